@@ -16,7 +16,6 @@ TARGETS: Final = (
     "program",
     "weights",
     "formatting",
-    "incremental",
     "zoo",
     "learn",
     "slow",

@@ -181,7 +181,7 @@ class Evaluation:
             session.animated[:] = [0.0, 0.0, 0.0, 1.0]
         with deep_stack(), suppress(Halt):
             self._body = prepare_file(self.context, file)
-            given.lost |= self.context.damage.words
+            given.lost |= session.report.damage(file.span.source).words
             if given is not params:
                 given.report_unused(diagnostics)
         self.wanted = tuple(loader.wanted)

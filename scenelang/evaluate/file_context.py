@@ -12,7 +12,6 @@ from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.loader import Loader
 from scenelang.evaluate.names import UNBOUND, Env, Scope, Slots
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.evaluate.session import Defines, Session
 from scenelang.syntax import nodes
 
@@ -30,7 +29,6 @@ class FileContext:
         path: where it was read from, resolved; None for text without a file.
         prefix: how the first file calls its params: empty, or ``lib.``.
         weight: half evaluation steps of what has been prepared of the block at hand.
-        damage: what syntax mistakes leave unknown of it.
         materials: what a Scene calls those of a file of elements.
         has_params: whether it, or a file that it imports, has params.
     """
@@ -46,7 +44,6 @@ class FileContext:
     nesting: int = 0
     weight: int = 0
     first: nodes.Stmt | None = None
-    damage: Damage = NONE
     materials: dict[str, str] = field(default_factory=dict)
     has_params: bool = False
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.elements.pyramid import Grid, finest
+from scenelang.fitting.looks import Points
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.grid import GridShape
 

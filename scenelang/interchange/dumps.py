@@ -19,7 +19,6 @@ from scenelang.graph.spaces import PLANE
 from scenelang.graph.stage import HORIZON, ZENITH, Stage, Triple, encoded, stage_data
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Twist, Warp
 from scenelang.syntax import nodes
-from scenelang.syntax.incremental import difference
 
 if TYPE_CHECKING:
     from scenelang.program.program import Program
@@ -274,6 +273,12 @@ def token_names(program: Program) -> list[str]:
     return [token_name(token) for token in program.tokens.tolist()]
 
 
+def _alike(left: list[str], right: list[str]) -> int:
+    """Number of lines with which both lists begin."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
+
+
 def changes(before: str, after: str, old: str, new: str) -> str:
     """The diff of two dumps; empty where nothing changed.
 
@@ -282,10 +287,11 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     if before == after:
         return ""
     a, b = before.splitlines(), after.splitlines()
-    edit = difference(a, b)
-    gone, come = edit.old_end - edit.start, edit.new_end - edit.start
+    start = _alike(a, b)
+    end = _alike(a[start:][::-1], b[start:][::-1])
+    gone, come = len(a) - start - end, len(b) - start - end
     if max(gone, come) > 3000:
         counts = f"{plural(gone, 'line')} became {come:,}"
-        return f"--- {old}\n+++ {new}\n@@ from line {edit.start + 1:,}: {counts} @@\n"
+        return f"--- {old}\n+++ {new}\n@@ from line {start + 1:,}: {counts} @@\n"
     lines = difflib.unified_diff(a, b, old, new, lineterm="")
     return "\n".join(lines) + "\n"

@@ -15,9 +15,8 @@ from scenelang.diagnostics.diagnostic import Diagnostic
 from scenelang.diagnostics.fixes import apply_fixes
 from scenelang.diagnostics.pages import CODES
 from scenelang.diagnostics.span import Span
-from scenelang.lsp.text import Lines
+from scenelang.lsp.text import Lines, difference
 from scenelang.lsp.workspace import Document, uri_of
-from scenelang.syntax.incremental import difference
 
 
 def to_location(span: Span, document: Document) -> types.Location:
@@ -68,7 +67,7 @@ def _import_of(name: str, document: Document) -> Span | None:
     """The import statement that brings a file, or the first one where it is brought by another."""
     from scenelang.syntax import nodes
 
-    imports = [stmt for stmt in document.parsed.file.statements if isinstance(stmt, nodes.Import)]
+    imports = [stmt for stmt in document.file.statements if isinstance(stmt, nodes.Import)]
     for stmt in imports:
         if name.endswith(Path(stmt.path.value).name):
             return stmt.path.span
@@ -94,7 +93,7 @@ def code_actions(
     """What may be done about the mistakes in a range: of the kinds asked for, or of all."""
     lines = document.lines
     start, end = lines.offset(place.start), lines.offset(place.end)
-    found = [*document.parsed.diagnostics, *document.semantic]
+    found = [*document.syntax, *document.semantic]
     here = [
         d
         for d in found

@@ -7,7 +7,7 @@ from typing import Final
 
 from lsprotocol import types
 
-from scenelang.lsp.context import Cursor, cursor_at, sight_at
+from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.text import width
 from scenelang.lsp.workspace import Document, Workspace
 from scenelang.resolve.names import Names, Symbol
@@ -23,7 +23,7 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
     call = cursor.call
     if call is None:
         return None
-    found = find_symbol(docs, document, sight_at(document.parsed, call.start), call.name, call.start)
+    found = find_symbol(docs, document, document.names, call.name, call.start)
     return word_of(found) if found is not None else word_for_call(call.name, cursor.block.kind == "material")
 
 
@@ -43,7 +43,7 @@ def find_symbol(docs: Workspace, document: Document, names: Names, name: str, of
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
     """How what is being called is called, and which argument the cursor is in."""
-    cursor = cursor_at(document.parsed, offset)
+    cursor = cursor_at(document.tokens, offset)
     callee = find_callee(docs, document, cursor)
     if callee is None or cursor.call is None or cursor.inside == "comment":
         return None

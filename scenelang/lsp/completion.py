@@ -14,7 +14,7 @@ from scenelang import words
 from scenelang.elements.groups import told
 from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
-from scenelang.lsp.context import Cursor, cursor_at, sight_at
+from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.tokens import COLOURED
 from scenelang.lsp.values import vocabulary_of
 from scenelang.lsp.workspace import Document, Workspace, scenes_below
@@ -88,10 +88,10 @@ _SYMBOLS: Final = {
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
     """What may stand at an offset."""
-    names = sight_at(document.parsed, offset)
+    names = document.names
     holders = ("let", "argument", "loop", "param")
     values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
-    cursor = cursor_at(document.parsed, offset, values)
+    cursor = cursor_at(document.tokens, offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
         start += 1
@@ -183,7 +183,7 @@ class _Maker:
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
-            tops = [s for s in self.document.parsed.heads() if isinstance(s, nodes.Version | nodes.Model)]
+            tops = [s for s in self.document.file.statements if isinstance(s, nodes.Version | nodes.Model)]
             given = {type(stmt) for stmt in tops}
             if nodes.Version not in given:
                 yield self._keyword("nsg", "c")

@@ -6,66 +6,29 @@ A `Cursor` is of tokens alone, which are there however broken the text is.
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from typing import Any, Final, Literal
 
-from scenelang.diagnostics.span import Span
 from scenelang.records import Record
-from scenelang.resolve.names import Kind, Names, Symbol
 from scenelang.syntax import nodes
-from scenelang.syntax.incremental import Parsed
+from scenelang.syntax.lexer import Tokens
 from scenelang.syntax.nodes import children
 from scenelang.syntax.tables import tables
 from scenelang.words import COMBINE, NODES
 
 
-def path_to(parsed: Parsed, offset: int) -> list[Any]:
+def path_to(file: nodes.File, offset: int) -> list[Any]:
     """The nodes that hold an offset, outermost first; empty between statements."""
-    index = parsed.at(offset)
-    if index is None:
+    index = bisect_right(file.statements, offset, key=lambda stmt: stmt.span.start) - 1
+    if index < 0 or offset > file.statements[index].span.end:
         return []
-    path: list[Any] = [parsed.statement(index)]
+    path: list[Any] = [file.statements[index]]
     while True:
         inner = [n for n in children(path[-1]) if n.span.start <= offset <= n.span.end]
         if not inner:
             return path
         # Where two touch at the offset, the one that begins there is meant.
         path.append(max(inner, key=lambda n: (n.span.start, -n.span.end)))
-
-
-_Defining = nodes.Param | nodes.Let | nodes.Fn | nodes.Module | nodes.Import
-_TOP: Final[dict[type, Kind]] = {
-    nodes.Param: "param",
-    nodes.Let: "let",
-    nodes.Fn: "fn",
-    nodes.Module: "module",
-    nodes.Import: "import",
-}
-
-
-def sight_at(parsed: Parsed, offset: int) -> Names:
-    """The names in sight of an offset: those of its statement, and what the others define at top level.
-
-    This is what a keystroke asks for. It takes the other statements' trees where they stand, moved or not,
-    so that the nodes of their symbols are good for text and not for places.
-    """
-    index = parsed.at(offset)
-    whole = Span(parsed.source, 0, len(parsed.source.text))
-    names = Names(nodes.File(whole, () if index is None else (parsed.statement(index),)))
-    top = names.top
-    for at, stmt in enumerate(parsed.heads()):
-        kind = _TOP.get(stmt.__class__)
-        if kind is None or at == index or not isinstance(stmt, _Defining):
-            continue
-        name = stmt.alias if isinstance(stmt, nodes.Import) else stmt.name
-        symbol = Symbol(name.text, kind, name.span, stmt, top, parsed.ends[at])
-        if isinstance(stmt, nodes.Fn | nodes.Module):
-            symbol.since = 0
-            symbol.params = [
-                Symbol(p.name.text, "argument", p.name.span, p, top, 0, symbol) for p in stmt.params
-            ]
-        top.symbols.setdefault(symbol.name, symbol)
-    return names
 
 
 BlockKind = Literal["file", "group", "chain", "object", "material"]
@@ -126,10 +89,9 @@ class Cursor(Record):
 class _Reader:
     """Tokens read backwards."""
 
-    def __init__(self, parsed: Parsed) -> None:
-        tokens = parsed.tokens
+    def __init__(self, tokens: Tokens) -> None:
         self.kinds, self.starts, self.ends = tokens.kinds, tokens.starts, tokens.ends
-        self.source_text = parsed.source.text
+        self.source_text = tokens.source.text
         self.names = tables().kinds
 
     def text(self, index: int) -> str:
@@ -159,9 +121,9 @@ class _Reader:
         return None
 
 
-def cursor_at(parsed: Parsed, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
+def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
     """What is around an offset; ``values`` are names in sight that may be materials."""
-    read = _Reader(parsed)
+    read = _Reader(tokens)
     count = len(read.kinds) - 1
     index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor
     start = end = offset

@@ -45,7 +45,7 @@ def hover(
     if use is not None:
         text = _elements(docs, document, use, picture) or _use(docs, document, use)
         return _answer(document, use.start, use.end, text) if text else None
-    path = path_to(document.parsed, offset)
+    path = path_to(document.file, offset)
     for node in reversed(path):
         keyword = _keyword(node, offset)
         if keyword is not None:
@@ -201,7 +201,7 @@ def _model(manifest: Manifest) -> str:
 
 def _calls(document: Document, use: Use) -> Iterator[nodes.Call]:
     """The calls around a name, the innermost first."""
-    path = path_to(document.parsed, use.start)
+    path = path_to(document.file, use.start)
     return (node for node in reversed(path) if isinstance(node, nodes.Call))
 
 
@@ -250,11 +250,10 @@ def inlay_hints(
     """The hints of a range."""
     low, high = document.lines.offset(place.start), document.lines.offset(place.end)
     found: list[types.InlayHint] = []
-    parsed = document.parsed
-    for index, (start, end) in enumerate(zip(parsed.starts, parsed.ends, strict=True)):
-        if end < low or start > high:
+    for stmt in document.file.statements:
+        if stmt.span.end < low or stmt.span.start > high:
             continue
-        for node in walk(parsed.statement(index)):
+        for node in walk(stmt):
             if node.span.end < low or node.span.start > high:
                 continue
             if isinstance(node, nodes.Let) and settings.value_hints:

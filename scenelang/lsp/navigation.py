@@ -263,7 +263,7 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
     """Definitions at the top of all files whose names have the letters of a query, in order."""
     query, found = query.lower(), []
     for document in docs.known():
-        for stmt in document.parsed.file.statements:
+        for stmt in document.file.statements:
             if isinstance(stmt, nodes.Param | nodes.Let | nodes.Fn | nodes.Module):
                 letters = iter(stmt.name.text.lower())
                 if not all(letter in letters for letter in query):
@@ -306,7 +306,7 @@ def folding(document: Document) -> list[types.FoldingRange]:
 
 def selection(document: Document, offset: int) -> types.SelectionRange:
     """The nodes around an offset, innermost first, each within the next."""
-    spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.parsed, offset))]
+    spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.file, offset))]
     use = document.names.at(offset)
     if use is not None:
         spans.append((use.start, use.end))

@@ -189,7 +189,7 @@ class Server(LanguageServer):
 
     def publish(self, document: Document) -> None:
         """Send what is known now: the syntax of this text, and what the last check found, moved along."""
-        found = [*document.parsed.diagnostics, *document.semantic]
+        found = [*document.syntax, *document.semantic]
         shown = [d for d in (to_diagnostic(item, document) for item in found) if d is not None]
         self.text_document_publish_diagnostics(
             types.PublishDiagnosticsParams(document.uri, shown, document.version)
@@ -218,7 +218,7 @@ class Server(LanguageServer):
             return
         stop = self._running[uri] = threading.Event()
         loop = asyncio.get_running_loop()
-        parsed = document.parsed
+        file, whole = document.file, not document.syntax
         folder = next(iter(self.docs.folders), None)
         root = self.settings.root or (folder if document.path is None else None)
         texts, model = self.docs.texts(), self.settings.model
@@ -227,8 +227,7 @@ class Server(LanguageServer):
             if stop.is_set():
                 return
             try:
-                whole = not parsed.diagnostics
-                checked = check(parsed.file, document.path, root, texts, model, whole, stop)
+                checked = check(file, document.path, root, texts, model, whole, stop)
             except Superseded:
                 return
             except Exception:

@@ -8,15 +8,42 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Literal
 
 from lsprotocol import types
 
 from scenelang.diagnostics.span import Span
-from scenelang.syntax.incremental import Edit, difference
 
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
 _NEWLINE: Final = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class Edit:
+    """``old[start:old_end]`` became ``new[start:new_end]``; offsets in code points."""
+
+    start: int
+    old_end: int
+    new_end: int
+
+    @property
+    def delta(self) -> int:
+        return self.new_end - self.old_end
+
+
+def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
+    """The shortest single edit from one text, or list of lines, to another."""
+    start = _alike(old, new)
+    end = _alike(old[start:][::-1], new[start:][::-1])
+    return Edit(start, len(old) - end, len(new) - end)
+
+
+def _alike(left: Sequence[str], right: Sequence[str]) -> int:
+    """Number of items with which both sequences begin."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
 
 class Lines:

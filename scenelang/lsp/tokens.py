@@ -70,7 +70,7 @@ def semantic_tokens(docs: Workspace, document: Document, place: types.Range | No
 
 
 def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tuple[int, int, str, int]]:
-    text, tokens = document.text, document.parsed.tokens
+    text, tokens = document.text, document.tokens
     names = tables().kinds
     uses = {use.start: use for use in document.names.uses}
     found: list[tuple[int, int, str, int]] = []

@@ -31,7 +31,7 @@ def _all() -> Vocabulary:
 
 def vocabulary_of(document: Document) -> Vocabulary:
     """The words of the model that a document names, or those of all models."""
-    for stmt in document.parsed.heads():
+    for stmt in document.file.statements:
         if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
             return _all().choose(stmt.name.value) or _all()
     return _all()

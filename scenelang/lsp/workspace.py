@@ -15,18 +15,16 @@ from typing import TYPE_CHECKING, Final
 
 from pygls.uris import from_fs_path, to_fs_path
 
-from scenelang.diagnostics.diagnostic import Diagnostic, Fix, Label
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Fix, Label
 from scenelang.diagnostics.diagnostic import Edit as Change
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.elements.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.evaluate.loader import Unreadable, read_source
-from scenelang.lsp.text import Encoding, Lines, applied
+from scenelang.lsp.text import Edit, Encoding, Lines, applied
 from scenelang.resolve.names import Names, Symbol, Use
 from scenelang.scene import library
-from scenelang.syntax import nodes
-from scenelang.syntax.incremental import Edit, Parsed, parse_edited, parse_whole
-from scenelang.syntax.lexer import Tokens
-from scenelang.syntax.tables import END
+from scenelang.syntax import nodes, parse
+from scenelang.syntax.lexer import Report, Tokens, scan
 from scenelang.tensors import TensorError
 
 if TYPE_CHECKING:
@@ -54,7 +52,7 @@ class Document:
 
     uri: str
     path: Path | None
-    parsed: Parsed
+    source: SourceFile
     version: int | None = None
     encoding: Encoding = "utf-16"
     checked: Checked | None = None
@@ -67,12 +65,8 @@ class Document:
         return self.path.name if self.path is not None else self.uri
 
     @property
-    def source(self) -> SourceFile:
-        return self.parsed.source
-
-    @property
     def text(self) -> str:
-        return self.parsed.source.text
+        return self.source.text
 
     @cached_property
     def lines(self) -> Lines:
@@ -80,20 +74,48 @@ class Document:
 
     @cached_property
     def names(self) -> Names:
-        return Names(self.parsed.file)
+        return Names(self.file)
 
     @property
     def file(self) -> nodes.File:
-        return self.parsed.file
+        """The tree."""
+        return self._parsed[0]
+
+    @cached_property
+    def tokens(self) -> Tokens:
+        """The tokens as they stand in the text; none of one that is too long."""
+        source = SourceFile(self.source.name, "") if self._is_too_long else self.source
+        return scan(source, Report(source))
+
+    @property
+    def syntax(self) -> tuple[Diagnostic, ...]:
+        """All syntax mistakes, in the order of the text."""
+        return self._parsed[1]
+
+    @property
+    def _is_too_long(self) -> bool:
+        return len(self.text) > MAX_TEXT
+
+    @cached_property
+    def _parsed(self) -> tuple[nodes.File, tuple[Diagnostic, ...]]:
+        if self._is_too_long:
+            message = (
+                f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
+            )
+            help = "`scenelang check` does, up to 10 MB"
+            nowhere = Span(self.source, 0, 0)
+            return nodes.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
+        found = Diagnostics()
+        return parse(self.source, found), tuple(found)
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
         text, edit = applied(self.lines, change)
         source = SourceFile(self.source.name, text)
-        self.parsed = _parsed(source, (self.parsed, edit))
+        self.source = source
         self.edits.append(edit)
         self.semantic = [moved for d in self.semantic if (moved := _carried(d, edit, source)) is not None]
-        for name in ("lines", "names"):
+        for name in ("_parsed", "lines", "names", "tokens"):
             self.__dict__.pop(name, None)
 
     def before(self, offset: int) -> int | None:
@@ -144,7 +166,7 @@ class Workspace:
         """Open a buffer, or open it anew."""
         path = path_of(uri)
         source = SourceFile(str(path) if path is not None else uri, text)
-        document = Document(uri, _resolved(path), _parsed(source), version, self.encoding)
+        document = Document(uri, _resolved(path), source, version, self.encoding)
         self.open[uri] = document
         return document
 
@@ -170,7 +192,7 @@ class Workspace:
             source = read_source(path, str(path))
         except (OSError, Unreadable, ValueError):
             return None
-        document = Document(uri_of(path), path, _parsed(source), None, self.encoding)
+        document = Document(uri_of(path), path, source, None, self.encoding)
         self._closed[path] = (stamp, document)
         return document
 
@@ -252,17 +274,6 @@ class Workspace:
                 target = self.definition(other, use)
                 if target is not None and target[1] is symbol:
                     yield other, use
-
-
-def _parsed(source: SourceFile, edited: tuple[Parsed, Edit] | None = None) -> Parsed:
-    """The tree of a text, by an edit of the one before where there was one; none of a large text."""
-    if len(source.text) <= MAX_TEXT:
-        return parse_whole(source) if edited is None else parse_edited(edited[0], source, edited[1])
-    tokens = Tokens(source)
-    tokens.append(END, len(source.text), len(source.text))
-    message = f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
-    help = "`scenelang check` does, up to 10 MB"
-    return Parsed(source, [], [], tokens, (Diagnostic("E0324", message, Span(source, 0, 0), help=help),), [])
 
 
 def scenes_below(folder: Path, most: int) -> Iterator[Path]:

@@ -193,8 +193,8 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     return re.compile(pattern), kinds, [*names, "sign", "illegal"]
 
 
-def scan(source: SourceFile, report: Report, begin: int = 0, end: int | None = None) -> Tokens:
-    """All tokens of a text, or of a part that begins and ends with a statement; slips go to ``report``."""
+def scan(source: SourceFile, report: Report) -> Tokens:
+    """All tokens of a text; slips go to ``report``."""
     pattern, group_kinds, names = _master()
     literals = tables().literals
     name_group, sign_group = names.index("NAME"), names.index("sign")
@@ -202,10 +202,9 @@ def scan(source: SourceFile, report: Report, begin: int = 0, end: int | None = N
     tokens = Tokens(source)
     kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
     text = source.text
-    stop = len(text) if end is None else end
     keyword = literals.get
     slips = _Slips(tokens, report)
-    for match in pattern.finditer(text, begin, stop):
+    for match in pattern.finditer(text):
         group = match.lastindex
         if group is None:
             break
@@ -224,7 +223,7 @@ def scan(source: SourceFile, report: Report, begin: int = 0, end: int | None = N
         kinds.append(kind)
         starts.append(start)
         ends.append(end)
-    tokens.append(END, stop, stop)
+    tokens.append(END, len(text), len(text))
     return tokens
 
 

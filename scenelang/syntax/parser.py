@@ -1,4 +1,4 @@
-"""Text to tree: braces, the automaton, and `syntax.recovery.recover` where a token does not fit."""
+"""Text to tree: braces, the automaton, and `syntax.recovery` where a token does not fit."""
 
 from __future__ import annotations
 

@@ -40,9 +40,9 @@ def test_what_is_left_is_reported(folder: Folder) -> None:
 
 def test_a_fix_uncovers_the_next_mistake(folder: Folder) -> None:
     """Rounds go on until nothing is found: the angle is met only once the name is right."""
-    name = folder.write("a.nsg", "modul m(x) { squar { rotate(PI * x) } }\nm(45)\n")
+    name = folder.write("a.nsg", "modul m(x) { squar { rotate(360.00) } }\nm(45)\n")
     assert folder.run("check", name, "--fix").exit_code == 0
-    assert read(folder, name) == "module m(x) { square { rotate(PI * x * 1rad); } }\nm(45);\n"
+    assert read(folder, name) == "module m(x) { square { rotate(360.00deg); } }\nm(45);\n"
 
 
 def test_a_file_without_fixes_is_not_touched(folder: Folder) -> None:
@@ -88,7 +88,7 @@ def test_a_file_that_cannot_be_written(folder: Folder, monkeypatch: pytest.Monke
 
 
 def test_imports_change_only_where_they_are_named(folder: Folder) -> None:
-    library, scene = "module m(x) { square { rotate(PI * x) } }\n", 'import "lib.nsg" as lib;\nlib.m(45)\n'
+    library, scene = "module m(x) { square { rotate(360.00) } }\n", 'import "lib.nsg" as lib;\nlib.m(45)\n'
     lib, name = folder.write("lib.nsg", library), folder.write("a.nsg", scene)
     result = folder.run("check", name, "--fix")
     assert result.exit_code == 1
@@ -97,7 +97,7 @@ def test_imports_change_only_where_they_are_named(folder: Folder) -> None:
     assert read(folder, name) == 'import "lib.nsg" as lib;\nlib.m(45);\n'
     # Named under another path, it is fixed, by what is found in the scene that imports it too.
     assert folder.run("check", name, f"./{lib}", "--fix").exit_code == 0
-    assert read(folder, lib) == "module m(x) { square { rotate(PI * x * 1rad); } }\n"
+    assert read(folder, lib) == "module m(x) { square { rotate(360.00deg); } }\n"
 
 
 def test_standard_input_goes_to_standard_output(folder: Folder) -> None:

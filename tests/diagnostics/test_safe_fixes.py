@@ -71,7 +71,6 @@ AMBIGUOUS = {
         "square { translate(1, 2 3 * 4); }",
     ],
     "E0114": ['import "my parts.nsg as a;'],
-    "E0116": ["let n = 1,500; square { scale(n); }", "let n = 0,500; square { scale(n); }"],
     "E0119": [r'param s = "caf\u00e9";', r'param s = "it\'s";'],
     "E0127": ["# square { scale(0.5); }"],
     "E0130": ["let a = 1; { square; }"],
@@ -90,24 +89,11 @@ def test_no_fix_where_several_things_can_be_meant(code: str, text: str) -> None:
     assert [d.message for d in found if d.fix is not None and d.code != "W0201"] == []
 
 
-def test_brackets_are_closed_where_they_can_be_closed_nowhere_else() -> None:
-    for text, good in {
-        "square { rotate(30deg; }": "square { rotate(30deg); }",
-        "square { translate((0.2 + 0.1) * 2, 0.5; }": "square { translate((0.2 + 0.1) * 2, 0.5); }",
-        "let e = sin(cos(tan(0.5rad);": "let e = sin(cos(tan(0.5rad)));",
-        "let a = [1 + 2, 2 * 3, 4;": "let a = [1 + 2, 2 * 3, 4];",
-    }.items():
-        fixed, _ = apply_fixes(text, check(text))
-        assert fixed.replace("_", "") == good
-
-
 @pytest.mark.parametrize(
     ("bad", "good"),
     [
         ("square { rotate(angle: 30deg); }", "square { rotate(angle = 30deg); }"),
-        ("let _d = rgb 0.1, 0.2, 0.3);", "let _d = rgb(0.1, 0.2, 0.3);"),
         ("for (_i in /* to */ in 0..3) { square {} }", "for (_i in /* to */ 0..3) { square {} }"),
-        ("square { scale(1, 2) ); }", "square { scale(1, 2); }"),
         ("star; ;  // a star", "star; // a star"),
         ("star;;  // a star", "star;  // a star"),
         ("star;\n  ;\nsquare;", "star;\nsquare;"),

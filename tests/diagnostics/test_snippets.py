@@ -55,8 +55,7 @@ def test_words_of_other_marks_hang_below_from_right_to_left() -> None:
         "  |",
         "1 | aa + bb - cc",
         "  | --   ^^ - -- right",
-        "  | |       |",
-        "  | |       minus",
+        "  |         minus",
         "  | left",
     ]
 
@@ -74,9 +73,8 @@ def test_two_words_for_one_place() -> None:
         "  |",
         "1 | aa + bb - cc",
         "  | --   ^^",
-        "  | |",
-        "  | one",
         "  | two",
+        "  | one",
     ]
 
 
@@ -95,55 +93,15 @@ def test_lines_between_marks() -> None:
     ]
 
 
-def test_a_mark_over_lines_that_begins_its_line() -> None:
-    assert rows(at("group", "x;")) == ["  |", "2 | / group {", "3 | |   x; {", "  | |____^"]
-
-
-def test_a_mark_over_lines_that_begins_within_one() -> None:
+def test_of_a_mark_over_lines_the_first_is_underlined() -> None:
+    assert rows(at("group", "x;")) == ["  |", "2 | group {", "  | ^^^^^^^"]
     assert rows(at("{\n    y", "y1"), (at("z"), "zed")) == [
         "  |",
-        "3 |     x; {",
-        "  |  ______^",
-        "4 | |     y",
-        "5 | |     y1",
-        "  | |______^",
+        "3 |   x; {",
+        "  |      ^",
         "...",
-        "9 |     } z",
-        "  |       - zed",
-    ]
-
-
-def test_a_long_mark_is_shown_in_part() -> None:
-    assert rows(at("group", "\n}"), (at("y2"), "inside")) == [
-        "   |",
-        " 2 | / group {",
-        " 3 | |   x; {",
-        " 4 | |     y",
-        " 5 | |     y1",
-        " 6 | |     y2",
-        "   | |     -- inside",
-        "...  |",
-        " 9 | |   } z",
-        "10 | | }",
-        "   | |_^",
-    ]
-
-
-def test_marks_over_the_same_lines_have_bars_of_their_own() -> None:
-    assert rows(at("group", "\n}"), (at("{\n    y", "  }"), "inner"), (at("z"), "zed")) == [
-        "   |",
-        " 2 | /  group {",
-        " 3 | |    x; {",
-        "   | | ______-",
-        " 4 | ||     y",
-        " 5 | ||     y1",
-        "...  ||",
-        " 8 | ||     y4",
-        " 9 | ||   } z",
-        "   | ||   - - zed",
-        "   | ||___| inner",
-        "10 | |  }",
-        "   | |__^",
+        "9 |   } z",
+        "  |     - zed",
     ]
 
 

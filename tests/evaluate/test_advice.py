@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 import scenelang as nsg
 from scenelang.diagnostics.pages import CODES
 
@@ -82,11 +80,11 @@ CASES = (
         f"{SHAPES} s.path([[0, 0], [1, 1]], 0.1);"),
     (f"{SHAPES} s.polygon([[0, 0], [1, 0], [0, 1]]);", "s.polygon(n, r), which is regular",
         f"{SHAPES} s.polygon(3, 1);"),
-    ("star { fill = #f00; }", "write material flat { color(…); }",
+    ("star { fill = #f00; }", "material flat { color(…); }",
         "star { material flat { color(#f00); } }"),
-    ("torus { position = [1, 0, 0]; }", "write translate(…);", "torus { translate([1, 0, 0]); }"),
+    ("torus { position = [1, 0, 0]; }", "translate(…);", "torus { translate([1, 0, 0]); }"),
     ("star { r = 0.5; scale(r); }", None, "star { let r = 0.5; scale(r); }"),
-    ("torus { radius = 0.5; }", "write scale(s)", "torus { scale(0.5); }"),
+    ("torus { radius = 0.5; }", "scale(s)", "torus { scale(0.5); }"),
     ("star { translate(10px, 0); }", "the shorter side of the canvas is 2", "star { translate(0.1, 0); }"),
     ("canvas(80x60); star;", "80, 60", "canvas(80, 60); star;"),
     ("star { rotate(45°); }", "it is `deg` here", "star { rotate(45deg); }"),
@@ -97,9 +95,8 @@ CASES = (
         "star { material flat { color([1, 0, 0]); } }"),
     ("torus { rotate(45deg, axis = y); }", "X, Y and Z", "torus { rotate(45deg, axis = Y); }"),
     ("model shapes2d; star;", "a string", 'model "shapes2d"; star;'),
-    ('group("wheel") { star; }', "comment", "group { star; }"),
-    ("linear_extrude(height = 1) star;", "not extruded", "star;"),
-    ("mirror([1, 0]) star;", "scale(-1, 1)", "star { scale(-1, 1); }"),
+    ("linear_extrude(height = 1) star;", "in the block", "star;"),
+    ("mirror([1, 0]) star;", "in the block", "star { scale(-1, 1); }"),
     ("star { scale(0,5); }", "behind a point", "star { scale(0.5); }"),
     ("sphere { <0, 0, 0>, 1 pigment { color Red } }", "sphere { translate(0, 1, 0); }",
         "sphere { translate(0, 1, 0); material diffuse { color(#f00); } }"),
@@ -110,16 +107,19 @@ CASES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "said", "meant"), CASES, ids=[text for text, *_ in CASES])
-def test_advice_leads_to_a_scene(text: str, said: str | None, meant: str) -> None:
-    (only,) = nsg.check_text(text)
-    assert only.code in CODES
-    assert said is None or said in (only.help or "")
-    assert [*nsg.check_text(meant)] == []
-    if only.fix is not None:
-        after, left = nsg.fix_text(text)
-        assert " ".join(after.split()) == meant
-        assert [*left] == []
+def test_advice_leads_to_a_scene() -> None:
+    wrong = []
+    for text, said, meant in CASES:
+        found = [*nsg.check_text(text)]
+        only = found[0] if len(found) == 1 else None
+        good = only is not None and only.code in CODES and (said is None or said in (only.help or ""))
+        if not good or [*nsg.check_text(meant)]:
+            wrong.append((text, found))
+        elif only is not None and only.fix is not None:
+            after, left = nsg.fix_text(text)
+            if " ".join(after.split()) != meant or [*left]:
+                wrong.append((text, [after, *left]))
+    assert wrong == []
 
 
 def test_lists_name_what_can_stand_there() -> None:

@@ -20,7 +20,6 @@ COUNTS = {
     "program": (20, 150),
     "weights": (20, 250),
     "formatting": (40, 50),
-    "incremental": (10, 25),
     "zoo": (20, 150),
     "learn": (30, 60),
     "slow": (4, 4),

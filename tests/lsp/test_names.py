@@ -12,10 +12,10 @@ from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare import references
-from scenelang.lsp.context import cursor_at, sight_at
+from scenelang.lsp.context import cursor_at
 from scenelang.resolve.names import Names
 from scenelang.syntax import nodes, parse
-from scenelang.syntax.incremental import parse_whole
+from scenelang.syntax.lexer import Report, Tokens, scan
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
 SHADOWS = """
@@ -30,6 +30,11 @@ module m(a, at = [a, a]) {
 if (a == 1) { let a = 5; m(a); } else { m(a, at = [a, f(a)]); }
 for (a in [a, a + 1]) { m(a); }
 """
+
+
+def tokens_of(text: str) -> Tokens:
+    source = SourceFile("a.nsg", text.replace("|", ""))
+    return scan(source, Report(source))
 
 
 @pytest.mark.parametrize("text", [SHADOWS, *(path.read_text("utf-8") for path in EXAMPLES)])
@@ -56,16 +61,6 @@ def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pyte
         assert use.symbol.span == place, name
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_the_sight_of_a_place_is_that_of_the_whole_file(path: Path) -> None:
-    parsed = parse_whole(SourceFile(path.name, path.read_text("utf-8")))
-    names = Names(parsed.file)
-    for offset in range(0, len(parsed.source.text), 7):
-        whole = {(symbol.name, symbol.kind) for symbol in names.visible(offset)}
-        near = {(symbol.name, symbol.kind) for symbol in sight_at(parsed, offset).visible(offset)}
-        assert near == whole, offset
-
-
 @pytest.mark.parametrize(
     ("text", "kind", "head"),
     [
@@ -85,8 +80,7 @@ def test_the_sight_of_a_place_is_that_of_the_whole_file(path: Path) -> None:
 )
 def test_the_kind_of_block_is_read_off_tokens(text: str, kind: str, head: str) -> None:
     offset = text.index("|")
-    parsed = parse_whole(SourceFile("a.nsg", text.replace("|", "")))
-    block = cursor_at(parsed, offset, frozenset({"m"}) if "let m" in text else frozenset()).block
+    block = cursor_at(tokens_of(text), offset, frozenset({"m"}) if "let m" in text else frozenset()).block
     assert (block.kind, block.head) == (kind, head)
 
 
@@ -106,7 +100,7 @@ def test_the_call_around_the_cursor(
     text: str, name: str, index: int, named: str | None, given: tuple[str, ...]
 ) -> None:
     offset = text.index("|")
-    call = cursor_at(parse_whole(SourceFile("a.nsg", text.replace("|", ""))), offset).call
+    call = cursor_at(tokens_of(text), offset).call
     assert call is not None
     assert (call.name, call.index, call.named, call.given) == (name, index, named, frozenset(given))
 
@@ -114,4 +108,4 @@ def test_the_call_around_the_cursor(
 def test_parentheses_that_call_nothing_are_no_call() -> None:
     for text in ("if (|", "let a = (1 + |", "fn f(|", "for (i in |"):
         offset = text.index("|")
-        assert cursor_at(parse_whole(SourceFile("a.nsg", text.replace("|", ""))), offset).call is None
+        assert cursor_at(tokens_of(text), offset).call is None

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lsprotocol import types
 
-from scenelang.lsp.text import Encoding, Lines, width
-from scenelang.syntax.incremental import difference
+from scenelang.lsp.text import Encoding, Lines, difference, width
 
 TEXTS = st.text(st.sampled_from("ab\té𝄞\n\r\u2028\x0b"), max_size=30)
 SIZES: dict[Encoding, tuple[str, int]] = {

@@ -47,7 +47,7 @@ def hold(table: Table, all_: float, each: float, most: float) -> None:
 
 
 def test_one_slip_is_one_diagnostic(table: Table) -> None:
-    hold(table, all_=0.96, each=0.9, most=0.002)
+    hold(table, all_=0.94, each=0.85, most=0.005)
 
 
 def test_every_kind_of_slip_makes_mistakes(table: Table) -> None:
@@ -59,7 +59,7 @@ def test_every_kind_of_slip_makes_mistakes(table: Table) -> None:
 
 @pytest.mark.slow
 def test_one_slip_anywhere_is_one_diagnostic() -> None:
-    hold(study(exhaust(seed=3, tries=1)), all_=0.96, each=0.9, most=0.0005)
+    hold(study(exhaust(seed=3, tries=1)), all_=0.94, each=0.85, most=0.003)
 
 
 def test_scenes_are_sound() -> None:

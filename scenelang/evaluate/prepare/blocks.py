@@ -14,7 +14,6 @@ from scenelang.evaluate.limits import MAX_NESTING
 from scenelang.evaluate.names import UNBOUND, Binding, Definition, Env, Needs, Scope, Slots
 from scenelang.evaluate.prepare.expressions import VARIES, guarded, prepare
 from scenelang.evaluate.prepare.operations import condition
-from scenelang.evaluate.report.undefined import report_rebound
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import POISON, Problem, RangeValue, Vec, unexpected
 from scenelang.records import Record
@@ -129,13 +128,12 @@ def misplaced(
 
 def define(name: nodes.Name, binding: Binding, place: Place) -> bool:
     """Bind a name in this scope; reports a second definition and keeps the first."""
-    file, scope = place.file, place.scope
+    scope = place.scope
     earlier = scope.names.get(name.text)
     scope.later.pop(name.text, None)
-    if file.damage and file.damage.holds(name.span):
+    if place.report.damage(name.span.source).holds(name.span):
         # What it stands for is known when its statement reads again.
         binding.kind = "poison"
-        report_rebound(place, name, scope.find(name.text))
     elif earlier is not None:
         message = f"`{name.text}` is already defined in this scope"
         help = "names are bound once; an inner block may bind them anew"

@@ -18,8 +18,6 @@ from scenelang.evaluate.prepare.references import lookup, wrong_kind
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.report.undefined import (
-    advise_parameter,
-    reported_at_definition,
     unknown,
     unknown_member,
 )
@@ -73,12 +71,9 @@ def bind(
         labels: tuple[Label, ...] = here,
     ) -> None:
         outer = definition.name.span if definition else span
-        key = code, way, outer.source, outer
-        known = report.shared.get(key)
-        if known is not None and known.code != code:
-            advise_parameter(report, known, outer)
-            return
-        report.error_once(key, code, message, span, help=help, fix=fix, labels=labels)
+        report.error_once(
+            (code, way, outer.source, outer), code, message, span, help=help, fix=fix, labels=labels
+        )
 
     good, position = True, 0
     for given in args:
@@ -94,16 +89,14 @@ def bind(
             index = params.index(word.text)
         else:
             good = False
-            formal = [(param.text, param.span, "argument") for param in places]
-            if not reported_at_definition(report, word.text, word.span.source, formal):
-                hint, fix = did_you_mean(word.text, params, word.span, effort=report.effort)
-                if hint is None and called in foreign_words.ARGUMENTS:
-                    hint, fix = instead(word.text, foreign_words.ARGUMENTS[called], params, word.span)
-                if hint is None and word.text in foreign_words.LOOKS and isinstance(definition, nodes.Module):
-                    hint = f"its block has the colour: {called}(…) {{ material flat {{ color(#d33); }} }}"
-                hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
-                message = f"`{called}` has no argument `{word.text}`"
-                fail(word.text, message, word.span, hint, fix, "E0206")
+            hint, fix = did_you_mean(word.text, params, word.span, effort=report.effort)
+            if hint is None and called in foreign_words.ARGUMENTS:
+                hint, fix = instead(word.text, foreign_words.ARGUMENTS[called], params, word.span)
+            if hint is None and word.text in foreign_words.LOOKS and isinstance(definition, nodes.Module):
+                hint = f"its block has the colour: {called}(…) {{ material flat {{ color(#d33); }} }}"
+            hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
+            message = f"`{called}` has no argument `{word.text}`"
+            fail(word.text, message, word.span, hint, fix, "E0206")
             continue
         earlier = bound[index]
         if earlier is None:
@@ -141,7 +134,6 @@ def prepare_call(expr: nodes.CallExpr, place: Place) -> Code:
     if enter is None:
         return POISONED
     session = place.session
-    session.report.defined[name.span.source, name.span.start] = definition.node.name.span
 
     def run(env: Env) -> Any:
         before = session.report.calls
@@ -187,15 +179,12 @@ def _call_builtin(expr: nodes.CallExpr, given: list[Given], place: Place) -> Cod
 
 def _method(expr: nodes.CallExpr, place: Place) -> None:
     """Report `v.length()`: a value has no functions."""
-    alias, _, rest = expr.name.text.partition(".")
-    source, start = expr.name.span.source, expr.name.span.start
-    value = nodes.Name(Span(source, start, start + len(alias)), alias)
-    last = nodes.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
-    from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+    rest, source = expr.name.text.partition(".")[2], expr.name.span.source
+    from scenelang.evaluate.report.advice import member_advice  # only mistakes need it
 
-    help, fix = member_advice(nodes.NameRef(value.span, value), last)
-    help = help or f"write {rest}(…) with the value as an argument"
-    place.report.error("E0128", "only a name can be called", expr.name.span, help=help, fix=fix)
+    last = nodes.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
+    help = member_advice(last) or f"write {rest}(…) with the value as an argument"
+    place.report.error("E0128", "only a name can be called", expr.name.span, help=help)
 
 
 def _doubted_hsv(exprs: Sequence[nodes.Expr], place: Place) -> Callable[..., Any]:

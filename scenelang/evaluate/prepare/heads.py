@@ -23,7 +23,7 @@ from scenelang.evaluate.report.undefined import (
     report_unknown,
     unknown,
     unknown_member,
-    within_effort,
+    visible,
 )
 from scenelang.syntax import nodes
 from scenelang.words import ANIMATED, COMBINE, CONSTANTS, FUNCTIONS, LANGUAGE, NODES, SETTINGS
@@ -77,8 +77,8 @@ def _skim(stmt: nodes.Call, place: Place) -> None:
 
 def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
     """Report ``dot(x, y) { … }`` whose arguments are unknown names: the word `module` is missing."""
-    name, damage = stmt.name.text, place.file.damage
-    if stmt.body is None or not stmt.args or "." in name or (damage and damage.loses(name)):
+    name = stmt.name.text
+    if stmt.body is None or not stmt.args or "." in name:
         return False
     values = [arg.value.name for arg in stmt.args if isinstance(arg.value, nodes.NameRef) and not arg.name]
     params = [arg.name for arg in stmt.args if arg.name] + values
@@ -92,15 +92,13 @@ def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
     written = ", ".join(arg.span.text for arg in stmt.args)
     help = f"to define it write module {name}({written}) {{ … }}"
     message = f"unknown geometry or module `{name}`"
-    report_unknown(stmt.name, place, "E0204", message, advise=lambda: (help, None), kinds=("module",))
+    report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
     return True
 
 
 def _unknown(stmt: nodes.Call, place: Place) -> None:
     """Report a statement whose name stands for nothing."""
     name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
-    if place.file.damage and place.file.damage.loses(text):
-        return
     if "." in text:
         alias = place.scope.find(text.partition(".")[0])
         if alias is None:
@@ -121,7 +119,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         place.report.error("E0205", message, name.span, help=help, labels=place.session.model_label())
         return
     if text in FUNCTIONS:
-        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+        from scenelang.evaluate.report.advice import material_advice  # only mistakes need it
 
         call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
         written = f"write color({call});" if inside else material_advice(place, "color", call)
@@ -129,9 +127,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         place.report.error("E0213", message, name.span, help=written if text in ("rgb", "hsv") else None)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-    kinds = ("module", *VALUES)
-    message = f"unknown {what} `{text}`"
-    report_unknown(name, place, "E0204", message, advise=lambda: _advice(stmt, place), kinds=kinds)
+    report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
 
 
 def _advice(stmt: nodes.Call, place: Place) -> Advice:
@@ -144,11 +140,11 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
     if place.kind == "object" and text in words.materials:
         return _lacks_material(stmt)
     if help is None and place.kind in HOLDERS:
-        from scenelang.evaluate.report.habits import called_boolean, in_library  # only mistakes need it
+        from scenelang.evaluate.report.advice import in_library  # only mistakes need it
 
         if (here := _boolean(stmt)) is not None:
-            return called_boolean(stmt, here)
-        help, fix = in_library(stmt, place)
+            return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
+        help, fix = in_library(stmt, place), None
     if fix is None:
         known, fix = instead(text, foreign_words.WORDS, candidates, name.span)
         help = known or help
@@ -157,14 +153,12 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign_words.WORDS.get(text, "")
     if help is None and place.kind == "object" and meant in words.material_ops - words.transforms:
-        from scenelang.evaluate.report.habits import in_material  # only mistakes need it
-        from scenelang.evaluate.report.spaces import material_advice
+        from scenelang.evaluate.report.advice import material_advice
 
         help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
-        fix = in_material(stmt, place.session, meant)
     help = help or foreign_words.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain") and words.geometries:
-        from scenelang.evaluate.report.spaces import drawn  # only mistakes need it
+        from scenelang.evaluate.report.advice import drawn  # only mistakes need it
 
         help = drawn(place, words.geometries)
     return help, fix
@@ -189,7 +183,7 @@ def _candidates(stmt: nodes.Call, place: Place) -> set[str]:
         return words.material_ops
     if kind == "object" and stmt.args is not None:
         return words.transforms
-    names = {n for n, _ in within_effort(place, VALUES if kind == "object" else ("module",))}
+    names = visible(place, VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
     found = words.geometries | names

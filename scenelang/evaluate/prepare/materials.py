@@ -148,7 +148,7 @@ def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
     elif name.text in words.geometries:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        from scenelang.evaluate.report.spaces import unknown_material  # only mistakes need it
+        from scenelang.evaluate.report.advice import unknown_material  # only mistakes need it
 
         hint, fix = unknown_material(name, place, known)
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
@@ -158,7 +158,7 @@ def _is_value(name: nodes.Name, place: Place) -> None:
     """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
-        from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+        from scenelang.evaluate.report.advice import material_advice  # only mistakes need it
 
         message = f"expected a material, found {describe(binding.value)}"
         help = f"for a colour write {material_advice(place, 'color', name.text)}"
@@ -202,7 +202,7 @@ def prepare_value_use(stmt: nodes.Call, binding: Binding, place: Place) -> Actio
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
+            from scenelang.evaluate.report.advice import material_advice  # only mistakes need it
 
             help = f"for a colour write {material_advice(place, 'color', name)}"
             session.report.error("E0301", message, span, labels=binding.labels(), help=help)

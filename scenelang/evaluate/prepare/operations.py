@@ -104,9 +104,9 @@ def member(code: Code, name: nodes.Name, place: Place, of: nodes.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
-        from scenelang.evaluate.report.habits import member_advice  # only mistakes need it
+        from scenelang.evaluate.report.advice import member_advice  # only mistakes need it
 
-        help, fix = member_advice(of, name)
+        help, fix = member_advice(name), None
         if help is None:
             help, fix = did_you_mean(name.text, COMPONENTS, name.span)
         help = help or "vectors have .x .y .z, or .r .g .b, or [i]"

@@ -22,8 +22,6 @@ def value_of(name: nodes.Name, binding: Binding, place: Place) -> Code:
         place.session.needs.on.append(binding.needs)
     if binding.kind == "poison" or slots is None:
         return POISONED
-    if binding.span is not None:
-        report.defined[span.source, span.start] = binding.span
     if slots is place.scope.slots:
         if binding.known:
             return constant(binding.value)
@@ -91,7 +89,7 @@ def _own_name(name: nodes.Name, place: Place) -> Code:
         else:
             unknown(name, place)
         return POISONED
-    if place.file.damage and place.file.damage.loses("animate"):
+    if "animate" in place.report.damage(place.file.source).words:
         return POISONED
     index = [*ANIMATED].index(text)
     session.needs.frame |= text != "frames"

@@ -18,7 +18,7 @@ from scenelang.evaluate.names import Binding, Env
 from scenelang.evaluate.prepare.blocks import Body, define, misplaced, prepare_block
 from scenelang.evaluate.prepare.calls import bind
 from scenelang.evaluate.prepare.expressions import prepare, prepare_arguments
-from scenelang.evaluate.report.suppression import find_damage
+from scenelang.evaluate.report.reporter import find_damage
 from scenelang.evaluate.report.type_errors import report_problem
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.functions import angle, number
@@ -301,9 +301,9 @@ def _elements(path: Path, zoo: Zoo, stmt: nodes.Import, context: FileContext) ->
 def prepare_file(context: FileContext, file: nodes.File, *, imported: bool = False) -> Body:
     """Prepare a file's statements; of an imported one only what it brings."""
     report = context.session.report
-    context.damage = find_damage(file, report.diagnostics)
-    if context.damage:
-        report.damaged[context.source] = context.damage
+    damage = find_damage(file, report.diagnostics)
+    if damage.lines:
+        report.damaged[context.source] = damage
     context.first = file.statements[0] if file.statements else None
     if imported:
         own = {s.name.text for s in file.statements if isinstance(s, nodes.Module)}

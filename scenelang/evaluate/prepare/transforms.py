@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from scenelang.diagnostics.diagnostic import Fix
 from scenelang.diagnostics.span import Span
 from scenelang.evaluate.builder import Builder
 from scenelang.evaluate.costs import MATRIX, MOVE, SAME_MOVE
@@ -32,8 +31,8 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
         return None
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
-        fix = _grouped(stmt, place)
-        report.error("E0330", f"`{name}` takes no block", stmt.name.span, help=help, fix=fix)
+        _skim(stmt, place)
+        report.error("E0330", f"`{name}` takes no block", stmt.name.span, help=help)
         return None
     if name == "scale" and len(given) == 1 and (given[0].arg.name is None or given[0].arg.name.text == "s"):
         spec = EVEN_SCALE
@@ -55,30 +54,26 @@ def _spec(stmt: nodes.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        from scenelang.evaluate.report.habits import in_material  # only mistakes need it
-        from scenelang.evaluate.report.spaces import material_advice
+        from scenelang.evaluate.report.advice import material_advice
 
         help = f"put it into a material's block, as in {material_advice(place, name)}"
-        fix = _grouped(stmt, place) or in_material(stmt, place.session, name)
         if name == "flip":
-            help, fix = "a material's flip() mirrors its texture; for an object write scale(-1, 1)", None
-        misplaced(place, span, "`{}` stands outside a material", name, help, fix)
+            help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
+        _skim(stmt, place)
+        misplaced(place, span, "`{}` stands outside a material", name, help)
         return None
     if place.kind == "file":
         help = "put what it moves and the transform into group { … }"
-        misplaced(place, span, "transform `{}` at top level", name, help, _grouped(stmt, place))
+        _skim(stmt, place)
+        misplaced(place, span, "transform `{}` at top level", name, help)
         return None
     return GEOMETRY.get(name) or TEXTURE[name]
 
 
-def _grouped(stmt: nodes.Call, place: Place) -> Fix | None:
-    """The fix for a transform with a block, which is looked through as one of children."""
-    if stmt.body is None or place.kind not in ("file", "group", "chain"):
-        return None
-    from scenelang.evaluate.report.habits import as_group  # only mistakes need it
-
-    prepare_inner(stmt.body, place.inner("group"))
-    return as_group(stmt, place.session)
+def _skim(stmt: nodes.Call, place: Place) -> None:
+    """Look through the block of a transform as one of children."""
+    if stmt.body is not None and place.kind in ("file", "group", "chain"):
+        prepare_inner(stmt.body, place.inner("group"))
 
 
 def _offered(stmt: nodes.Call, place: Place) -> bool:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from scenelang.records import Record
-
 
 def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     """A table by each of the words that share a meaning."""
@@ -18,10 +16,10 @@ _NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes wh
 _UNIT: Final = "glue the unit to the number: 30deg; what is computed is multiplied by 1deg"
 FUNCTIONS: Final = _each_word(
     {
-        "pow": "a b -> a ^ b",
-        "mod": "a b -> a % b",
+        "pow": "write a ^ b",
+        "mod": "write a % b",
         "fmod": "write a % b, which takes the sign of b",
-        "fract frac": "x -> x % 1",
+        "fract frac": "write x % 1",
         "length": "len counts items; for a norm write sqrt(v.x ^ 2 + v.y ^ 2)",
         "norm": "write sqrt(v.x ^ 2 + v.y ^ 2)",
         "distance": "write sqrt((a.x - b.x) ^ 2 + (a.y - b.y) ^ 2)",
@@ -29,32 +27,32 @@ FUNCTIONS: Final = _each_word(
         "normalize": "divide by sqrt(v.x ^ 2 + v.y ^ 2)",
         "atan": "write atan2(y, x)",
         "ln": "log is the natural logarithm",
-        "log10": "x -> log(x) / log(10)",
-        "log2": "x -> log(x) / log(2)",
+        "log10": "write log(x) / log(10)",
+        "log2": "write log(x) / log(2)",
         "cbrt": "write x ^ (1 / 3)",
         "sqr": "write x ^ 2",
-        "exp2": "x -> 2 ^ x",
+        "exp2": "write 2 ^ x",
         "cot": "write 1 / tan(x)",
         "sec": "write 1 / cos(x)",
         "csc": "write 1 / sin(x)",
         "sinh": "write (exp(x) - exp(-x)) / 2",
         "cosh": "write (exp(x) + exp(-x)) / 2",
         "tanh": "write 1 - 2 / (exp(2 * x) + 1)",
-        "square": "x -> x ^ 2",
-        "lerp": "a b t -> mix(a, b, t)",
-        "step": "e x -> x < e ? 0 : 1",
-        "sign": "x -> x < 0 ? -1 : x > 0 ? 1 : 0",
+        "square": "write x ^ 2",
+        "lerp": "write mix(a, b, t)",
+        "step": "write x < e ? 0 : 1",
+        "sign": "write x < 0 ? -1 : x > 0 ? 1 : 0",
         "trunc": "write floor(x), or ceil(x) below 0",
         "int": "write floor(x)",
-        "float": "x -> x",
-        "saturate": "x -> clamp(x, 0, 1)",
-        "random rands": "write rand(seed)",
+        "float": "write x",
+        "saturate": "write clamp(x, 0, 1)",
+        "random rands": "write rand(seed), from a to b mix(a, b, rand(seed))",
         "noise": "write rand(seed), or rand([seed, i]) for one of many",
-        "range": "n -> 0..<n; a b -> a..<b; a b s -> a..<b step s",
-        "vec2 float2 point": "x y -> [x, y]",
-        "vec3": "x y z -> [x, y, z]; x -> [x, x, x]",
+        "range": "write 0..<n, a..<b or a..<b step s",
+        "vec2 float2 point": "write [x, y]",
+        "vec3": "write [x, y, z]; x -> [x, x, x]",
         "vec4": "write [x, y, z]; colours have no alpha",
-        "float3": "x y z -> [x, y, z]",
+        "float3": "write [x, y, z]",
         "rgba": "write rgb(r, g, b); colours have no alpha",
         "hsl": "write hsv(h, s, v)",
         "deg rad turn radians": _UNIT,
@@ -64,7 +62,7 @@ FUNCTIONS: Final = _each_word(
         "str": "strings are not put together",
     }
 )
-"""Functions, and what to write: advice, or `parameters -> what stands for a call` for each number of them."""
+"""Functions, and what to write."""
 
 MATERIALS: Final = _each_word(
     {
@@ -221,43 +219,24 @@ LOOKS: Final = ("color", "colour", "fill", "stroke", "material", "c")
 """Arguments that elsewhere give an object its colour."""
 
 
-class Shape(Record):
-    """A module of ``std/shapes``.
-
-    Args:
-        call: how it is called, for people.
-        least, most: how many arguments without a name it takes; of others nothing is known.
-        bare: what stands for a call without any, if that means something.
-    """
-
-    call: str
-    least: int = 0
-    most: int = 0
-    bare: str = ""
-
-    @property
-    def module(self) -> str:
-        return self.call.partition("(")[0]
-
-
-SHAPES: Final = {
-    **dict.fromkeys(("circle", "disc", "disk", "dot"), Shape("disc(r)", 1, 1, "disc()")),
-    **dict.fromkeys(("ellipse", "oval"), Shape("ellipse(rx, ry)", 2, 2)),
-    **dict.fromkeys(("ring", "annulus"), Shape("ring(r, width)", 2, 2, "ring()")),
-    **dict.fromkeys(("rect", "rectangle", "box", "quad"), Shape("rect(w, h)", 1, 2, "rect()")),
-    **dict.fromkeys(
-        ("rounded", "rounded_rect", "rounded_rectangle", "roundrect", "rrect"), Shape("rounded(w, h, r)")
-    ),
-    **dict.fromkeys(("line", "segment"), Shape("line([x, y], [x, y], width)", 2, 3)),
-    **dict.fromkeys(("capsule", "stadium"), Shape("capsule([x, y], [x, y], width)", 2, 3)),
-    **dict.fromkeys(("path", "polyline"), Shape("path([[x, y], [x, y], …], width)", 1, 2)),
-    **dict.fromkeys(("polygon", "ngon"), Shape("polygon(n, r), which is regular")),
-    **dict.fromkeys(("pie", "sector", "wedge"), Shape("pie(r, 0deg, 90deg)")),
-    "arrow": Shape("arrow([x, y], [x, y], width)", 2, 3),
-    "arc": Shape("arc(r, width, 0deg, 90deg)"),
-    "parallelogram": Shape("parallelogram(p, a, b)", 3, 3),
-    "hexagon": Shape("polygon(6)", bare="polygon(6)"),
-    "heptagon": Shape("polygon(7)", bare="polygon(7)"),
-    "octagon": Shape("polygon(8)", bare="polygon(8)"),
-}
-"""Names of shapes, in small letters."""
+SHAPES: Final = _each_word(
+    {
+        "circle disc disk dot": "disc(r)",
+        "ellipse oval": "ellipse(rx, ry)",
+        "ring annulus": "ring(r, width)",
+        "rect rectangle box quad": "rect(w, h)",
+        "rounded rounded_rect rounded_rectangle roundrect rrect": "rounded(w, h, r)",
+        "line segment": "line([x, y], [x, y], width)",
+        "capsule stadium": "capsule([x, y], [x, y], width)",
+        "path polyline": "path([[x, y], [x, y], …], width)",
+        "polygon ngon": "polygon(n, r), which is regular",
+        "pie sector wedge": "pie(r, 0deg, 90deg)",
+        "arrow": "arrow([x, y], [x, y], width)",
+        "arc": "arc(r, width, 0deg, 90deg)",
+        "parallelogram": "parallelogram(p, a, b)",
+        "hexagon": "polygon(6)",
+        "heptagon": "polygon(7)",
+        "octagon": "polygon(8)",
+    }
+)
+"""Shapes by names in small letters: how the module of ``std/shapes`` is called."""

@@ -1,48 +1,95 @@
-"""One place, one mistake; one cause, one report; and nothing that only follows from a mistake of syntax."""
+"""One place, one mistake; one name, one report; and nothing that only follows from a mistake of syntax."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable
+import re
+from bisect import bisect_left
+from collections.abc import Hashable, Iterable
 from dataclasses import field, replace
 from itertools import islice
 from typing import Final
 
-from scenelang.diagnostics.diagnostic import Diagnostics, Fix, Label
+from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics, Fix, Label
 from scenelang.diagnostics.span import SourceFile, Span
 from scenelang.diagnostics.suggest import Effort
 from scenelang.evaluate.limits import MAX_COMPARED, Halt
-from scenelang.evaluate.report.suppression import NONE, Damage
 from scenelang.records import Record
 from scenelang.scene import library
 from scenelang.scene.spans import Calls
-from scenelang.syntax.lexer import Report, scan
-from scenelang.syntax.tables import tables
+from scenelang.syntax import nodes
 
 Advice = tuple[str | None, Fix | None]
 """Help, and a fix."""
 
-_SHOWN: Final = 3  # places of one report
+_SHOWN: Final = 3  # further places of one report
+_WORD: Final = re.compile(r"[A-Za-z_]\w*")
+_NAMELESS: Final = re.compile(r"\b(?:let|param|fn|module|import)\b(?![ \t]+[\"A-Za-z_])")
+_NAMES: Final = frozenset(("E0201", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
+_PLACES: Final = frozenset(("E0202", "E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
+_CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
+"""Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
 
 
-class Shared(Record, frozen=False):
-    """A report that several places share: its index among the diagnostics, its own labels, further places."""
+class Damage(Record):
+    """What the syntax mistakes of a file leave unknown.
 
-    index: int
-    code: str
-    own: tuple[Label, ...]
-    again: dict[Span, None] = field(default_factory=dict)
-
-
-def shown_places(places: Collection[Span], words: str, rest: str = "") -> tuple[Label, ...]:
-    """Labels for the places that share one report: the first few, and how many there are beyond.
-
-    ``rest`` is how their number is put: "in" for "and in 2 more".
+    Args:
+        lines: lines of statements that were mended or skipped, by guess.
+        words: words there, which a definition may have been among.
+        nameless: some definition there does not say what it defines.
+        unmatched: braces did not match, so nobody knows what stands where.
     """
-    labels = [Label(place, words) for place in islice(places, _SHOWN)]
-    if len(places) > _SHOWN:
-        more = f"{rest} {len(places) - _SHOWN} more".strip()
-        labels[-1] = replace(labels[-1], message=f"{words}, and {more}")
-    return tuple(labels)
+
+    lines: frozenset[int] = frozenset()
+    words: frozenset[str] = frozenset()
+    nameless: bool = False
+    unmatched: bool = False
+
+    def holds(self, span: Span) -> bool:
+        """Whether a place lies in what was mended or skipped."""
+        return bool(self.lines) and span.locate()[0][0] in self.lines
+
+    def explains(self, code: str, span: Span) -> bool:
+        """Whether a diagnostic may follow from a syntax mistake."""
+        if not self.lines:
+            return False
+        lost = self.nameless or self.unmatched or span.text.partition(".")[0] in self.words
+        return self.holds(span) or (code in _NAMES and lost) or (code in _PLACES and self.unmatched)
+
+
+_SOUND: Final = Damage()
+
+
+def find_damage(file: nodes.File, found: Iterable[Diagnostic]) -> Damage:
+    """The damage that a file's syntax mistakes, those among ``found``, have done."""
+    source = file.span.source
+    marks = [
+        (d.span.start, d.span.end, d.code)
+        for d in found
+        if d.code.startswith("E01") and d.span is not None and d.span.source is source
+        if d.fix is None or d.code not in _CERTAIN
+    ]
+    if not marks:
+        return _SOUND
+    ends = sorted(end for _, end, _ in marks)
+    starts = dict(sorted(((end, start) for start, end, _ in marks), reverse=True))
+    parts = [Span(source, start, end) for start, end, _ in marks]
+    for node in nodes.walk(file):
+        if isinstance(node, nodes.Stmt):
+            blocks = [child.span.start for child in nodes.children(node) if isinstance(child, nodes.Block)]
+            part = Span(source, node.span.start, min([node.span.end, *blocks]))
+            at = bisect_left(ends, part.start)
+            if isinstance(node, nodes.BadStmt) or (at < len(ends) and starts[ends[at]] <= part.end):
+                parts.append(part)
+    lines = {line for part in parts for line in range(part.locate()[0][0], part.locate()[1][0] + 1)}
+    texts = [source.line(line) for line in lines]
+    braces = {"E0104", "E0105", "E0106", "E0129"}
+    return Damage(
+        frozenset(lines),
+        frozenset(word for text in texts for word in _WORD.findall(text)),
+        any(_NAMELESS.search(text) for text in texts),
+        any(code in braces or re.search("[{}]", source.text[start:end]) for start, end, code in marks),
+    )
 
 
 class Reporter(Record, frozen=False):
@@ -52,31 +99,36 @@ class Reporter(Record, frozen=False):
         calls: the calls that are running.
         damaged: what syntax mistakes have damaged, by file.
         reported: the code that was reported at each place.
-        shared: reports that several places share, by what they have in common.
-        at_definition: unknown names that were reported where a definition has the slip.
+        shared: indices of reports that several places share, by what they have in common.
         effort: what looking for similar names may still cost.
-        names_in: where each name of a file stands.
-        defined: where variables and functions are defined, by the file and start of each use.
+        words_in: the words of each file.
     """
 
     diagnostics: Diagnostics
     calls: Calls | None = None
     damaged: dict[SourceFile, Damage] = field(default_factory=dict)
     reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)
-    shared: dict[Hashable, Shared] = field(default_factory=dict)
-    at_definition: set[Hashable] = field(default_factory=set)
+    shared: dict[Hashable, int] = field(default_factory=dict)
     effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
-    names_in: dict[SourceFile, dict[str, list[Span]]] = field(default_factory=dict)
-    defined: dict[tuple[SourceFile, int], Span] = field(default_factory=dict)
+    words_in: dict[SourceFile, frozenset[str]] = field(default_factory=dict)
+
+    def damage(self, source: SourceFile) -> Damage:
+        """What syntax mistakes have damaged of a file."""
+        return self.damaged.get(source, _SOUND)
+
+    def words(self, source: SourceFile) -> frozenset[str]:
+        """All words of a file."""
+        if source not in self.words_in:
+            self.words_in[source] = frozenset(_WORD.findall(source.text))
+        return self.words_in[source]
 
     def follows(self, code: str, span: Span) -> bool:
         """Whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
         if not self.damaged:
             return False
         within = self.calls.outwards() if self.calls is not None else ()
-        if any(self.damaged.get(call.source, NONE).holds(call) for call in within):
-            return True
-        return self.damaged.get(span.source, NONE).explains(code, span)
+        damage = self.damage(span.source)
+        return damage.explains(code, span) or any(self.damage(call.source).holds(call) for call in within)
 
     def error(
         self,
@@ -87,13 +139,13 @@ class Reporter(Record, frozen=False):
         help: str | None = None,
         fix: Fix | None = None,
         labels: tuple[Label, ...] = (),
-    ) -> Shared | None:
+    ) -> int | None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
 
         One that shows in the library that ships is reported where that is called.
 
         Returns:
-            The report, for further places of it; None where nothing was added.
+            The index of the report; None where nothing was added.
 
         Raises:
             Halt: there are so many mistakes that no more are kept.
@@ -110,23 +162,12 @@ class Reporter(Record, frozen=False):
         index = len(self.diagnostics)
         if not self.diagnostics.add(code, message, span, labels=labels, help=help, fix=fix):
             raise Halt
-        if index == len(self.diagnostics):
-            return None
-        return Shared(index, code, self.diagnostics.items[index].labels)
+        return None if index == len(self.diagnostics) else index
 
     def warn(self, code: str, message: str, span: Span, help: str | None) -> None:
         """Warn, unless it may follow from a mistake of syntax."""
         if not self.follows(code, span):
             self.diagnostics.add(code, message, span, help=help)
-
-    def share(self, shared: Shared, place: Span, rest: str = "") -> None:
-        """Show a further place at a report."""
-        items, index = self.diagnostics.items, shared.index
-        if place == items[index].span or place in shared.again:
-            return
-        shared.again[place] = None
-        places = shown_places(shared.again, "also here", rest)
-        items[index] = replace(items[index], labels=(*shared.own, *places))
 
     def error_once(
         self,
@@ -139,36 +180,18 @@ class Reporter(Record, frozen=False):
         fix: Fix | None = None,
         labels: tuple[Label, ...] = (),
     ) -> None:
-        """Report a mistake, or show its place at the report of the same one with the same key.
-
-        A fix is for one place: where there are several it is left out.
-        """
-        known = self.shared.get(key)
-        if known is None:
-            known = self.error(code, message, span, help=help, fix=fix, labels=labels)
-            if known is not None:
-                self.shared[key] = known
-        elif not self.follows(code, span):
-            self.share(known, span)
-            items, index = self.diagnostics.items, known.index
-            items[index] = replace(items[index], fix=None if known.again else items[index].fix)
-
-    def uses(self, source: SourceFile) -> dict[str, list[Span]]:
-        """Where each name stands in a text, its definition included; made at the first unknown name."""
-        known = self.names_in.get(source)
-        if known is None:
-            known = self.names_in[source] = {}
-            tokens = scan(source, Report(source))
-            kinds = {tables().kind(name) for name in ("NAME", "step", "as")}
-            for index, kind in enumerate(tokens.kinds):
-                if kind in kinds:
-                    span = Span(source, tokens.starts[index], tokens.ends[index])
-                    known.setdefault(span.text, []).append(span)
-        return known
-
-    def is_unused(self, name: str, span: Span | None) -> bool:
-        """Whether nothing in a text bears a name but its definition at ``span``."""
-        return span is not None and len(self.uses(span.source).get(name, ())) == 1
+        """Report a mistake, or show its place at the report of the same one with the same key."""
+        index = self.shared.get(key)
+        if index is None:
+            index = self.error(code, message, span, help=help, fix=fix, labels=labels)
+            if index is not None:
+                self.shared[key] = index
+            return
+        known = self.diagnostics.items[index]
+        again = [label for label in known.labels if label.message == "also here"]
+        if len(again) < _SHOWN and span not in (known.span, *(label.span for label in again)):
+            labels = (*known.labels, Label(span, "also here"))
+            self.diagnostics.items[index] = replace(known, labels=labels)
 
 
 def _called(site: Span) -> str | None:
@@ -176,5 +199,4 @@ def _called(site: Span) -> str | None:
     from scenelang.evaluate.report.foreign_words import SHAPES  # only mistakes need it
 
     alias, _, module = site.text.rpartition(".")
-    shape = SHAPES.get(module)
-    return f"it is called {alias}.{shape.call}" if shape is not None and alias else None
+    return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None

@@ -1,346 +1,560 @@
-"""Well known mistakes: habits, by the table in `foreign`, and slips told in words of their own."""
+"""What people write out of habit, from OpenSCAD, GLSL, JavaScript and Python, and what is written here.
+
+A habit is a pattern and its replacement, as texts with holes: ``for (<i> = [<A>:<B>])`` and
+``for (<i> in <A>..<B>)``.
+
+======================  ======================================================================
+``<i>``                 one name
+``<A>``                 text of one statement whose brackets match, up to what follows
+``<in|of>``             one of these words or signs
+``<type>``              one of the words that `_WORDS` has under this name
+``<VALUES>``            as ``<A>``, where it begins with a number, a colour or a vector
+``<LINE>``              the rest of the line, or of the statement on it
+``<BODY>``              the same, or all lines below that stand further in
+``<BLOCK>``             a block with its braces
+``<PARAMS>``            parameters; the replacement has them without their types
+``…?`` before ``>``     may be missing
+======================  ======================================================================
+"""
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from functools import cache, cached_property
+from functools import cache, lru_cache, partial
 from typing import Final
 
-from scenelang.diagnostics.diagnostic import Edit, Fix
-from scenelang.diagnostics.span import Span
-from scenelang.syntax.automaton import fits, reach
-from scenelang.syntax.lexer import UNIT_ALIASES, Report, Token, Tokens
-from scenelang.syntax.recovery import mistakes
-from scenelang.syntax.recovery.foreign import HABITS, OPERATORS, Habit
-from scenelang.syntax.recovery.patterns import MOST, Change, Match, change, closing, find, pieces
-from scenelang.syntax.recovery.repairs import FOLLOWED
+from scenelang.diagnostics.diagnostic import Fix
+from scenelang.diagnostics.suggest import ranked
+from scenelang.records import Record
+from scenelang.syntax.automaton import reach
+from scenelang.syntax.lexer import Report, Token, Tokens
 from scenelang.syntax.tables import END, tables
-from scenelang.words import NODES, TRANSFORMS, UNITS
+from scenelang.words import GEOMETRIES, NODES, OPERATIONS, TRANSFORMS
 
-_FLAT: Final = frozenset(("square", "triangle", "pentagon", "star"))
-_SOLID: Final = frozenset(("sphere", "torus"))
-"""What is drawn in two and in three dimensions; the scene of a text tells which materials there are."""
+OPERATORS: Final = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
+"""Operators that other languages write as words."""
 
-_MOVES: Final = {*TRANSFORMS, "color"}
-_ELSEWHERE: Final = {
-    "mirror": "write scale(-1, 1); in its block",
-    "resize": "write scale(sx, sy); in its block, in factors",
-    "offset": "outlines are not offset",
-    "multmatrix": "write matrix([[…4], […4], […4], […4]]); in its block",
-    "linear_extrude": "a 2D scene is not extruded",
-    "rotate_extrude": "a 2D scene is not extruded",
-    "hull": "there is no hull; smooth { … } blends objects into each other",
+HEADS: Final = (
+    dict.fromkeys(("function", "func", "fun", "def", "define"), "fn")
+    | dict.fromkeys(("var", "const", "float", "int", "bool", "vec2", "vec3"), "let")
+    | dict.fromkeys(("include", "use", "require"), "import")
+    | {"uniform": "param", "foreach": "for", "macro": "module", "class": "module"}
+)
+"""Words that begin statements in other languages, and the keyword that begins them here."""
+
+MAX_REPLAY: Final = 400
+"""A statement with more tokens before the mistake is not tried again from its start."""
+
+_FOLLOWED: Final = 80  # tokens behind a habit that are read to see whether it was one
+_LONGEST: Final = 1000  # letters of a habit, without its block
+_MOST: Final = 100  # mistakes of a file among which habits are looked for
+
+_TYPES: Final = ("float", "int", "bool", "double", "number", "string", *(f"vec{n}" for n in "234"), "color")
+_ELSEWHERE: Final = ("mirror", "resize", "offset", "multmatrix", "linear_extrude", "rotate_extrude", "hull")
+_MOVES: Final = (*TRANSFORMS, "color", *_ELSEWHERE)
+_WORDS: Final[dict[str, tuple[str, ...]]] = {
+    "type": _TYPES,
+    "fn": ("fn", "function", "func", "fun", "def", *_TYPES),
+    "let": ("let", "var", "const", *_TYPES),
+    "use": ("use", "include", "require"),
+    "node": tuple(NODES),
+    "object": (*NODES, *GEOMETRIES),
+    "elif": ("elif", "elsif", "elseif"),
+    "call": (*(TRANSFORMS | OPERATIONS), "canvas", "background"),
+    "move": tuple(TRANSFORMS),
+    "turn": tuple(TRANSFORMS),
+    "before": _MOVES,
+    "next": _MOVES,
+    "block": (*NODES, "for", "if"),
+    "control": ("for", "if"),
+    "library": ("math", "numpy", "random", "sys", "os", "Math"),
 }
-"""What OpenSCAD writes before objects, and what there is instead."""
-_PREFIXES: Final = _MOVES.union(_ELSEWHERE)
+"""Words that a hole of this name takes."""
 
-_INSIDE: Final = (
-    "it stands in the block: square { translate(1, 0); }, square { material flat { color(#d33); } }"
+
+@lru_cache(maxsize=256)
+def keywords_near(text: str) -> tuple[str, ...]:
+    """Keywords that a word may have been meant for, nearest first."""
+    words = [word for word in tables().literals if word.isalpha()]
+    return tuple(word for _, word in ranked(text, words, max(1, len(text) // 3)))
+
+
+class Habit(Record):
+    """One habit."""
+
+    pattern: str  # what is written
+    meant: str  # what is written here; also read in its place, so that the rest can be checked
+    message: str  # the fact; words that the pattern has found may stand in it
+    help: str | None = None
+    code: str = "E0133"
+    safe: bool = True  # whether ``meant`` is sure to mean the same, and so is a fix
+
+
+_unsafe: Final = partial(Habit, safe=False)
+
+
+_LOOP: Final = "`for` takes a range or a vector"
+_PASSES: Final = "write for (<i> in 0..<n) { … }"
+_BRACES: Final = "blocks stand in braces"
+_FUNCTION: Final = "a function is `fn` and one expression"
+_SQUARE: Final = "write fn <f>(x) = x ^ 2;"
+_PARENTHESES: Final = "missing parentheses"
+_UNTYPED: Final = "names have no types"
+_RANGE: Final = "ranges are written with `..`"
+_CALLED: Final = "`<call>` is called, not set"
+_BOUND: Final = "missing `let` before `<n>`"
+_ONCE: Final = "`<n>` cannot be changed"
+_NEW_NAME: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
+_BRACKETS: Final = "vectors stand in brackets"
+_BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
+_JOINS: Final = "`<node>` joins no loop"
+_HOLDS: Final = "the loop stands in its block: <node> { square; for (i in 0..3) { star; } }"
+_LISTED: Final = "vectors are not made by loops"
+_WRITTEN: Final = (
+    "write the items out, or draw in a loop: for (i in 0..<n) { s.disc(0.1) { translate(i, 0); } }"
 )
+_COMMAS: Final = "`,` between statements"
+_JOINED: Final = "objects are joined by words"
+_ARGUED: Final = "`<node>` takes no objects as arguments"
+_STANDS: Final = "objects stand in its block: <node> { square; star; }"
+_METHOD: Final = "transforms stand in the block of what they move"
+_DRAWN: Final = "objects are drawn where they stand"
+_VALUE: Final = "objects are not values"
+_MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
+_BEFORE: Final = "transforms stand behind what they apply to"
+_INSIDE: Final = "it stands in the block, as in square { translate(1, 0); material flat { color(#d33); } }"
+_ARGUMENTS: Final = "a material takes no arguments"
+_OPERATIONS: Final = "a material's colour stands in its block"
+_COLOUR: Final = "its colour stands in its block: material <n> { color(#d33); }"
+_CONSTANT: Final = "a colour is not a material"
+_UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`"
+_PATH: Final = "files are imported by their path"
+_IMPORTED: Final = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
+_IMPORT: Final = "functions are there without an import"
 
-_FAR = 1000  # tokens that the statement of a loop without braces may have
-
-_IMPORT = re.compile(
-    r"""(?P<word>use|include|require)[ \t]*
-        (?:<(?P<angled>[^<>"'\n]+)>|"(?P<quoted>[^"\\\n]+)")[ \t]*(?:;|(?=//)|$)""",
-    re.VERBOSE | re.MULTILINE,
+HABITS: Final = (
+    # loops and conditions
+    Habit("for (<i> = [<A>:<S>:<B>])", "for (<i> in <A>..<B> step <S>)", _LOOP),
+    Habit("for (<i> = [<A>:<B>])", "for (<i> in <A>..<B>)", _LOOP),
+    Habit("for (<let?> <i> = <A>; <i> < <B>; <i>++)", "for (<i> in <A>..<<B>)", _LOOP, code="E0126"),
+    Habit("for (<let?> <i> = <A>; <i> <= <B>; <i>++)", "for (<i> in <A>..<B>)", _LOOP, code="E0126"),
+    _unsafe("for (<let?> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
+    Habit("for (<let?> <i> <=|of|in> <E>)", "for (<i> in <E>)", _LOOP),
+    Habit("for <i> in <E>: <BODY>", "for (<i> in <E>) { <BODY> }", _BRACES),
+    Habit("if <E>: <BODY>", "if (<E>) { <BODY> }", _BRACES),
+    Habit("<control> <E> {", "<control> (<E>) {", _PARENTHESES, code="E0107"),
+    Habit("<elif> <E>: <BODY>", "<elif> (<E>) { <BODY> }", _BRACES),
+    Habit("<elif> <E> {", "<elif> (<E>) {", _PARENTHESES, "it is `else if (…) { … }` here", "E0107"),
+    Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
+    _unsafe("for (<i>, <v> in <E>)", "for (<i> in <E>)", "a loop has one name", _PASSES),
+    _unsafe("<node> <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
+    _unsafe("<node>(<P>) <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
+    _unsafe("let (<P>) <LINE?>", "BAD_HEAD", "`let` has no parentheses", "write let x = 1; before its use"),
+    # functions and modules
+    Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
+    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, "write module <f>() { … }"),
+    Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
+    _unsafe("<fn> <f>(<P?>) = <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
+    _unsafe("void <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write module <f>() { … }"),
+    Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
+    Habit("<let> <f> = function(<P?>) { return <E> <;?> } <;?>", "fn <f>(<P>) = <E>;", _FUNCTION),
+    Habit("<let> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
+    Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNTYPED),
+    Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _UNTYPED),
+    Habit("<f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"),
+    Habit("fn <f> <P> = <E>;", "fn <f>(<P>) = <E>;", _PARENTHESES, code="E0107"),
+    Habit("module <f> <P> {", "module <f>(<P>) {", _PARENTHESES, code="E0107"),
+    # names
+    Habit("const <type> <n> = <E>;", "let <n> = <E>;", _UNTYPED),
+    Habit("<let> <n>: <t> = <E>;", "let <n> = <E>;", _UNTYPED),
+    Habit("uniform <type> <n> = <E>;", "param <n> = <E>;", "it is `param` here"),
+    _unsafe("uniform <type?> <n>;", "BAD_STATEMENT", "`<n>` has no value", "write param <n> = 0.5 in 0..1;"),
+    Habit("param <n> = <E> in (<A>, <B>);", "param <n> = <E> in <A>..<B>;", _RANGE),
+    Habit("<call> <=|:> (<E>);", "<call>(<E>);", _CALLED),
+    Habit("<call> <=|:> <E>;", "<call>(<E>);", _CALLED),
+    Habit("<n>: <E>;", "<n>(<E>);", "`<n>` is called, not set"),
+    Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", _BOUND, code="E0126"),
+    _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
+    _unsafe("<n>++;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
+    _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
+    _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
+    # objects and their blocks
+    Habit("<move>(<P>) <o>;", "<o> { <move>(<P>); }", _BEFORE, _INSIDE),
+    Habit("<move>(<P>) <o>(<Q?>);", "<o>(<Q>) { <move>(<P>); }", _BEFORE, _INSIDE),
+    Habit("<move>(<P>) <turn>(<Q>) <o>;", "<o> { <turn>(<Q>); <move>(<P>); }", _BEFORE, _INSIDE),
+    Habit("color(<E>) <o>;", "<o> { material <material> { color(<E>); } }", _BEFORE, _INSIDE),
+    _unsafe("<before>(<P>) <next>(<Q>) <o>", "<o>", _BEFORE, _INSIDE),
+    _unsafe("<before>(<P>) <o>", "<o>", _BEFORE, _INSIDE),
+    _unsafe("<before>(<P>) <next>(<Q>) <block>", "<block>", _BEFORE, _INSIDE),
+    _unsafe("<before>(<P>) <node>()", "<node>", _BEFORE, _INSIDE),
+    _unsafe("<before>(<P>) <block>", "<block>", _BEFORE, _INSIDE),
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
+    _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
+    _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
+    Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
+    Habit("<difference|minus|without> <o>", "subtract <o>", "it is `subtract` here"),
+    Habit("<blend|smin> <o>", "smooth <o>", "it is `smooth` here"),
+    Habit("intersection <o>", "intersect <o>", "it is `intersect` here"),
+    Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
+    Habit("<n> + <o>;", "union { <n>; <o>; }", _JOINED),
+    Habit("<n>, <o> }", "<n>; <o>; }", _COMMAS),
+    _unsafe("<n>, <LINE> }", "BAD_STATEMENT }", _COMMAS, "every statement ends with `;`"),
+    Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
+    Habit("<node>(<A>, <B>);", "<node> { <A>; <B>; }", _ARGUED, _STANDS),
+    Habit("<node>(<A>, <B>, <C>);", "<node> { <A>; <B>; <C>; }", _ARGUED, _STANDS),
+    _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
+    Habit("<node>()", "<node>", "`<node>` takes no arguments"),
+    _unsafe(
+        "<node>(<P>) {",
+        "<node> {",
+        "`<node>` takes no arguments",
+        "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }",
+    ),
+    _unsafe("< <A>, <B>, <C> > <LINE?> <BLOCK>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe(
+        "< <n> <LINE>",
+        "BAD_STATEMENT",
+        "this is SVG or HTML",
+        "a drawing becomes a shape: scenelang learn drawing.svg -o zoo.safetensors",
+    ),
+    _unsafe("<n> < <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("<location|look_at|angle> [<A>] <LINE?> <;?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    Habit("<call> <rgb|srgb> < <A>, <B>, <C> ><;?>", "<call>([<A>, <B>, <C>]);", _BRACKETS),
+    # materials
+    Habit("material { <call>(", "material <material> { <call>(", "material without a name", _UNNAMED),
+    Habit("material <=|:?> <VALUES>;", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
+    Habit("material(<VALUES>);", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
+    Habit("material = <n>;", "material <n>;", "`material` is not set"),
+    Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
+    Habit("material <n>();", "material <n>;", _ARGUMENTS),
+    Habit("material <n>(color = <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    _unsafe("material <n>(<A>, <P>);", "material <n>;", _ARGUMENTS, _COLOUR),
+    Habit("material <n>(<E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <m> = <n> <BLOCK>", "let <m> = material <n> <BLOCK>;", "a material is named by `let`"),
+    Habit("material <n> <VALUES>;", "material <n> { color(<VALUES>); }", _OPERATIONS),
+    Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
+    Habit("<let> <m> = material <n>();", "let <m> = material <n>;", _ARGUMENTS),
+    Habit("<let> <m> = material <n>(color = <E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS),
+    _unsafe("<let> <m> = material <n>(<A>, <P>);", "let <m> = material <n>;", _ARGUMENTS, _COLOUR),
+    Habit("<let> <m> = material <n>(<E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS, _COLOUR),
+    # expressions
+    _unsafe("[for <E>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
+    _unsafe("[<E> for <F>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
+    Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
+    Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
+    Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
+    Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("<rgb|srgb> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("< <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("<A>%", "<A> / 100", "`%` is the rest of a division", "a share is a number: 50 % is 0.5"),
+    # settings and imports
+    Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
+    Habit("import <library> <LINE?> <;?>", "", _IMPORT),
+    Habit("from <library> import <LINE> <;?>", "", _IMPORT),
+    Habit("import <n> from <A>;", "import <A> as <n>;", "the path comes first"),
+    _unsafe("import <A> as <n>;", "BAD_STATEMENT", "a path stands in quotes", _IMPORTED, "E0126"),
+    _unsafe("import <n>.<m> <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("import <n> <LINE?> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
+    _unsafe("<use> < <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
+    _unsafe("<use> <A>;", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
 )
-_GROUPED = re.compile(r"[0-9]{1,3}(?:,[0-9]{3}(?![\w°]|\.(?!\.)))+")
+"""Habits that do not parse. The first that fits, and after which more of the text reads, is taken."""
+
+
+# ---------------------------------------------------------------- patterns over text
+
+_PIECE: Final = re.compile(
+    r"(?P<gap>\s*)(?:<(?P<hole>[^<>\s?]+)(?P<optional>\??)>"
+    r"|(?P<text>\w+|\.\.<(?!\w+>)|\.\.|[<>=!]=|&&|\|\||\S))"
+)
+_TYPED: Final = re.compile(rf"\b(?:{'|'.join(_TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
+"""The types that stand before or after the names of parameters."""
+
+_FLAT: Final = re.compile(r"\b(?:square|triangle|pentagon|star)\b")
+_SOLID: Final = re.compile(r"\b(?:sphere|torus)\b")
+
+
+def _balanced(besides: str = "", word: str = "", depth: int = 4) -> str:
+    """Expression for text whose brackets match, without a `;`, a brace or some signs, up to a word."""
+    inner = rf"[(\[](?:{_balanced(depth=depth - 1)})?[)\]]" if depth else r"[(\[][)\]]"
+    before = rf"(?!\b{word}\b)" if word else ""
+    return rf'(?:{before}(?:"[^"\n]*"|[^"(){{}}\[\];{re.escape(besides)}]|{inner}))++'
 
 
 @cache
-def _anchor(pattern: str) -> str:
-    """What a pattern begins with: a bracket or `<`, an operand, a name or a word."""
-    head = pieces(pattern)[0]
-    if head.text in ("(", "[", "<", "A"):
-        return head.text
-    return "name" if head.is_hole and not head.words else "word"
+def _expression(pattern: str) -> re.Pattern[str]:
+    """The expression of a pattern, with a group for each hole; a block or body at its end is left out."""
+    keywords = "|".join(word for word in tables().literals if word.isalpha() and word not in ("step", "as"))
+    pieces = [match for match in _PIECE.finditer(pattern) if match["hole"] not in ("BODY", "BLOCK")]
+    parts, seen = [], set()
+    for number, piece in enumerate(pieces):
+        hole, text = piece["hole"], piece["text"]
+        following = next((p["text"] for p in pieces[number + 1 :] if not p["optional"]), None)
+        words = _WORDS.get(hole or "", re.findall(r"[^|]+", hole) if hole and not hole.isidentifier() else ())
+        if not hole or words:
+            choice = sorted(words or (text,), key=len, reverse=True)
+            part = "|".join(
+                re.escape(w) + (r"(?!\w)" if w[-1].isalnum() else "(?!=)" * (w in "<=>")) for w in choice
+            )
+        elif hole.islower():
+            others = f"{keywords}|{'|'.join(_MOVES)}" if hole == "o" else keywords
+            part = f"(?P=g_{hole})" if hole in seen else rf"(?!(?:{others})\b)\$?[A-Za-z_]\w*+"
+        elif hole == "LINE":
+            part = r"[^\n;{}]++"
+        else:
+            word = following if following and following[0].isalpha() else ""
+            sign = following[0] if following and not word else "," * (number + 1 == len(pieces))
+            part = _balanced(sign, word)
+            part = rf"(?=[\d.#\[]){part}" if hole == "VALUES" else rf"(?=\S){part}"
+        name = re.sub(r"\W", "_", f"g_{hole}") if hole else ""
+        part = f"(?P<{name}>{part})" if hole and hole not in seen else f"(?:{part})"
+        seen.add(hole)
+        parts.append(rf"\s*+{part}" + "?" * bool(piece["optional"]))
+    return re.compile("".join(parts))
 
 
-class Habits:
-    """Tells well known mistakes from others, reports them and mends their tokens."""
+class _Match(Record):
+    """Where the holes of a pattern were found: indices of tokens, first and past the last."""
 
-    def __init__(self, tokens: Tokens, report: Report) -> None:
-        self.tokens = tokens
-        self.report = report
-        self.literals = tables().literals
+    tokens: Tokens
+    start: int
+    stop: int
+    holes: dict[str, tuple[int, int]]
 
-    def _is(self, index: int, *texts: str) -> bool:
-        kinds = self.tokens.kinds
-        return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
+    @property
+    def whole(self) -> str:
+        return self.tokens.source.text[self.tokens.starts[self.start] : self.tokens.ends[self.stop - 1]]
 
-    def _insert(self, index: int, name: str) -> None:
-        self.tokens.replace(index, 0, [tables().kind(name)])
+    def text(self, hole: str) -> str:
+        start, stop = self.holes[hole]
+        return self.tokens.source.text[self.tokens.starts[start] : self.tokens.ends[stop - 1]]
 
-    # ------------------------------------------------------------ habits
+    def told(self, words: str) -> str:
+        """Words for a report, with the names that it has in its holes."""
+        for hole in filter(str.islower, self.holes):
+            words = words.replace(f"<{hole}>", self.text(hole))
+        return words
 
-    def _foreign(self, stack: list[int], first: int, at: int) -> bool:
-        """What `HABITS` knows, or a transform before what it moves; ``stack`` is the statement's."""
-        if self._prefixed(stack, first, at):
-            return True
-        tokens = self.tokens
-        anchors = self._anchors(first, at)
-        for habit in HABITS:
-            for start in anchors[_anchor(habit.pattern)]:
-                match = find(habit.pattern, tokens, start)
-                new = match and change(match, habit.meant, {"material": self._materials[1] or "…"})
-                if match and new and self._reads_on(stack, first, at, match, new, habit.meant):
-                    self._tell(habit, match, new)
-                    return True
+
+def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
+    """The tokens from ``at`` on that a pattern describes; None where they are others."""
+    text, begin = tokens.source.text, tokens.starts[at]
+    found = _expression(pattern).match(text, begin, begin + _LONGEST)
+    if found is None:
+        return None
+
+    def index(offset: int) -> int:
+        return bisect_left(tokens.starts, offset, at, len(tokens.starts) - 1)
+
+    holes, stop = {}, index(found.end())
+    for piece in _PIECE.finditer(pattern):
+        hole = piece["hole"]
+        if hole in ("BODY", "BLOCK"):
+            end = _body(tokens, stop, at) if hole == "BODY" else _block(tokens, stop)
+            if end == stop:
+                return None
+            holes[hole], stop = (stop, end), end
+            stop += hole == "BLOCK" and tokens.text(stop) == ";"
+        elif hole:
+            start, end = found.span(re.sub(r"\W", "_", f"g_{hole}"))
+            if start < end:
+                holes[hole] = (index(start), index(end))
+    if stop <= at or any(first >= last for first, last in holes.values()):
+        return None
+    return _Match(tokens, at, stop, holes)
+
+
+def _block(tokens: Tokens, at: int) -> int:
+    """Index after the block that begins at a token; ``at`` where none does."""
+    depth, (opening, closing) = 0, (tables().literals[sign] for sign in "{}")
+    for index in range(at, min(at + 4000, len(tokens.kinds) - 1)):
+        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == closing)
+        if depth <= 0:
+            return index + (index > at)
+    return at
+
+
+def _body(tokens: Tokens, at: int, head: int) -> int:
+    """Index after the rest of a line, or after the lines that stand further in than a head's."""
+
+    def column(index: int) -> int:
+        return tokens.starts[index] - tokens.source.text.rfind("\n", 0, tokens.starts[index])
+
+    level = column(head) if tokens.on_new_line(at) else None
+    depth, (opening, closing) = 0, (tables().literals[sign] for sign in "{}")
+    for index in range(at, min(at + 4000, len(tokens.kinds) - 1)):
+        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == closing)
+        if depth < 0 or (tokens.on_new_line(index) and (level is None or column(index) <= level)):
+            return index
+    return min(at + 4000, len(tokens.kinds) - 1)
+
+
+def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
+    """Text and tokens of a replacement: holes keep their places, all else is empty.
+
+    Holes that change their order are left out of the tokens: nothing is known of them.
+    """
+    tokens, language = match.tokens, tables()
+    text, new, at = "", [], tokens.starts[match.start]
+    for piece in _PIECE.finditer(meant):
+        hole, word = piece["hole"], piece["text"]
+        if hole and hole not in match.holes and hole != "material":
+            continue  # what may be missing
+        text += " " * bool(piece["gap"] and text)
+        if hole in match.holes:
+            first, last = match.holes[hole]
+            begin, written = tokens.starts[first], match.text(hole)
+            types = [t.span() for t in _TYPED.finditer(written)] if hole == "PARAMS" else []
+            text += _TYPED.sub("", written) if types else written
+            if begin >= at:
+                part = tokens.part(first, last)
+                new += [one for one in part if not any(i <= one[1] - begin < j for i, j in types)]
+                at = tokens.ends[last - 1]
+            else:
+                kind = "BAD_EXPRESSION" if hole.isupper() else "NAME"
+                new.append((language.kind(kind), at, at))
+        elif word and word.startswith("BAD_"):
+            end = tokens.ends[match.stop - 1]
+            new.append((language.kind(word), tokens.starts[match.start], end))
+        else:
+            if hole:
+                whole = tokens.source.text
+                solid = _SOLID.search(whole)
+                word = "…" if bool(solid) == bool(_FLAT.search(whole)) else "diffuse" if solid else "flat"
+            text += word
+            new.append((language.literals.get(word, language.kind("NAME")), at, at))
+    return text, new
+
+
+# ---------------------------------------------------------------- looking one up
+
+
+def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at: int) -> bool:
+    """Report a habit in a statement and read what was meant in its place.
+
+    Args:
+        stack: the parser's states before the statement.
+        first: index of the statement's first token.
+        at: that of the one that does not fit.
+
+    Returns:
+        Whether there was one.
+    """
+    if len(report.found) > _MOST:
         return False
+    anchors = _anchors(tokens, first, at)
+    for habit in HABITS:
+        lead = _PIECE.match(habit.pattern)
+        assert lead is not None
+        text = lead["text"] or lead["hole"]
+        for start in anchors.get(text, anchors["word" if text[1:] else "name"]):
+            match = _find(habit.pattern, tokens, start)
+            if match is None:
+                continue
+            written, new = _replaced(match, habit.meant)
+            if written != match.whole and _reads_on(tokens, stack, first, at, match, new, habit.meant):
+                _tell(tokens, report, habit, match, written)
+                tokens.splice(match.start, match.stop, new)
+                return True
+    return False
 
-    def _anchors(self, first: int, at: int) -> dict[str, list[int]]:
-        """Where a pattern may begin, by what it begins with."""
-        tokens, depth = self.tokens, 0
-        found = {"(": [], "[": [], "<": [at], "A": [], "name": [first], "word": [first, at - 1]}
-        for index in range(at - 1, max(first, at - MOST), -1):
-            text = tokens.text(index)
-            depth += (text in (")", "]")) - (text in ("(", "["))
-            if depth <= 0 and text in ("(", "[", ",", "=", "return") and not found["A"]:
-                found["A"] = [index + 1]
-            if depth < 0:
-                before = tokens.text(index - 1)
-                operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
-                found[text] = [] if operand else [index]
-                break
-        return found
 
-    def _reads_on(self, stack: list[int], first: int, at: int, match: Match, new: Change, meant: str) -> bool:
-        """Whether a change lets the rest of the statement read, or the head of one with a block."""
-        if new.first > at:
-            return False
-        old = self._reach(stack, first, new.first, [], new.first, at)
-        reached = self._reach(stack, first, new.first, new.new, new.stop, at)
-        end = match.stop
-        whole = meant[-1:] in (";", "}", "{", "")
-        while not whole and end < match.stop + FOLLOWED and not self._at_end(end):
-            end += 1
-            whole = self._is(end - 1, ";", "{", "}")
-        head = "BODY" in meant or (match.parts[0][0] == "for" and reached == match.stop)
-        return reached > max(old, at) and (reached >= end or head)
+def _anchors(tokens: Tokens, first: int, at: int) -> dict[str, list[int]]:
+    """Where a pattern may begin, by what it begins with."""
+    found: dict[str, list[int]] = {"(": [], "[": [], "<": [at], "A": [], "name": [first], "word": [first]}
+    found["word"] += [at - 1] * (at - 1 > first)
+    depth = 0
+    for index in range(at - 1, max(first, at - 200), -1):
+        text = tokens.text(index)
+        depth += (text in (")", "]")) - (text in ("(", "["))
+        if depth <= 0 and text in ("(", "[", ",", "=", "return") and not found["A"]:
+            found["A"] = [index + 1]
+        if depth < 0:
+            before = tokens.text(index - 1)
+            operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
+            found[text] = [] if operand else [index]
+            break
+    return found
 
-    def _reach(self, stack: list[int], first: int, begin: int, new: list[Token], stop: int, at: int) -> int:
-        """The first token after a mistake that does not fit where others stand for ``[begin, stop)``."""
-        tokens = self.tokens
-        trial = tokens.part(first, begin) + new + tokens.part(stop, max(at, stop) + FOLLOWED)
-        # Words that stand for operators elsewhere are mended, and reported, when their turn comes.
-        words = [(kind, OPERATORS.get(tokens.source.text[start:end])) for kind, start, end in trial]
-        read = [self.literals[sign] if sign else kind for kind, sign in words]
-        return first + reach(stack.copy(), read, 0, len(read)) + (stop - begin) - len(new)
 
-    def _tell(self, habit: Habit, match: Match, new: Change) -> None:
-        tokens = self.tokens
-        old = tokens.source.text[new.start : new.end]
-        fix: Fix | None = None
-        if habit.safe and "…" not in new.text and "//" not in old and "/*" not in old:
-            shown = " ".join(new.text.split())
-            shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
-            words = f"write `{shown}`" if shown else "remove it"
-            fix = self.report.change(new.start, new.end, new.text, words)
-        help = habit.help and match.told(habit.help)
-        if tokens.starts[match.start] not in tokens.reported:
-            self.report.add(habit.code, match.told(habit.message), *new.place, help=help, fix=fix)
-        tokens.splice(new.first, new.stop, new.new)
+def _reads_on(
+    tokens: Tokens, stack: list[int], first: int, at: int, match: _Match, new: list[Token], meant: str
+) -> bool:
+    """Whether a replacement lets the rest of the statement read, or the head of one with a block."""
+    if match.start > at:
+        return False
+    before, after = tokens.part(first, match.start), tokens.part(match.stop, match.stop + _FOLLOWED)
 
-    @cached_property
-    def _materials(self) -> tuple[str | None, str | None]:
-        """What an object without a material has in this text, and what the only material is, if known."""
-        words = set(re.findall(r"\w+", self.tokens.source.text))
-        flat, solid = not words.isdisjoint(_FLAT), not words.isdisjoint(_SOLID)
-        if flat == solid:
-            return None, None
-        return ("flat", "flat") if flat else ("diffuse", None)
+    def left(middle: list[Token]) -> int:
+        """Number of tokens behind the first that does not fit; words for operators are mended later."""
+        words = [(kind, OPERATORS.get(tokens.source.text[i:j])) for kind, i, j in before + middle + after]
+        kinds = [tables().literals[sign] if sign else kind for kind, sign in words]
+        return len(kinds) - reach(stack.copy(), kinds, 0, len(kinds))
 
-    def _prefixed(self, stack: list[int], first: int, at: int) -> bool:
-        """`translate([1, 0]) color("red") square;`: transforms before what they apply to."""
-        tokens = self.tokens
-        calls: list[tuple[int, int]] = []
-        child = first
-        while tokens.text(child) in _PREFIXES and self._is(child + 1, "(") and len(calls) < 20:
-            stop = closing(tokens, child + 1)
-            calls.append((child, stop))
-            child = stop
-        if not calls or calls[0][1] != at or tokens.text(child) in _PREFIXES:
-            return False
-        named = tokens.kinds[child] == tables().kind("NAME")
-        glued = tokens.starts[child] == tokens.ends[child - 1]
-        if glued or not (named or self._is(child, *NODES, "for", "if")):
-            return False
-        if reach(stack.copy(), tokens.kinds, child, child + 2) <= child + named:
-            return False
-        start, end = tokens.starts[first], tokens.ends[calls[-1][1] - 1]
-        message = f"`{tokens.text(first)}` stands before what it applies to"
-        # Among other transforms it lacks its `;`, and what follows is a material.
-        among = first > 0 and mistakes.head(tokens, first - 1) in _PREFIXES
-        fix = None if among else self._moved_inside(calls, child)
-        help = next(
-            (_ELSEWHERE[word] for call, _ in calls if (word := tokens.text(call)) in _ELSEWHERE), _INSIDE
-        )
-        self.report.add("E0133", message, start, end, help=help, fix=fix)
-        tokens.replace(first, child - first, [])
-        return True
+    rest = left(new)
+    read = len(after) - rest
+    ends = [tables().literals[sign] for sign in ";{}"]
+    end, whole = 0, meant[-1:] in (";", "}", "{", "") or "BAD_S" in meant
+    while not whole and end < len(after) and after[end][0] != END:
+        end += 1
+        whole = after[end - 1][0] in ends
+    head = "BODY" in meant or meant[:3] == "for"
+    further = rest < left(tokens.part(match.start, match.stop))
+    return further and read >= max(meant[:3] != "for", at - match.stop + 1) and (read >= end or head)
 
-    def _moved_inside(self, calls: list[tuple[int, int]], child: int) -> Fix | None:
-        """Put transforms into the block of what they stand before."""
-        tokens, text = self.tokens, self.tokens.source.text
-        stop = child + 1
-        while self._is(stop, "."):
-            stop += 2
-        stop = closing(tokens, stop) if self._is(stop, "(") else stop
-        end = closing(tokens, stop, "{}")
-        inside = text[tokens.starts[calls[0][0]] : tokens.ends[max(stop, end - 1)]]
-        words = [tokens.text(call) for call, _ in calls]
-        colours = words.count("color")
-        if self._is(child, "for", "if") or not set(words) <= _MOVES or colours > 1:
-            return None
-        known = self._materials[0] is not None and "material" not in inside
-        if "//" in inside or "/*" in inside or (colours and not known):
-            return None
-        moves = [f"{text[tokens.starts[call] : tokens.ends[last - 1]]};" for call, last in reversed(calls)]
-        moves = [m if m[:5] != "color" else f"material {self._materials[0]} {{ {m} }}" for m in moves]
-        gone = Edit(Span(tokens.source, tokens.starts[calls[0][0]], tokens.starts[child]), "")
-        written = " ".join(moves)
-        if self._is(stop, ";"):
-            place, text = tokens.place(stop), f" {{ {written} }}"
-        elif end > stop:
-            last = tokens.ends[end - 2]
-            place, text = (last, last), f" {written}{' ' * self._is(end - 2, '{')}"
-        else:
-            return None
-        return Fix("put them into its block", (gone, Edit(Span(tokens.source, *place), text)))
 
-    # ------------------------------------------------------------ slips
+def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str) -> None:
+    start, end = tokens.starts[match.start], tokens.ends[match.stop - 1]
+    if start in tokens.reported:
+        return
+    text = tokens.source.text
+    old = text[start:end]
+    code, message, help = habit.code, match.told(habit.message), habit.help and match.told(habit.help)
+    safe = habit.safe and "…" not in new and "//" not in old and "/*" not in old
+    if habit.message == _BOUND:
+        name = match.text("n")
+        if re.search(rf"\b{name}\b", text[:start]):
+            code, message, help, safe = "E0133", match.told(_ONCE), _NEW_NAME, False
+        elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
+            help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
+    elif habit.message == _BEFORE and match.start and head(tokens, match.start - 1) in _MOVES:
+        safe = False  # it may lack its `;`, and what follows be a material
+    # What both have at their ends is not shown.
+    lead = _alike(old, new)
+    tail = _alike(old[lead:][::-1], new[lead:][::-1])
+    lead += len(old[lead:]) - len(old[lead:].lstrip())
+    place = (start + lead, end - tail) if lead + tail < len(old) else (start, end)
+    fix: Fix | None = None
+    if safe:
+        shown = " ".join(new.split())
+        shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
+        fix = report.change(start, end, new, f"write `{shown}`" if shown else "remove it")
+    report.add(code, message, *place, help=help, fix=fix)
 
-    def _head_mistake(self, states: list[int], first: int, at: int) -> bool:
-        """`for` and `if` without braces, a path without quotes."""
-        if self._is(at - 1, "import") and self._bare_path(at):
-            return True
-        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
-        if not wants_block or not self._is(at - 1, ")", "else"):
-            return False
-        if (
-            not self._is(first, "for", "if", "module")
-            or self._is(at, ";", "}", ")")
-            or self.tokens.kinds[at] == END
-        ):
-            return False
-        stop = self._end_of_statement(at)
-        if not stop:
-            return False
-        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
-        if reach(states.copy(), few, 0, len(few)) < len(few):
-            return False
-        bare = [(at, stop)]
-        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
-            bare.append((stop + 1, self._end_of_statement(stop + 1) or stop + 2))
-        mistakes.report_braces(self.tokens, self.report, bare)
-        for first, stop in reversed(bare):
-            self._insert(stop, "}")
-            self._insert(first, "{")
-        return True
 
-    def _at_end(self, at: int) -> bool:
-        return self.tokens.kinds[at] == END
+def head(tokens: Tokens, at: int) -> str:
+    """The first word of the statement that the token at an index belongs to."""
+    first = at
+    while first and at - first < MAX_REPLAY and tokens.text(first - 1) not in (";", "{", "}"):
+        first -= 1
+    return tokens.text(first) if first < at else ""
 
-    def _bare_path(self, at: int) -> bool:
-        """`import lib/parts.nsg as parts`: the path without its quotes."""
-        tokens = self.tokens
-        near = range(at + 1, min(at + 20, len(tokens.kinds) - 1))
-        stop = next((i for i in near if tokens.on_new_line(i) or self._is(i, ";", "as")), at)
-        if not self._is(stop, "as") or stop == at or tokens.on_new_line(stop):
-            return False
-        start, end = tokens.place(at, stop)
-        path = tokens.source.text[start:end]
-        fix = self.report.change(start, end, f'"{path}"', "put quotes around it")
-        self.report.add("E0126", f"expected a string, found `{path}`", start, end, fix=fix)
-        tokens.replace(at, stop - at, [])
-        self._insert(at, "STRING")
-        return True
 
-    def _import_of_others(self, first: int) -> bool:
-        """`use <lib.scad>`, `include "parts.nsg";`: a file without a name for it."""
-        tokens, start = self.tokens, self.tokens.starts[first]
-        found = _IMPORT.match(tokens.source.text, start)
-        if found is None:
-            return False
-        path = found["angled"] or found["quoted"]
-        alias = re.sub(r"\W", "_", path.rpartition("/")[2].partition(".")[0]) or "parts"
-        alias = f"_{alias}" if alias[0].isdigit() or alias in self.literals else alias
-        written = f'import "{path}" as {alias};'
-        fix = written if path.endswith(".nsg") else None  # any other file has to be written anew
-        message = f"`{found['word']}` without a name for the file"
-        help = f"write {written} and use what it defines as {alias}.…"
-        self.report.add("E0126", message, start, found.end(), help=help, fix=fix)
-        stop = bisect_left(tokens.starts, found.end(), first, len(tokens.kinds) - 1)
-        tokens.reported.update(tokens.starts[first:stop])
-        tokens.give_up(first, stop, "BAD_STATEMENT", start, found.end())
-        return True
-
-    def _end_of_statement(self, at: int) -> int:
-        """Index after the statement at a token, its `;` or its block; 0 where that is far."""
-        opening, closing, semicolon = (self.literals[sign] for sign in "{};")
-        depth, last = 0, len(self.tokens.kinds) - 1
-        for index in range(at, min(at + _FAR, last)):
-            kind = self.tokens.kinds[index]
-            if kind == closing:
-                if depth <= 1:
-                    return index + depth
-                depth -= 1
-            elif kind == opening:
-                depth += 1
-            elif depth == 0 and kind == semicolon:
-                return index + 1
-        return last if last <= at + _FAR else 0
-
-    def _spaced_unit(self, at: int) -> bool:
-        """`30 deg`: mend the number, drop the unit."""
-        tokens = self.tokens
-        kind = tables().kind
-        if not at or tokens.kinds[at] != kind("NAME") or tokens.kinds[at - 1] != kind("NUMBER"):
-            return False
-        word, gap = tokens.text(at), tokens.source.text[tokens.ends[at - 1] : tokens.starts[at]]
-        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
-            return False
-        unit = UNIT_ALIASES.get(word, word)
-        start, end = tokens.starts[at - 1], tokens.ends[at]
-        fix = self.report.change(tokens.ends[at - 1], end, unit, f"write `{unit}` right after the number")
-        help = "units are glued to their number"
-        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
-        if word in UNITS:
-            tokens.ends[at - 1] = end
-        else:
-            tokens.reported.add(start)
-        tokens.replace(at, 1, [])
-        return True
-
-    def _unseparated(self, states: list[int], at: int) -> bool:
-        """`[1 2 3]`: put the commas in, as one mistake."""
-        tokens = self.tokens
-        literal = {tables().kind(name) for name in ("NUMBER", "COLOR", "STRING")}
-        stop = at
-        while tokens.kinds[stop] in literal:
-            stop += 1
-        if stop < at + 2 or tokens.kinds[at - 1] not in literal or not fits(states, self.literals[","]):
-            return False
-        gaps = tokens.ends[at - 1 : stop - 1]
-        edits = tuple(Edit(Span(tokens.source, gap, gap), ",") for gap in gaps)
-        self.report.add("E0112", "missing `,`", gaps[0], gaps[-1], fix=Fix("insert `,` between them", edits))
-        for index in reversed(range(at, stop)):
-            self._insert(index, ",")
-        return True
-
-    def _grouped_digits(self, at: int) -> bool:
-        """`let n = 1,000;`: commas in a number."""
-        tokens, start = self.tokens, self.tokens.starts[at - 1]
-        found = _GROUPED.match(tokens.source.text, start)
-        if not found or not self._is(at, ",") or tokens.kinds[at - 1] != tables().kind("NUMBER"):
-            return False
-        commas = found[0].count(",")
-        help = "digits are not grouped, and decimals stand behind a point"
-        fix = found[0].replace(",", "") if commas > 1 else None  # one comma may be the decimal one
-        self.report.add("E0116", f"`{found[0]}` is not a number", start, found.end(), help=help, fix=fix)
-        tokens.reported.add(start)
-        tokens.ends[at - 1] = found.end()
-        tokens.replace(at, 2 * commas, [])
-        return True
+def _alike(one: str, other: str) -> int:
+    """How many letters two texts begin with alike, without half a word."""
+    pairs = enumerate(zip(one, other, strict=False))
+    count = next((at for at, (a, b) in pairs if a != b), min(len(one), len(other)))
+    while count and re.match(r"\w\w", one[count - 1 : count + 1] + other[count : count + 1]):
+        count -= 1
+    return count

@@ -1,38 +1,114 @@
-"""At a mistake: say what it is, mend the tokens, go on.
+"""Recovery at a token that does not fit: mend a token, or give the statement up.
 
-Well known mistakes are told apart first; then the best small repair is looked for (`repairs`); where
-none helps, the statement is skipped. Braces are balanced before parsing, so a skip stays inside its block.
+What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
+replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
+Where none helps, the statement is skipped. Braces match before parsing (`braces`), so a skip stays inside
+its block.
 """
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
-from typing import Any
+from collections.abc import Iterator
+from functools import cache
+from math import inf
+from typing import Any, Final
 
+from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.syntax import nodes
-from scenelang.syntax.automaton import advance, reach, statement_depth
-from scenelang.syntax.lexer import MAX_MISTAKES, Report, Tokens
-from scenelang.syntax.recovery import mistakes
-from scenelang.syntax.recovery.foreign import HEADS, keywords_near
-from scenelang.syntax.recovery.habits import Habits
-from scenelang.syntax.recovery.patterns import closing
-from scenelang.syntax.recovery.repairs import FOLLOWED, MAX_REPLAY, THOROUGH, WINDOW, Repair, Search
-from scenelang.syntax.tables import tables
-from scenelang.words import DECLARING, NODES
+from scenelang.records import Record
+from scenelang.syntax.automaton import LOOKAHEAD, advance, completion, fits, reach, statement_depth
+from scenelang.syntax.lexer import MAX_MISTAKES, UNIT_ALIASES, Report, Tokens
+from scenelang.syntax.recovery.habits import HEADS, MAX_REPLAY, OPERATORS, head, keywords_near, mend_habit
+from scenelang.syntax.tables import END, tables
+from scenelang.words import UNITS
 
-_WORDS = (*(word for word in DECLARING if word != "as"), "for", "if", "material", *NODES)
-_INSIDE = 65  # tokens over which another place for a closing bracket is looked for
-_STARTS = ("let", "fn", "module", "param", "import", "for", "if", "group", "chain", "material", "union")
+FOLLOWED: Final = 80
+"""How many tokens the repairs that look best are followed to choose between them."""
+_WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
+_THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
+_FAR: Final = 1000  # tokens that the statement of a loop without braces may have
+
+# What may be missing, and what that costs; tokens that only make sense together count as one.
+_INSERTIONS: Final = {
+    **{";": 1.3, ",": 1.2, "=": 1.3, "in": 1.4, "as": 1.4, ":": 1.5, "..": 2.0, "*": 2.2},
+    **{"(": 1.6, "( )": 1.6, "{ }": 1.9, "BAD_EXPRESSION": 1.6, "NAME": 1.7, "STRING": 1.8},
+    **{"= BAD_EXPRESSION": 1.9, "in BAD_EXPRESSION": 1.9, "as NAME": 1.9, ": BAD_EXPRESSION": 1.9},
+    **{"let": 1.4, "param": 1.5, "fn": 1.5, "for": 1.5, "if": 1.5, "nsg": 1.6, "model": 1.7},
+    **{"import": 1.6, "material": 1.6},
+}
+_ONLY_BEFORE: Final = {
+    **dict.fromkeys(("let", "param", "fn", "material"), "NAME"),
+    **{"for": "(", "if": "(", "nsg": "NUMBER", "model": "STRING", "import": "STRING"},
+}
+_REPLACEMENTS: Final = {
+    "=": {"==": 1.0},
+    "==": {"=": 1.2},
+    ":": {"=": 1.2, ";": 1.2, "..": 1.4, ",": 1.4},
+    ";": {",": 1.2, ":": 1.5, "{ }": 1.8},
+    ",": {";": 1.2, "=": 1.6},
+    ".": {",": 1.5, ";": 1.5},
+    ")": {"]": 1.1},
+    "]": {")": 1.1},
+    "(": {"[": 1.3},
+    "[": {"(": 1.3},
+}
+"""What is likely written for something else; anything else costs `_SUBSTITUTION` more than inserting it."""
+_DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
+_NEW_LINE = 0.6  # a token that begins a line is seldom the slip
+_CLOSING = 1.1
+
+_DIVISION: Final = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
+"""What is taken for a comment and was meant for a division."""
+_DEFINITIONS: Final = ("let", "param", "fn")
+_NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
+_CODES: Final = {
+    **{")": "E0103", "]": "E0103", "}": "E0104", "{": "E0106", "BAD_EXPRESSION": "E0108"},
+    **{"NAME": "E0109", "(": "E0107", ";": "E0102", ",": "E0112", "*": "E0112"},
+}
+"""Codes of what is missing; anything else is E0126."""
 
 
-class Recovery(Habits):
+class Repair(Record):
+    """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
+
+    at: int
+    delete: int
+    insert: tuple[int, ...]
+    cost: float = 0
+
+
+def _kinds(names: str) -> tuple[int, ...]:
+    return tuple(map(tables().kind, names.split()))
+
+
+@cache
+def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
+    """What may be missing: the tokens, the cost, and what has to follow if that matters."""
+    return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
+
+
+@cache
+def _replacements() -> dict[int, dict[tuple[int, ...], float]]:
+    """`_REPLACEMENTS` by kinds."""
+    rows = _REPLACEMENTS.items()
+    return {tables().kind(old): {_kinds(new): cost for new, cost in row.items()} for old, row in rows}
+
+
+class Recovery:
     """Recovery for one file, whose tokens it edits."""
 
     def __init__(self, tokens: Tokens, report: Report) -> None:
-        super().__init__(tokens, report)
+        self.tokens = tokens
+        self.report = report
+        self.literals = literals = tables().literals
         self.repairs = 0
-        self.heads = {self.literals[word] for word in _STARTS}
+        self.closing_of = {literals["("]: literals[")"], literals["["]: literals["]"]}
+        self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
+        self.ends = {literals[";"], literals["}"], END}
+        self.name = tables().kind("NAME")
+        self.words = {kind for text, kind in literals.items() if text.isalpha()}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
         """Mend what does not fit at a token; the parser's stacks are cut back to read a statement again.
@@ -44,55 +120,29 @@ class Recovery(Habits):
         if self.report.full or self.repairs > 4 * MAX_MISTAKES:
             return None
         depth = statement_depth(states)
-        start = self._misspelt_if(states, values, at) if self._is(at, "else") else None
-        if start is not None:
-            return start
+        base = states[: depth + 1]
         first = self._index(values[depth]) if depth < len(values) else at
-        if (first < at or self._is(at, "<")) and (
-            self._grouped_digits(at)
-            or self._import_of_others(first)
-            or (at - first <= MAX_REPLAY and self._foreign(states[: depth + 1], first, at))
-        ):
+        if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
             del states[depth + 1 :], values[depth:]
             return first
-        known = self._head_mistake(states, first, at) if first < at else self._start_mistake(states, at)
-        if self._misspelt(states[: depth + 1], first, at):
-            del states[depth + 1 :], values[depth:]
-            return first
-        if known or self._spaced_unit(at) or self._unseparated(states, at):
+        if self._start_mistake(states, at) if first == at else self._bare_body(states, first, at):
             return at
-        search = Search(self.tokens, first, at)
-        window = WINDOW if len(self.report.found) < THOROUGH else 0
-        repair = search.run(states[: depth + 1], states, window)
+        if self._spaced_unit(at):
+            return at
+        repair = self._search(base, states, first, at)
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)
-        sure = self._stands_there(states[: depth + 1], search, repair)
-        mistakes.report_repair(self.tokens, self.report, repair, search.open_brackets(repair.at), sure)
+        report_repair(self.tokens, self.report, repair, self._open(first, repair.at))
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if at - first > MAX_REPLAY:
             return at
         del states[depth + 1 :], values[depth:]
         return first
 
-    def _stands_there(self, stack: list[int], search: Search, repair: Repair) -> bool:
-        """Whether a bracket that a repair closes can be closed nowhere else in the statement.
-
-        ``sin(x * 2;`` may have been meant as ``sin(x) * 2`` and as ``sin(x * 2)``.
-        """
-        if repair.delete or repair.insert[0] not in search.closings:
-            return True
-        kinds, opening = self.tokens.kinds, search.open_brackets(repair.at)[0]
-        if repair.at - search.first > MAX_REPLAY or repair.at - opening > _INSIDE:
-            return False
-        reach(stack, kinds, search.first, opening + 1)
-        after = [*repair.insert[1:], *kinds[repair.at : search.bound]]
-        for at in range(opening + 1, repair.at):
-            moved = [repair.insert[0], *kinds[at : repair.at], *after]
-            if kinds[at] != repair.insert[0] and reach(stack.copy(), moved, 0, len(moved)) == len(moved):
-                return False
-            advance(stack, kinds[at])
-        return True
+    def _is(self, index: int, *texts: str) -> bool:
+        kinds = self.tokens.kinds
+        return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
 
     def _index(self, value: Any) -> int:
         """Index of the first token of something on the value stack."""
@@ -101,98 +151,350 @@ class Recovery(Habits):
         span: Span = value[1] if isinstance(value, tuple) else value.span
         return bisect_left(self.tokens.starts, span.start)
 
-    # ------------------------------------------------------------ well known mistakes
+    def _open(self, first: int, at: int) -> list[int]:
+        """Indices of the brackets of a statement that are open before a token."""
+        open_: list[int] = []
+        for index in range(first, at):
+            kind = self.tokens.kinds[index]
+            if kind in self.closing_of:
+                open_.append(index)
+            elif kind in self.closing_of.values() and open_:
+                open_.pop()
+        return open_
+
+    # ------------------------------------------------------------ the best repair
+
+    def _search(self, base: list[int], stack: list[int], first: int, at: int) -> Repair | None:
+        """The best repair of a statement from ``first`` on, or None where none helps.
+
+        Args:
+            base: the states before the statement.
+            stack: those at the mistake; used where it is too far from there.
+        """
+        kinds = self.tokens.kinds
+        bound = next((i for i in range(at, at + FOLLOWED) if kinds[i] in self.ends), at + FOLLOWED)
+
+        def worth(stop: int) -> float:  # tokens of later statements that fit count little
+            own = min(stop, bound + 1) - at
+            return own + 0.15 * (min(stop, at + FOLLOWED) - at - own)
+
+        found: list[tuple[float, float, Repair, list[int]]] = []
+
+        def attempt(stack: list[int], place: int, repairs: Iterator[Repair]) -> None:
+            cost = 0.1 + 0.1 * (at - place) if place < at else 0.0
+            for repair in repairs:
+                trial = stack.copy()
+                if not all(advance(trial, kind) for kind in repair.insert):
+                    continue
+                end = repair.at + repair.delete
+                start = max(at, end)
+                stop = reach(trial.copy(), kinds, end, start + LOOKAHEAD)
+                if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
+                    found.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
+
+        def settle() -> tuple[float, Repair | None]:
+            best: tuple[float, Repair | None] = (-inf, None)
+            for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
+                end = repair.at + repair.delete
+                score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
+                best = max(best, (score, repair), key=lambda one: one[0])
+            return best
+
+        if at - first > MAX_REPLAY:
+            attempt(stack, at, self._candidates(stack, first, at))
+            return settle()[1]
+        prefixes, prefix = [], base.copy()
+        for place in range(first, at):  # replayed: the parser may have applied rules for the bad token
+            prefixes.append((place, prefix.copy()))
+            advance(prefix, kinds[place])
+        attempt(prefix, at, self._candidates(prefix, first, at))
+        for place, stack in {index: prefixes[index] for index in (0, -1) if prefixes}.values():
+            attempt(stack, place, self._misspelt(first, place))
+        prefixes = prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else []
+        for place, stack in prefixes:
+            if self._begins_statement(first, place):
+                attempt(stack, place, self._broken_off(stack, place, 0.7 - 0.1 * (at - place)))
+        score, best = settle()
+        if best is None or score < worth(at + FOLLOWED) - 2:
+            for place, stack in prefixes:
+                attempt(stack, place, self._candidates(stack, first, place))
+            best = settle()[1]
+        return best
+
+    def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
+        """All repairs at one token."""
+        tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
+        kind, new_line = kinds[at], tokens.on_new_line(at)
+        after = kinds[at + 1] if kind != END else END
+        open_ = self._open(first, at)
+        if open_:
+            dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
+            closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
+            yield Repair(at, 0, closings[:1], _CLOSING + dangling)
+            yield Repair(at, 0, closings, _CLOSING + dangling + 0.1 * len(closings))
+            yield Repair(at, 0, (*closings, semicolon), _CLOSING + 0.7 + dangling)
+            if kind not in self.fixed and kind not in self.closing_of.values():
+                yield Repair(at, 1, closings[:1], _CLOSING + dangling + _SUBSTITUTION)
+            if new_line:
+                yield Repair(at, 0, (closings[0], self.literals[","]), _CLOSING + 0.7 + dangling)
+        for insert, cost, following in _insertions():
+            after_string = at > 0 and kinds[at - 1] == tables().kind("STRING")
+            if not fits(stack, insert[0]) or (insert[0] == self.literals["as"] and not after_string):
+                continue
+            if following in ((), (after,)) and kind not in self.fixed and insert != (kind,):
+                yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line + len(insert) - 1)
+            if insert[0] == semicolon and (new_line or kind in self.ends):
+                cost = 1.0
+            elif new_line and insert[0] not in self.ends:
+                cost += _NEW_LINE / 2
+            if following in ((), (kind,)):
+                yield Repair(at, 0, insert, cost)
+        if new_line or kind in self.ends:
+            yield from self._broken_off(stack, at)
+        if END not in (kind, after) and kind != after and not self.fixed.issuperset((kind, after)):
+            yield Repair(at, 2, (after, kind), _SWAP)
+        if kind in self.fixed:
+            return
+        for insert, cost in _replacements().get(kind, {}).items():
+            header = kind == self.literals["="] and self._is(first, "fn", "module")
+            yield Repair(at, 1, insert, cost + 0.5 * header)
+        if kind in self.words:
+            yield Repair(at, 1, (self.name,), _MISSPELT + 0.2)
+        yield from self._misspelt(first, at)
+        cost = _DELETION
+        for last in range(at, at + 3):
+            begins = tokens.on_new_line(last)
+            if kinds[last] in self.fixed or (last > at and (kinds[last] == semicolon or begins)):
+                return
+            yield Repair(at, last + 1 - at, (), cost + _NEW_LINE * begins)
+            cost += 0.6
+
+    def _misspelt(self, first: int, at: int) -> Iterator[Repair]:
+        """A keyword with a slip or of another language, or an operator written as a word."""
+        text = self.tokens.text(at) if self.tokens.kinds[at] == self.name else ""
+        for word in (OPERATORS.get(text), HEADS.get(text) if at == first else None, *keywords_near(text)):
+            if text and word:
+                yield Repair(at, 1, (self.literals[word],), _MISSPELT)
+
+    def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
+        """The line before a token breaks off in the middle of a statement."""
+        for goal, rest in ((";", ()), ("{", (self.literals["}"],))):
+            missing = completion(stack, self.literals[goal])
+            if missing or (missing is not None and goal == ";"):
+                yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
+
+    def _begins_statement(self, first: int, at: int) -> bool:
+        """Whether a line in open brackets, or behind half a head, reads like a statement of its own."""
+        kinds = self.tokens.kinds
+        if not self.tokens.on_new_line(at) or kinds[at] not in (self.name, *self.words):
+            return False
+        half = self._is(at - 1, "let", "param", "fn", "module") or self._is(at - 2, "material")
+        depth = 0
+        for kind in kinds[at : at + 300] if half or self._open(first, at) else ():
+            if kind in self.fixed or kind == self.literals[";"]:
+                return not self._is(at, "material", "step", "as")
+            depth += (kind in self.closing_of) - (kind in self.closing_of.values())
+            if depth < 0:
+                return False
+        return False
+
+    # ------------------------------------------------------------ mistakes with words of their own
 
     def _start_mistake(self, states: list[int], at: int) -> bool:
         """A token that no statement begins with."""
-        tokens = self.tokens
-        if self._is(at, ";", "{") and self._better_swapped(states, at):
-            return False
-        if self._is(at, ";"):
-            self.report.add("W0101", "stray `;`", *tokens.place(at), help="no `;` follows a block", fix="")
+        tokens, place = self.tokens, self.tokens.place(at)
+        if self._is(at, ";") and not self._is(at + 1, "{"):
+            self.report.add("W0101", "stray `;`", *place, help="no `;` follows a block", fix="")
             tokens.replace(at, 1, [])
+        elif self._is(at, "{") and at and self._is(at - 1, ";") and not tokens.on_new_line(at):
+            fix = None if head(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
+            self.report.add("E0130", "`;` between a statement and its block", *tokens.place(at - 1), fix=fix)
+            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
         elif self._is(at, "{"):
-            self._headless(at)
-            self._insert(at, "BAD_HEAD")
+            help = "a block belongs to an object, a module, `group`, `material`, `for`, `if` or a boolean"
+            self.report.add("E0129", "block without a head", *place, help=help)
+            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
         elif self._is(at, "else"):
-            self.report.add("E0101", "`else` without `if`", *tokens.place(at))
-            headed = self._is(at + 1, "{")
-            tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if headed else [])
+            self.report.add("E0101", "`else` without `if`", *place)
+            tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if self._is(at + 1, "{") else [])
         else:
             return False
         return True
 
-    def _better_swapped(self, states: list[int], at: int) -> bool:
-        """Whether more fits when a `;` or `{` changes places with the next token than otherwise."""
-        kinds = self.tokens.kinds
-        rest = kinds[at + 2 : at + 2 + FOLLOWED]
-        instead = [tables().kind("BAD_HEAD"), kinds[at]] if self._is(at, "{") else []
-        swapped = reach(states.copy(), [kinds[at + 1], kinds[at], *rest], 0, len(rest) + 2)
-        kept = reach(states.copy(), [*instead, kinds[at + 1], *rest], 0, len(rest) + 1 + len(instead))
-        return swapped - 2 > kept - 1 - len(instead)
-
-    def _headless(self, at: int) -> None:
-        tokens = self.tokens
-        before = at - 1
-        if at and self._is(before, ";") and not tokens.on_new_line(at):
-            start, end = tokens.starts[before], tokens.ends[before]
-            fix = None if mistakes.head(tokens, before) in mistakes.DEFINITIONS else ""  # it needs its `;`
-            self.report.add("E0130", "`;` between a statement and its block", start, end, fix=fix)
-            return
-        help = "a block belongs to a geometry, a module, `group`, `material`, `for`, `if` or a boolean word"
-        self.report.add("E0129", "block without a head", tokens.starts[at], tokens.ends[at], help=help)
-
-    def _misspelt(self, stack: list[int], first: int, at: int) -> bool:
-        """A keyword with a slip at the head of a statement, which reads on once it is mended."""
-        tokens = self.tokens
-        if first >= at or at - first > MAX_REPLAY or tables().kinds[tokens.kinds[first]] != "NAME":
+    def _bare_body(self, states: list[int], first: int, at: int) -> bool:
+        """`for`, `if` or `else` and a statement without braces."""
+        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
+        heads = self._is(first, "for", "if", "module") and self._is(at - 1, ")", "else")
+        if not (wants_block and heads) or self._is(at, ";", "}", ")") or self.tokens.kinds[at] == END:
             return False
-        start, end = tokens.starts[first], tokens.ends[first]
-        text = tokens.source.text[start:end]
-        rest = tokens.kinds[first + 1 : at + FOLLOWED]
-        words = {HEADS[text]} if text in HEADS else set(keywords_near(text)).intersection(_WORDS)
-        trials = {word: [self.literals[word], *rest] for word in sorted(words)}
-        read = {word: reach(stack.copy(), trial, 0, len(trial)) for word, trial in trials.items()}
-        word = max(read, key=read.__getitem__, default=None)
-        if word is None or read[word] <= at + 1 - first:
+        stop = self._end_of_statement(at)
+        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
+        if not stop or reach(states.copy(), few, 0, len(few)) < len(few):
             return False
-        fix = None if text == "int" else word  # whose quotients are whole
-        help = f"it is `{word}` here" if text in HEADS else f"did you mean `{word}`?"
-        self.report.add("E0132", f"unknown statement `{text}`", start, end, help=help, fix=fix)
-        tokens.kinds[first] = self.literals[word]
+        tokens, bodies = self.tokens, [(at, stop)]
+        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
+            bodies.append((stop + 1, self._end_of_statement(stop + 1) or stop + 2))
+        place = tokens.end_before(at) if tokens.on_new_line(at) else tokens.starts[at]
+        ends = [(tokens.starts[i], "{ ") for i, _ in bodies] + [(tokens.ends[j - 1], " }") for _, j in bodies]
+        edits = tuple(Edit(Span(tokens.source, end, end), brace) for end, brace in ends)
+        fix = None if tokens.on_new_line(at) else Fix("put braces around it", edits)
+        self.report.add("E0106", "missing braces", place, place, help="braces are mandatory here", fix=fix)
+        for begin, end in reversed(bodies):
+            tokens.replace(end, 0, [self.literals["}"]])
+            tokens.replace(begin, 0, [self.literals["{"]])
         return True
 
-    def _misspelt_if(self, states: list[int], values: list[Any], at: int) -> int | None:
-        """`fi (a) { … } else { … }`: where `if` was meant, for parsing to go on from there."""
-        tokens = self.tokens
-        for depth in reversed(range(len(values))):
-            if isinstance(values[depth], nodes.Name | nodes.NameRef):
-                first = self._index(values[depth])
-                block = closing(tokens, first + 1)
-                headed = closing(tokens, block, "{}") == at > block > first + 1
-                if headed and "if" in keywords_near(tokens.text(first)):
-                    mistakes.report_misspelt(tokens, self.report, first, "if")
-                    tokens.kinds[first] = self.literals["if"]
-                    del states[depth + 1 :], values[depth:]
-                    return first
-        return None
+    def _end_of_statement(self, at: int) -> int:
+        """Index after the statement at a token, its `;` or its block; 0 where that is far."""
+        depth, last = 0, len(self.tokens.kinds) - 1
+        for index in range(at, min(at + _FAR, last)):
+            if self._is(index, "}"):
+                if depth <= 1:
+                    return index + depth
+                depth -= 1
+            elif self._is(index, "{"):
+                depth += 1
+            elif depth == 0 and self._is(index, ";"):
+                return index + 1
+        return last if last <= at + _FAR else 0
 
-    # ------------------------------------------------------------ skipping
+    def _spaced_unit(self, at: int) -> bool:
+        """`30 deg`: mend the number, drop the unit."""
+        tokens, kind = self.tokens, tables().kind
+        if not at or tokens.kinds[at] != self.name or tokens.kinds[at - 1] != kind("NUMBER"):
+            return False
+        word, before = tokens.text(at), tokens.ends[at - 1]
+        gap = tokens.source.text[before : tokens.starts[at]]
+        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
+            return False
+        unit, (start, end) = UNIT_ALIASES.get(word, word), tokens.place(at - 1, at + 1)
+        fix = self.report.change(before, end, unit, f"write `{unit}` right after the number")
+        help = "units are glued to their number"
+        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
+        tokens.splice(at - 1, at + 1, [(kind("BAD_EXPRESSION"), start, end)])
+        return True
 
     def _skip(self, first: int, at: int) -> int | None:
         """Give the statement up: one `BadStmt` up to its `;`, its block, or the end of the block around."""
         tokens = self.tokens
-        mistakes.report_unexpected(tokens, self.report, at)
+        if tokens.starts[at] not in tokens.reported:
+            place = (tokens.end_before(at),) * 2 if tokens.kinds[at] == END else tokens.place(at)
+            self.report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", *place)
         stop = at
-        while not self._at_end(stop) and not self._is(stop, "}", "{"):
+        while tokens.kinds[stop] not in self.fixed:
             if self._is(stop, ";"):
                 stop += 1
                 break
-            if stop > at and tokens.kinds[stop] in self.heads and tokens.on_new_line(stop):
+            if stop > at and tokens.kinds[stop] in self.words and tokens.on_new_line(stop):
                 break
             stop += 1
         if stop == first:
             return None
         bad = "BAD_HEAD" if self._is(stop, "{") and not self._is(stop - 1, ";") else "BAD_STATEMENT"
-        tokens.give_up(first, stop, bad, *tokens.place(first, stop))
+        tokens.splice(first, stop, [(tables().kind(bad), *tokens.place(first, stop))])
         return first
+
+
+# ---------------------------------------------------------------- repairs in words
+
+
+def report_repair(tokens: Tokens, report: Report, repair: Repair, open_: list[int]) -> None:
+    """Report the mistake that a repair is going to mend; ``open_`` are the brackets open before it."""
+    at, stop = repair.at, repair.at + repair.delete
+    gap = (tokens.end_before(at), tokens.starts[at])
+    if any(tokens.starts[index] in tokens.reported for index in range(at, stop)):
+        return  # a slip that has been reported already
+    if repair.delete and tokens.starts[at] == tokens.ends[stop - 1]:
+        return  # what recovery put in itself, at a mistake that has been reported
+    if not repair.delete and any(start in tokens.reported for start in range(*gap)):
+        return  # what belongs here was read as something illegal
+    names = [tables().kinds[kind] for kind in repair.insert]
+    if not repair.delete:
+        _report_insertion(tokens, report, at, names, open_)
+    elif not names:
+        text = tokens.source.text[slice(*tokens.place(at, stop))]
+        code, word = ("E0105", "unmatched") if text in (")", "]", "{", "}") else ("E0101", "unexpected")
+        twice = text.isalpha() and text in (tokens.text(stop), tokens.text(at - 1))
+        report.add(code, f"{word} {_quoted(text)}", *tokens.place(at, stop), fix="" if twice else None)
+    else:
+        _report_replacement(tokens, report, repair, names)
+
+
+def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str], open_: list[int]) -> None:
+    end, shown, first = tokens.end_before(at), _shown(tokens, at), names[0]
+    breaks_off = tokens.on_new_line(at) or tokens.kinds[at] == END
+    code, place = _CODES.get(first, "E0126"), (end, end)
+    message, help, labels, fix = f"missing {_listed(names)}", None, [], None
+    if names == ["as", "NAME"]:
+        help = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
+    elif names == ["{", "}"]:
+        help = "braces are mandatory here, even around nothing"
+    elif len(names) > 1 and names[-1] in (";", "}") and set(names) - {")", "]", "}", ";"}:
+        message, help = f"unfinished statement: {message}", "the line breaks off here"
+    elif first in (")", "]") and open_:
+        labels = [Label(Span(tokens.source, *tokens.place(open_[-1])), "opened here")]
+    elif first == ";":
+        help = "a `;` ends every statement without a block"
+        if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
+            help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
+        elif breaks_off or shown == "`}`":
+            fix = ";"
+    elif first in _NAMED:
+        message = f"expected {_NAMED[first]}, found {shown}"
+        if not breaks_off:  # an operand is missed where the next token stands
+            place = tokens.place(at)
+    elif first == ",":
+        message = f"missing `,` or operator before {shown}"
+    else:
+        message = f"{message} before {shown}"
+        fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
+    report.add(code, message, *place, labels=labels, help=help, fix=fix)
+
+
+def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
+    at, (start, end) = repair.at, tokens.place(repair.at, repair.at + repair.delete)
+    text, new = tokens.text(at), "".join(names)
+    code, message, help, fix = "E0130", f"{_shown(tokens, at)} where {_listed(names)} belongs", None, None
+    if repair.delete == 2:
+        code, message = "E0131", f"`{text}` and `{tokens.text(at + 1)}` are in the wrong order"
+    elif new == "NAME" and text.isalpha():
+        code, message, help = "E0110", f"`{text}` is a keyword, not a name", "choose another name"
+    elif names[0] in _NAMED:
+        code = _CODES.get(names[0], "E0126")
+        message = f"expected {_NAMED[names[0]]}, found {_shown(tokens, at)}"
+    elif new == "==":
+        code, message, help = "E0111", "`=` does not compare", "equality is `==`"
+        fix = None if head(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
+    elif names == ["{", "}"]:
+        code, message = "E0106", f"missing block, found `{text}`"
+    elif {text, new} == {")", "]"}:
+        code, fix = "E0105", new
+    elif OPERATORS.get(text) == new:
+        code, message, help = "E0127", f"`{text}` is not used here", f"`{new}` is the sign for it"
+        fix = None if new == "!" and tokens.text(at + 1) != "(" else new  # elsewhere it takes more
+    elif new.isalpha() and new in (HEADS.get(text), *keywords_near(text)):
+        code, message, fix = "E0132", f"unknown word `{text}`", None if text == "int" else new
+        help = f"it is `{new}` here" if text in HEADS else f"did you mean `{new}`?"
+    elif new in _REPLACEMENTS.get(text, ()):
+        fix = " =" if new == "=" and tokens.end_before(at) == start else new
+    report.add(code, message, start, end, help=help, fix=fix)
+
+
+def _listed(names: list[str]) -> str:
+    """What is missing, in words: "an expression, `)` and `{`"."""
+    parts: list[str] = []
+    for name in names:
+        if parts and not (name.isalpha() or parts[-1][-2:-1].isalpha()) and name not in _NAMED:
+            parts[-1] = f"{parts[-1][:-1]}{name}`"  # signs in a row
+        else:
+            parts.append(_NAMED.get(name, f"`{name}`"))
+    return " and ".join((", ".join(parts[:-1]), parts[-1])) if parts[1:] else parts[0]
+
+
+def _shown(tokens: Tokens, at: int) -> str:
+    return "the end of the file" if tokens.kinds[at] == END else _quoted(tokens.text(at))
+
+
+def _quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
