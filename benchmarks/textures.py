@@ -16,9 +16,9 @@ import numpy as np
 import torch
 
 import scenelang as nsg
+from scenelang.elements.textures import load_textures
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
-from scenelang.models.manifest import load_manifest, load_textures
 from scenelang.program.compile import compile_scene
 from scenelang.program.paints import Paint
 from scenelang.program.program import Program
@@ -42,8 +42,8 @@ SCENES = {
 
 
 def textured(program: Program) -> Program:
-    """The same with the textures of `textures2d`, every second one with its hue shifted."""
-    found = load_textures(load_manifest("textures2d")).values()
+    """The same with the textures that ship, every second one with its hue shifted."""
+    found = load_textures().values()
     palette = [Paint(element, (("hue", 0.1),) if at % 2 else ()) for at, element in enumerate(found)]
     worn = tuple(islice(cycle(palette[:: max(1, len(palette) // 5)]), len(program)))
     shown = tuple(dict.fromkeys(worn))

@@ -17,7 +17,6 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import FileContext
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
@@ -28,7 +27,6 @@ from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.settings import prepare_file
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.session import Defines, Inputs, Session
-from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written
 from scenelang.syntax import nodes, parse
@@ -68,11 +66,10 @@ class Evaluation:
     def __init__(self, file: nodes.File, *, diagnostics: Diagnostics, **inputs: Unpack[Inputs]) -> None:
         self.file, self.diagnostics = file, diagnostics
         self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
-        self._errors = len(diagnostics.errors)
+        self._errors, self._model = len(diagnostics.errors), inputs.get("model")
         self._steps = self._objects = 0
         self._session = session = Session(
             Reporter(diagnostics),
-            _choose(file, vocabulary(inputs.get("models")), inputs.get("model"), diagnostics),
             EXPRESSIONS,
             STATEMENTS,
             inputs.get("frame", 0),
@@ -141,10 +138,10 @@ class Evaluation:
             name_frame(self.diagnostics, before, frame)
         if self._body is None or len(self.diagnostics.errors) > self._errors:
             return None, session.spans
-        settings, chosen = session.settings, session.vocabulary.chosen
+        settings = session.settings
         fields = {
             "version": 1,
-            "model": chosen.name if chosen else None,
+            "model": self._model or settings.model,
             "canvas": settings.canvas,
             "background": settings.background,
             **{word: settings.stage.get(word, "default") for word in STAGE},
@@ -157,21 +154,6 @@ class Evaluation:
         if written is not None:
             session.spans.record(scene, Written(written, written))
         return scene, session.spans
-
-
-def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics: Diagnostics) -> Vocabulary:
-    """The vocabulary of the model from outside, or of the one that the file names."""
-    name = model
-    if name is None:
-        stated = (stmt.name for stmt in file.statements if isinstance(stmt, nodes.Model))
-        name = next((stmt.value for stmt in stated if isinstance(stmt, nodes.String)), None)
-    if name is None:
-        return words
-    chosen = words.choose(name)
-    if chosen is None and model is not None:  # what the file names is reported at its statement
-        help = f"there is {listing(m.name for m in words.models)}"
-        diagnostics.add("E0210", f"unknown model `{name}`", None, help=help)
-    return chosen or Vocabulary(words.models, blind=True)
 
 
 def load_scene(

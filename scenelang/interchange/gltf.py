@@ -258,7 +258,7 @@ class _Import:
         if (red, green, blue) == (1.0, 1.0, 1.0):
             return None
         paint = schema.Color(rgb=(srgb(red), srgb(green), srgb(blue)))
-        return schema.Material(self.manifest.default_material, ops=(paint,))
+        return schema.Material(self.manifest.materials[0], ops=(paint,))
 
     def local(self, node: Node, path: str) -> tuple[Rows, Steps]:
         """A node's transform in the axes of the scene, as a matrix and as it was written."""

@@ -83,10 +83,7 @@ def manifest_schema() -> dict[str, Any]:
             "lifting": word,
             "layout": word,
             "geometries": {**words, "minItems": 1, "description": "in the order of the learned codes"},
-            "materials": {**words, "minItems": 1},
-            "default_material": {**word, "description": "one of the materials"},
-            "transforms": words,
-            "material_ops": words,
+            "materials": {**words, "minItems": 1, "description": "likewise, the default first"},
             "limits": {"type": "object", "additionalProperties": limit},
             "trained": {
                 "description": "ranges, beyond which is a warning",
@@ -107,10 +104,8 @@ def manifest_schema() -> dict[str, Any]:
                     {"corners": {"type": "array", "items": pair, "minItems": 3}, "inner": {"type": "number"}}
                 ),
             },
-            "fixed_stage": {"description": "whether camera and light are its own", "type": "boolean"},
             "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
-            "textures": {**words, "description": "materials that are elements in textures.safetensors"},
         },
         optional=OPTIONAL,
         title="Manifest",

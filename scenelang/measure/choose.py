@@ -12,8 +12,9 @@ import numpy as np
 import torch
 
 from scenelang.backend.load import Load
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
 from scenelang.measure.frontier import Cost, Frontier, Limits, Point
-from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import Manifest
 from scenelang.scene.schema import Scene
 
@@ -73,14 +74,8 @@ def refusal(point: Point, manifest: Manifest | None, scene: Scene | None, compil
         return None if point.model == compiled else f"the program was compiled for `{compiled}`"
     if scene is None or manifest is None:
         return None
-    if unknown := lacking(manifest, uses(scene)):
-        return f"has no `{unknown[0]}`"
-    if not paints(manifest, scene):
-        if manifest.sizes and scene.canvas not in manifest.sizes:
-            sizes = ", ".join(f"{w} x {h}" for w, h in manifest.sizes)
-            return f"draws {sizes} pixels only"
-        return "draws on white only"
-    return None
+    lower(scene, manifest, None, found := Diagnostics())
+    return found.errors[0].message if found.errors else None
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.files import read_regular
-from scenelang.models.manifest import ROOT, Manifest, load_manifest
+from scenelang.models.manifest import Manifest, load_manifest, model_folder
 from scenelang.tensors import TensorError, read_tensors
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Facts:
 
 def weights_path(name: str) -> Path:
     """Where a shipped model's weights lie."""
-    return ROOT / name / "weights.safetensors"
+    return model_folder(name) / "weights.safetensors"
 
 
 def shipped_weights(name: str, path: Path | None = None) -> bytes:

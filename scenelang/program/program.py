@@ -27,7 +27,7 @@ from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
 from scenelang.graph.stage import Stage, stage_data
 from scenelang.lifting.layout import LAYOUTS
-from scenelang.models.manifest import available, load_manifest
+from scenelang.models.manifest import ALIASES, available, load_manifest
 from scenelang.notebook import bundle
 from scenelang.program.groups import OPERATOR, token_fault
 from scenelang.program.paints import Paint, paint_fault, paint_tensors
@@ -160,7 +160,8 @@ class Program:
         """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
         if (self.tokens > OPERATOR).any():
             return True
-        if self.model in available() and load_manifest(self.model).lifting != "exact":
+        known = ALIASES.get(self.model, self.model)
+        if known in available() and load_manifest(known).lifting != "exact":
             return False  # its numbers mean something else
         layout = LAYOUTS["plane" if self.stage is None else "solid"]
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())

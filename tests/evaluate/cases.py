@@ -1,4 +1,4 @@
-"""What the tests of evaluation share: a second model, and a way to run text."""
+"""A way to run text, which the tests of evaluation share."""
 
 from __future__ import annotations
 
@@ -10,12 +10,8 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import load_source
-from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
-from tests.models import SOLIDS, STUDIO
-
-MODELS = (load_manifest("shapes2d"), SOLIDS, STUDIO)
 
 
 @dataclass
@@ -40,9 +36,9 @@ class Outcome:
 
 
 def run_text(text: str, *, name: str = "test.nsg", **options: Any) -> Outcome:
-    """Evaluate text with both models at hand."""
+    """Evaluate text."""
     found = Diagnostics()
-    scene, spans = load_source(SourceFile(name, text), diagnostics=found, **{"models": MODELS, **options})
+    scene, spans = load_source(SourceFile(name, text), diagnostics=found, **options)
     return Outcome(scene, spans, found)
 
 

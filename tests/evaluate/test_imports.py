@@ -14,7 +14,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import evaluate, load_scene
 from scenelang.evaluate.prepare import settings
 from scenelang.syntax import parse
-from tests.evaluate.cases import MODELS, Outcome, run_text, transform
+from tests.evaluate.cases import Outcome, run_text, transform
 from tests.work import lines_run
 
 
@@ -27,7 +27,7 @@ def write(folder: Path, **files: str) -> None:
 
 def load(path: Path, **options: Any) -> Outcome:
     found = Diagnostics()
-    scene, spans = load_scene(path, diagnostics=found, models=MODELS, **options)
+    scene, spans = load_scene(path, diagnostics=found, **options)
     return Outcome(scene, spans, found)
 
 

@@ -265,7 +265,7 @@ MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text(
         {"format": 2}, {"unknown": 1}, {"name": None}, {"name": 3}, {"name": 'a"b'}, {"dimension": 4},
         {"dimension": True}, {"dimension": "2"}, {"geometries": "star"}, {"geometries": ["../star"]},
         {"geometries": ["star", "star"]}, {"geometries": [1]}, {"materials": []}, {"renderer": "../../x"},
-        {"lifting": "a/b"}, {"default_material": "gold"}, {"limits": {"canvas": 1e300}},
+        {"lifting": "a/b"}, {"limits": {"canvas": 1e300}},
         {"limits": {"canvas": -1}}, {"limits": {"canvas": 1 << 60}}, {"limits": [1]},
         {"trained": {"twirl": [2]}},
         {"trained": {"twirl": [2, 1]}}, {"trained": {"twirl": ["a", "b"]}},

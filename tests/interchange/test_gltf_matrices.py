@@ -13,9 +13,7 @@ import trimesh
 import scenelang as nsg
 from scenelang.interchange import gltf as module
 from scenelang.interchange.gltf import GltfError, load_gltf
-from scenelang.models.manifest import load_manifest
 from tests.interchange.documents import Json, document, objects, read, write
-from tests.models import SOLIDS
 
 
 def oracle(path: Path) -> dict[str, np.ndarray]:
@@ -28,7 +26,6 @@ def oracle(path: Path) -> dict[str, np.ndarray]:
 def solids(monkeypatch: pytest.MonkeyPatch) -> None:
     """A 3D model beside the shipped ones."""
     monkeypatch.setattr(module, "available", lambda: ["shapes2d", "solids3d"])
-    monkeypatch.setattr(module, "load_manifest", lambda n: SOLIDS if n == "solids3d" else load_manifest(n))
 
 
 @pytest.fixture

@@ -243,13 +243,15 @@ def test_points_that_cannot_draw_a_scene_are_refused() -> None:
     scene = Scene(nodes=(Object(geometry="square", transforms=(Scale(x=0.5, y=0.5, z=1),)),))
     one = point("a", 1, 0.1)
     assert refusal(one, manifest, scene, None) is None
-    assert refusal(one, fixed, scene, None) == "draws 64 x 64 pixels only"
+    assert refusal(one, fixed, scene, None) == (
+        "a canvas of 256 x 256 pixels; model `shapes2d` draws only 64 x 64"
+    )
     small = scene.model_copy(update={"canvas": (64, 64)})
     assert refusal(one, fixed, small, None) is None
     grey = small.model_copy(update={"background": (0.5, 0.5, 0.5)})
-    assert refusal(one, fixed, grey, None) == "draws on white only"
+    assert refusal(one, fixed, grey, None) == "model `shapes2d` draws only over white"
     twisted = Scene(nodes=(Object(geometry="square", transforms=(Twist(k=0.3),)),))
-    assert refusal(one, manifest, twisted, None) == "has no `twist`"
+    assert refusal(one, manifest, twisted, None) == "`twist` leaves the plane"
     assert refusal(one, manifest, None, "shapes2d") is None
     assert refusal(one, manifest, None, "other") == "the program was compiled for `other`"
     exact = point("exact", 1, 0.0, backend="reference", model=None)

@@ -150,7 +150,7 @@ def test_models() -> None:
     assert compile_scene(scene, model="shapes2d").model == "shapes2d"
     with pytest.raises(SceneError) as caught:
         compile_scene(scene, model="nosuch")
-    assert caught.value.diagnostics[0].code == "E0210"
+    assert caught.value.diagnostics[0].code == "E0514"
 
 
 def test_compiling_loads_no_torch_and_checking_no_numpy() -> None:

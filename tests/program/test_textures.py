@@ -225,9 +225,9 @@ def test_an_error_says_that_a_scene_is_flat_or_solid() -> None:
     with pytest.raises(nsg.SceneError):
         compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
     (only,) = found
-    assert only.code == "E0508"
-    assert only.message.startswith("`sphere` belongs to solid scenes, `square` to flat ones")
-    assert only.help == "leave out `square` or `sphere`"
+    assert only.code == "E0501"
+    assert only.message == "geometry `square` belongs to flat scenes, and this one is solid"
+    assert only.help == "a scene is flat or solid; model `solids3d` has `sphere`, `torus`"
 
 
 def test_models_of_the_paper_draw_no_textures() -> None:

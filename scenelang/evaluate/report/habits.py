@@ -13,7 +13,7 @@ from scenelang.evaluate.file_context import FileContext, Place
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.foreign_words import SHAPES, Shape
 from scenelang.evaluate.report.reporter import Advice
-from scenelang.evaluate.report.spaces import likely_material, likely_models
+from scenelang.evaluate.report.spaces import likely_dimensions, likely_material
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
 from scenelang.scene import library
@@ -212,15 +212,11 @@ def as_group(stmt: nodes.Call, session: Session) -> Fix | None:
     return Fix("write it as a group", (Edit(head, "group "), Edit(Span(source, last, last), f" {moved}")))
 
 
-_LEAVES: Final = frozenset(("square", "triangle", "pentagon"))  # what the library is made of
-
-
 def in_library(stmt: nodes.Call, place: Place) -> tuple[str | None, Fix | None]:
     """Help and fix for a statement whose name is that of a shape of the library; both None for any other."""
     shape = SHAPES.get(stmt.name.text.lower())
     session = place.session
-    likely = {model.dimension for model in likely_models(session, stmt.span.source)}
-    if shape is None or not session.vocabulary.geometries >= _LEAVES or likely == {3}:
+    if shape is None or likely_dimensions(session, stmt.span.source) == (3,):
         return None, None
     imported = next(
         (n for n, b in place.scope.visible() if b.kind == "import" and _is_library(b.value)), None

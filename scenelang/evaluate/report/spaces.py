@@ -11,28 +11,27 @@ from scenelang.evaluate.file_context import Place
 from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.session import Session
-from scenelang.models.manifest import Manifest
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import STAGE
+from scenelang.words import LEAVES, SHADINGS, STAGE
 
 _MESHES: Final = "learned from a mesh: scenelang learn part.obj -o zoo.safetensors"
 
 
-def likely_models(session: Session, source: SourceFile) -> list[Manifest]:
-    """The models in use of the dimension of what a text draws, of all where nobody can tell."""
-    words, models = session.report.uses(source), session.vocabulary.in_use
-    dimensions = {m.dimension for m in models if any(geometry in words for geometry in m.geometries)}
-    dimensions |= {3} if not words.keys().isdisjoint(STAGE) else set()
-    dimensions |= {2} if f'"{library.SHAPES}"' in source.text else set()
-    dimensions |= {3} if f'"{library.MESHES}"' in source.text else set()
-    return [m for m in models if m.dimension in dimensions] if len(dimensions) == 1 else [*models]
+def likely_dimensions(session: Session, source: SourceFile) -> tuple[int, ...]:
+    """The dimension of what a text draws; both where nobody can tell."""
+    words = session.report.uses(source).keys()
+    found = {d for d, leaves in LEAVES.items() if not words.isdisjoint(leaves)}
+    found |= {3} if not words.isdisjoint(STAGE) else set()
+    found |= {2} if f'"{library.SHAPES}"' in source.text else set()
+    found |= {3} if f'"{library.MESHES}"' in source.text else set()
+    return (*found,) if len(found) == 1 else (*LEAVES,)
 
 
 def likely_material(session: Session, source: SourceFile) -> str | None:
     """The material that what a text draws has without one; None where nobody can tell."""
-    materials = {model.default_material for model in likely_models(session, source)}
-    return materials.pop() if len(materials) == 1 else None
+    dimensions = likely_dimensions(session, source)
+    return next(iter(SHADINGS[dimensions[0]])) if len(dimensions) == 1 else None
 
 
 def material_advice(place: Place, name: str, argument: str = "…") -> str:
@@ -45,8 +44,7 @@ def material_advice(place: Place, name: str, argument: str = "…") -> str:
 def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
     """Likely meaning of a name in the place of a material."""
     session, source, span, lower = place.session, place.file.source, name.span, name.text.lower()
-    models = likely_models(session, source)
-    there = known & {look for model in models for look in model.looks} or known
+    there = known.difference(*(SHADINGS[d] for d in SHADINGS.keys() - likely_dimensions(session, source)))
     help, fix = did_you_mean(name.text, there, span)
     colour, here = foreign_words.COLOURS.get(lower), foreign_words.MATERIALS.get(lower)
     if help is None and colour is not None and here is None:
@@ -57,13 +55,10 @@ def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
     return help or (here if here is not None and " " in here else listed), fix
 
 
-def drawn(place: Place, known: set[str]) -> str:
+def drawn(place: Place) -> str:
     """Shapes that can be drawn, in the plane or in space."""
-    models = [m for m in likely_models(place.session, place.file.source) if known.intersection(m.geometries)]
-    spaces = sorted({model.dimension for model in models})
-    said = {n: listing({g for m in models if m.dimension == n for g in m.geometries}) for n in spaces}
+    dimensions = likely_dimensions(place.session, place.file.source)
+    said = {n: listing(LEAVES[n]) for n in dimensions}
     if len(said) == 1:
-        return f"there is {said[spaces[0]]}" + (f", and what is {_MESHES}" if spaces == [3] else "")
-    if not said:
-        return "no model is at hand"
+        return f"there is {said[dimensions[0]]}" + (f", and what is {_MESHES}" if dimensions == (3,) else "")
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"

@@ -15,7 +15,7 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice, Reporter, Shared, shown_places
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, TRANSFORMS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, GEOMETRIES, MATERIALS, OPERATIONS, TRANSFORMS
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
@@ -199,11 +199,10 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
         return call_advice(text, call)
     if call and text in TRANSFORMS:
         return f"transforms are statements of a block: square {{ {call.span.text}; }}", None
-    words = place.session.vocabulary
-    if text in words.materials | words.geometries:
-        if span.source.text[span.end : span.end + 1] == "." and text in words.geometries:
+    if text in MATERIALS or text in GEOMETRIES:
+        if span.source.text[span.end : span.end + 1] == "." and text in GEOMETRIES:
             return f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}", None
-        if text in words.geometries:
+        if text in GEOMETRIES:
             return f"objects are not values; one to use again is module part() {{ {text}; }}", None
         colour = call.args[0].value.span.text if call and len(call.args) == 1 else None
         written = f"material {text}" + (f" {{ color({colour or '…'}); }}" if call else "")
@@ -212,7 +211,7 @@ def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None, kinds: 
     before = span.source.text[max(0, span.start - 20) : span.start].replace(" ", "")
     if text in ("x", "y", "z") and before.endswith("axis="):
         return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))
-    if before.strip().endswith("model") and any(text == model.name for model in words.in_use):
+    if before.strip().endswith("model"):
         return "a model is named by a string", Fix("put quotes around it", (Edit(span, f'"{text}"'),))
     if not call and lower in foreign_words.VALUES:
         return foreign_words.VALUES[lower], None
@@ -252,11 +251,11 @@ def report_rebound(place: Place, name: nodes.Name, known: Binding | None) -> Non
 
 def _set_otherwise(place: Place, word: str) -> str | None:
     """Statement for a property that other languages set in a block."""
-    words, meant = place.session.vocabulary, foreign_words.WORDS.get(word, "")
+    meant = foreign_words.WORDS.get(word, "")
     if place.kind in ("file", "unknown"):
         return None
-    if meant in words.material_ops - words.transforms:
+    if meant in OPERATIONS.keys() - TRANSFORMS.keys():
         from scenelang.evaluate.report.spaces import material_advice  # only mistakes need it
 
         return f"write {material_advice(place, meant)}"
-    return f"write {meant}(…);" if meant in words.transforms else foreign_words.STATEMENTS.get(word)
+    return f"write {meant}(…);" if meant in TRANSFORMS else foreign_words.STATEMENTS.get(word)

@@ -16,6 +16,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.element import Element
 from scenelang.elements.picture import painted, texels
 from scenelang.elements.pyramid import packed, refine
+from scenelang.elements.textures import load_textures
 from scenelang.evaluate.evaluation import loads
 from scenelang.files import write_whole
 from scenelang.fitting.ladder import Shape, fit
@@ -25,11 +26,10 @@ from scenelang.graph.lower import lower
 from scenelang.lab.codes.decoder import decoded
 from scenelang.lab.codes.forms import REACH, Array, best_form, off
 from scenelang.models.load import Model, load_model
-from scenelang.models.manifest import load_textures
 
 CELLS, LEVELS = 6, 5  # of grids of distances
 SEEDS: Final = (1, 2)  # of codes and their decoder
-MODELS: Final = {"textures": "textures2d", "meshes": "solids3d"}
+MODELS: Final = {"textures": "shapes2d", "meshes": "solids3d"}
 ERRORS: Final = {
     "textures": (0.1, 0.03),
     "meshes": (0.01, 0.003, 0.001),
@@ -156,7 +156,7 @@ def load_arrays(path: Path) -> tuple[Array, dict[str, Any]]:
 
 
 def world(what: str, kept: Path) -> World:
-    """The textures of `textures2d`, or the meshes of `std/meshes`, whose originals have to be at hand.
+    """The textures that ship, or the meshes of `std/meshes`, whose originals have to be at hand.
 
     Args:
         kept: folder that gets the meshes' distances, which take a minute.
@@ -166,7 +166,7 @@ def world(what: str, kept: Path) -> World:
     """
     model = load_model(MODELS[what])
     if what == "textures":
-        shipped = load_textures(model.manifest)
+        shipped = load_textures()
         return World(what, model, shipped, {name: texels(e) for name, e in shipped.items()}, {})
     scene = loads('import "std/meshes" as m; m.bunny; m.monkey; m.teapot;')
     graph = lower(scene, model.manifest, None, Diagnostics())

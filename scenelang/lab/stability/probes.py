@@ -14,12 +14,12 @@ from functools import partial
 
 import numpy as np
 
+from scenelang import words
 from scenelang.elements.element import TEXELS
 from scenelang.measure import varied
 from scenelang.measure.sets import SETS, Rng, SetConfig, random_object, random_scene
 from scenelang.measure.varied import LARGE as LARGE
 from scenelang.measure.varied import Base
-from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import (
     Bend,
     Chain,
@@ -33,8 +33,7 @@ from scenelang.scene.schema import (
     Twirl,
 )
 
-BASE, TEXTURED = SETS["shapes2d"], "textures2d"
-NAMES = load_manifest(TEXTURED).textures
+BASE = SETS["shapes2d"]
 _BEYOND = 3.0  # scale of a square that covers the canvas however it is turned
 Make = Callable[[Rng, float], Scene]
 
@@ -184,7 +183,7 @@ def _texels(rng: Rng, texels: float) -> Scene:
     """A square beyond a small canvas, with so many texels of a texture to a pixel."""
     side = 48
     material = Material(
-        NAMES[int(rng.integers(len(NAMES)))],
+        words.TEXTURES[int(rng.integers(len(words.TEXTURES)))],
         (
             Scale.uniform(TEXELS / (texels * side * _BEYOND)),
             Rotate(angle=float(rng.uniform(-math.pi, math.pi))),
@@ -193,7 +192,7 @@ def _texels(rng: Rng, texels: float) -> Scene:
     )
     moves = Scale.uniform(_BEYOND), Rotate(angle=float(rng.uniform(-math.pi, math.pi)))
     scene = union_of([Object("square", moves, material)])
-    return scene.model_copy(update={"model": TEXTURED, "canvas": (side, side)})
+    return scene.model_copy(update={"model": "shapes2d", "canvas": (side, side)})
 
 
 def drifting(scene: Scene, frames: int) -> list[Scene]:

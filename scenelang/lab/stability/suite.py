@@ -52,7 +52,7 @@ Row = dict[str, Any]
 
 def kit_of(manifest: Manifest) -> Kit:
     """What a model is measured with."""
-    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.textures else FLAT
+    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.elements else FLAT
 
 
 class Errors(NamedTuple):
