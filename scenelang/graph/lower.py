@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from scenelang.diagnostics.diagnostic import Diagnostics, Label
@@ -115,7 +115,7 @@ def lower(
             place = None if spans is None else spans.span(stated) or spans.span(scene)
             fact = f"model `{manifest.name}` is flat and has no {word}"
             diagnostics.add("E0511", fact, place, help="leave it out; flat scenes have none")
-    space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
+    space = SPACES[manifest.dimension]
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     brought = Brought.of(scene.elements)
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)

@@ -97,13 +97,6 @@ def manifest_schema() -> dict[str, Any]:
                 "type": "array",
                 "items": size,
             },
-            "outlines": {
-                "description": "extents of geometries: corners of a convex hull, radius of a disc inside",
-                "type": "object",
-                "additionalProperties": _object(
-                    {"corners": {"type": "array", "items": pair, "minItems": 3}, "inner": {"type": "number"}}
-                ),
-            },
             "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
         },

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenelang.graph.solid import Solid
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.measure.sets import Rng
 from scenelang.measure.solid_sets import SOLID_SETS, WARP, random_solid
 from scenelang.measure.varied import rebuilt
@@ -52,7 +52,7 @@ def thin(rng: Rng, thickness: float) -> Scene:
     """Opaque objects squeezed to that thickness where they are thinnest."""
 
     def squeezed(_: int, node: Object) -> list[Transform]:
-        y = thickness / Solid().thickness(node.geometry)
+        y = thickness / GEOMETRIES[node.geometry].thickness
         return [t.model_copy(update={"y": y}) if isinstance(t, Scale) else t for t in node.transforms]
 
     return rebuilt(scene(rng, media=0.0), squeezed)

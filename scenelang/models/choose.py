@@ -19,8 +19,8 @@ def scene_dimension(scene: Scene) -> int:
             if dimension is not None:
                 return dimension
         else:
-            children = node.children
-            stack += reversed([link.node for link in children] if isinstance(node, Chain) else children)
+            links = [link.node for link in node.children] if isinstance(node, Chain) else list(node.children)
+            stack += links[::-1]
     return 3 if any(getattr(scene, word) != "default" for word in STAGE) else 2
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from scenelang.files import note_input, read_json, read_regular
 
 ROOT = Path(__file__).parent
 MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
-OPTIONAL: Final = ("layout", "set", "sizes", "white", "outlines", "any_blend")
+OPTIONAL: Final = ("layout", "set", "sizes", "white", "any_blend")
 ALIASES: Final = {"textures2d": "shapes2d"}
 """Earlier names of models, which scenes, Programs and commands may go on to use."""
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
@@ -45,18 +44,6 @@ _DRAWN: Final = {
 """What renderers draw of what users bring, of an exact lifting."""
 
 
-class Outline(NamedTuple):
-    """What is known of a flat geometry's extent; of one without, that it stays within the unit disc.
-
-    Args:
-        corners: of a convex polygon that contains it, all within the unit disc.
-        inner: radius of a disc about the origin that lies inside.
-    """
-
-    corners: tuple[tuple[float, float], ...]
-    inner: float
-
-
 @dataclass(frozen=True, slots=True)
 class Manifest:
     """A model's manifest, as read from its JSON file.
@@ -77,7 +64,6 @@ class Manifest:
         set: name of the scenes it was trained on, which models of different speed and error share.
         sizes: canvases (width, height) that it draws; any within its limits where there are none.
         white: whether it draws only over white, knowing colours but no coverage.
-        outlines: of its geometries, for bounds; see `Outline`.
         any_blend: whether it draws `smooth` of any width k.
     """
 
@@ -95,7 +81,6 @@ class Manifest:
     sizes: tuple[tuple[int, int], ...] = ()
     white: bool = False
     layout: str = "plane"
-    outlines: dict[str, Outline] = field(default_factory=dict)
     any_blend: bool = False
 
     @staticmethod
@@ -120,11 +105,7 @@ class Manifest:
         lists = {key: tuple(data[key]) for key in ("geometries", "materials")}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
         sizes = tuple((width, height) for width, height in data.get("sizes", ()))
-        outlines = {
-            name: Outline(tuple((float(x), float(y)) for x, y in shape["corners"]), float(shape["inner"]))
-            for name, shape in data.get("outlines", {}).items()
-        }
-        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes, "outlines": outlines})
+        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes})
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -173,19 +154,6 @@ def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
-def _is_corner(value: Any) -> bool:
-    """A point of the unit disc, but for rounding."""
-    return _is_pair(value) and all(-1 <= v <= 1 for v in value) and math.hypot(*value) < 1.000001
-
-
-def _is_outline(value: Any) -> bool:
-    if not isinstance(value, dict) or value.keys() != {"corners", "inner"}:
-        return False
-    corners, inner = value["corners"], value["inner"]
-    fits = isinstance(corners, list) and len(corners) >= 3 and all(map(_is_corner, corners))
-    return fits and _is_range([0, inner]) and _is_range([inner, 1])
-
-
 def _is_figure(key: str, value: Any) -> bool:
     """Sets are objects of figures; the stability suite says a line of text of each quantity."""
     if key == "sets":
@@ -208,7 +176,6 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "set": _is_name,
     "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
     "white": lambda value: type(value) is bool,
-    "outlines": _are(lambda _, value: _is_outline(value)),
     "any_blend": lambda value: type(value) is bool,
 }
 """What each field may hold."""

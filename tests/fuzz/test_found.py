@@ -95,7 +95,7 @@ def test_manifests_hold_what_the_compiler_asks_of_them(change: dict[str, object]
 
 
 def test_manifests_miss_nothing() -> None:
-    for key in MANIFEST.keys() - {"layout", "outlines", "any_blend"}:
+    for key in MANIFEST.keys() - {"layout", "any_blend"}:
         with pytest.raises(ValueError, match=r"."):
             Manifest.from_json(json.dumps({k: v for k, v in MANIFEST.items() if k != key}))
 

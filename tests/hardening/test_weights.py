@@ -276,11 +276,6 @@ MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text(
         {"limits": {"canvas": 8193}}, {"limits": {"inner_warps": 3}}, {"limits": {"canvas": True}},
         {"trained": {"shear": [0, 1]}}, {"measured": {"sets": {"shapes2d": {"flip": 10**400}}}},
         {"measured": {"sets": {"shapes2d": {"flip": "0"}}}}, {"summary": "x" * (1 << 20)},
-        {"outlines": []}, {"outlines": {"star": {"corners": [[0, 1], [1, 0], [0, -1]]}}},
-        *({"outlines": {"star": {"corners": corners, "inner": inner}}} for corners, inner in (
-            ([[0, 1], [1, 0]], 0.5), ([[0, 1], [1, 0], [0.9, 0.9]], 0.5), ([[0, 1], [1, 0], [0, -1]], True),
-            ([[0, 1], [1, 0], [0, "1"]], 0.5), ([[0, 1], [1, 0], [0]], 0.5), ([[0, 1], [1, 0], 3], 0.5),
-            ([[0, 1], [1, 0], [0, -1]], 10**400))),
     ],
     ids=str,
 )  # fmt: skip

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scenelang.graph.geometries import SECTORS
 from scenelang.lab import errors as lab
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
 from scenelang.proof import errors
 from scenelang.proof.errors import PROVER, Errors, layers_of, load_errors
-from scenelang.reference.field import SECTORS, leaf_distance
+from scenelang.reference.field import leaf_distance
 from scenelang.renderers.network import RADIUS
 from tests.pictures import Array
 

@@ -55,7 +55,7 @@ def _facts(manifest: Manifest) -> dict[str, Any]:
 def _text(facts: dict[str, Any]) -> str:
     manifest, weights = facts["manifest"], facts["weights"] or {"weights": "missing or damaged"}
     lines = [f"{manifest['name']}: {manifest['summary']}", ""]
-    lines += _tree({k: v for k, v in manifest.items() if v and k not in ("name", "summary", "outlines")}, "")
+    lines += _tree({k: v for k, v in manifest.items() if v and k not in ("name", "summary")}, "")
     return "\n".join([*lines, "", "weights", *_tree(weights, "  ")])
 
 

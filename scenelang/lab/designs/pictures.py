@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from scenelang.graph.geometries import sector_distance
 from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
-from scenelang.reference.field import fold, map_back, sector_distance, warp_back
+from scenelang.reference.field import fold, map_back, warp_back
 from scenelang.training.scenes import sectors
 
 

@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.graph.geometries import SECTORS
 from scenelang.graph.nodes import Fold, Graph, Leaf, Node
 from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.reference.field import SECTORS
 
 Points = npt.NDArray[np.float64]
 TOLERANCE: Final = 0.02
