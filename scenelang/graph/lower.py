@@ -236,6 +236,8 @@ class _Lowering:
                 self.element(node.geometry, self.brought.geometries, node, "E0501")
             elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
+                if dimension_of(node.geometry) not in (None, self.space.dimension):
+                    material = None  # which is of the other kind of scene, too
             look = Look(self.manifest.materials[0]) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.kept is None else {}
             leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)

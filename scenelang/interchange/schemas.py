@@ -81,7 +81,6 @@ def manifest_schema() -> dict[str, Any]:
             "dimension": {"enum": [2, 3]},
             "renderer": word,
             "lifting": word,
-            "layout": word,
             "geometries": {**words, "minItems": 1, "description": "in the order of the learned codes"},
             "materials": {**words, "minItems": 1, "description": "likewise, the default first"},
             "limits": {"type": "object", "additionalProperties": limit},

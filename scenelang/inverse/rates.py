@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.inverse.space import Point, Space
-from scenelang.lifting.layout import LAYOUTS
-from scenelang.models.manifest import load_manifest
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.program.groups import SMOOTH
 from scenelang.program.program import Program
 from scenelang.renderers.field import BLEND
@@ -29,7 +28,7 @@ def numbers_of(program: Program) -> Floats:
     Settings are the background, or black; of solids the camera's eye, target and angle of view, the light's
     position, power and colour, the ground's height and colour, horizon and zenith.
     """
-    at = LAYOUTS[load_manifest(program.model).layout].blend
+    at = LAYOUTS[2 if program.stage is None else 3].places.width
     vectors = program.vectors.astype(np.float64)
     vectors[:, at] = np.where((program.tokens == SMOOTH) & (vectors[:, at] <= 0), BLEND, vectors[:, at])
     if program.stage is None:

@@ -13,7 +13,8 @@ from torch import Tensor
 from scenelang.graph.stage import AMBIENT, FADE, LIFT, NEAREST
 from scenelang.inverse.surfaces import SLOTS, Numbers, Surfaces, length, unit
 from scenelang.inverse.target import WHITE
-from scenelang.program.program import WIDTH, Program
+from scenelang.lifting.vector import WIDTH
+from scenelang.program.program import Program
 from scenelang.renderers.solid.network import Wanted
 
 

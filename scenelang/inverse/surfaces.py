@@ -14,9 +14,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from scenelang.lifting.vector import STRENGTHS, WIDTH
 from scenelang.models.load import load_model
 from scenelang.program.groups import SMOOTH
-from scenelang.program.program import WIDTH, Program
+from scenelang.program.program import Program
 from scenelang.renderers.field import BLEND
 from scenelang.renderers.solid.network import EMPTY, RADIUS, Cell, Wanted
 from scenelang.renderers.solid.parameters import Solids
@@ -86,8 +87,9 @@ class Surfaces:
         self.layout = layout = network.layout
         self.count, self.tokens, self.dtype = len(program), program.tokens.tolist(), dtype
         vectors = torch.from_numpy(program.vectors.copy()).to(dtype)
-        self.decoders = [network.decoder(code) for code in vectors[:, : layout.code]]
-        self.looks = network.look(vectors[:, layout.geometry :][:, layout.material_code])
+        parts = layout.unpack(vectors)
+        self.decoders = [network.decoder(code) for code in parts.code]
+        self.looks = network.look(parts.material)
         self.opaque = bool((self.looks[:, 3] < 0.5).all())
         self.balls = torch.from_numpy(program.bounds.copy()).to(dtype)
         camera, self.px = program.stage.camera, 2 / min(program.canvas)
@@ -104,7 +106,7 @@ class Surfaces:
         """Note along which directions maps to leaves stretch most."""
         self.most = []
         for i in range(self.count):
-            frames = (numbers[i * WIDTH :][s].reshape(3, 4) for s in (self.layout.frame, self.layout.middle))
+            frames = (numbers[i * WIDTH :][s].reshape(3, 4) for s, _ in self.layout.ways)
             last, middle = (rows[:, :3] for rows in frames)
             u, _, v = torch.linalg.svd(middle @ last)
             self.most.append((u[:, 0], v[0]))
@@ -112,18 +114,18 @@ class Surfaces:
     def _distance(self, i: int, p: Tensor, at: Numbers) -> Tensor:
         """World distances (K,) of an object at points (3, K)."""
         layout, row = self.layout, i * WIDTH
-        maps = [at(row + part.start, 12).reshape(3, 4, -1) for part in (layout.frame, layout.middle)]
+        maps = [at(row + frame.start, 12).reshape(3, 4, -1) for frame, _ in layout.ways]
         q = p
-        for rows, warps in zip(maps, (layout.outer_warps, layout.inner_warps), strict=True):
+        for rows, (_, warps) in zip(maps, layout.ways, strict=True):
             q = (rows[:, :3] * q).sum(1) + rows[:, 3]
-            for first in range(warps.start, warps.stop, layout.strengths):
-                q = _turned(q, at(row + first, layout.strengths))
+            for first in range(warps.start, warps.stop, STRENGTHS):
+                q = _turned(q, at(row + first, STRENGTHS))
         u, v = self.most[i]
         last, middle = (rows[:, :3] for rows in maps)
         stretch = u @ (middle * (last * v[:, None]).sum(1)).sum(1)
         far = length(q)
         d = self.network.field(q * (RADIUS / far.clamp(RADIUS)), self.decoders[i], False)[0]
-        amount, frequency = at(row + layout.geometry - 3, 2)
+        amount, frequency = at(row + layout.places.bulge.start, 2)
         if amount.any() or amount.requires_grad:
             d = d + amount * (frequency * q).sin().prod(0)
         found: Tensor = (d + (far - RADIUS).clamp(0.0)) / stretch
@@ -136,12 +138,12 @@ class Surfaces:
         for i, token in enumerate(self.tokens):
             look = memory
             if wanted:
-                matrix = at(i * WIDTH + layout.geometry + layout.colour.start, 12).reshape(3, 4, -1)
-                colour = ((matrix[:, :3] * self.looks[i, :3, None]).sum(1) + matrix[:, 3]).clamp(0.0, 1.0)
+                rgb = at(i * WIDTH + layout.places.rgb.start, 12)[::5]
+                colour = (rgb * self.looks[i, :3, None]).clamp(0.0, 1.0)
                 look = torch.cat([colour.expand(3, count), p.new_zeros(1, count)])
             cell = self.cells[token][wanted]
             if token == SMOOTH:
-                cell = self._soft(cell, BLEND / at(i * WIDTH + layout.blend, 1))
+                cell = self._soft(cell, BLEND / at(i * WIDTH + layout.places.width, 1))
             memory = self.network.join(self._distance(i, p, at), memory, look, cell, wanted)[0]
         return memory
 

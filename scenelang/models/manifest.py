@@ -13,7 +13,7 @@ from scenelang.files import note_input, read_json, read_regular
 ROOT = Path(__file__).parent
 MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
-OPTIONAL: Final = ("layout", "set", "sizes", "white", "any_blend")
+OPTIONAL: Final = ("set", "sizes", "white", "any_blend")
 ALIASES: Final = {"textures2d": "shapes2d"}
 """Earlier names of models, which scenes, Programs and commands may go on to use."""
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
@@ -54,7 +54,6 @@ class Manifest:
         dimension: 2 or 3.
         renderer: name of the renderer.
         lifting: name of the lifting.
-        layout: of an exact lifting, where its numbers lie: a name in `scenelang.lifting.layout`.
         geometries: leaf geometries it draws, in the order of their codes.
         materials: the ways of lighting it knows, likewise; an object without a material gets the first.
         limits: hard limits; beyond them a scene cannot be compiled for this model.
@@ -80,7 +79,6 @@ class Manifest:
     set: str = ""
     sizes: tuple[tuple[int, int], ...] = ()
     white: bool = False
-    layout: str = "plane"
     any_blend: bool = False
 
     @staticmethod
@@ -167,7 +165,6 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "dimension": lambda value: type(value) is int and value in (2, 3),
     "renderer": _is_word,
     "lifting": _is_word,
-    "layout": _is_word,
     "geometries": _are_words,
     "materials": lambda value: _are_words(value) and len(value) > 0,
     "limits": _are(lambda key, v: type(v) is int and 0 <= v <= _LIMITS.get(key, -1)),

@@ -26,7 +26,7 @@ from scenelang.elements.element import Element
 from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
 from scenelang.graph.stage import Stage, stage_data
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS, WIDTH
 from scenelang.models.manifest import ALIASES, available, load_manifest
 from scenelang.notebook import bundle
 from scenelang.program.groups import OPERATOR, token_fault
@@ -36,7 +36,6 @@ from scenelang.words import TOKENS
 
 MOST_OBJECTS = 100_000
 MOST_PIXELS = 8192
-WIDTH = 64
 
 
 class ProgramError(ValueError):
@@ -163,8 +162,8 @@ class Program:
         known = ALIASES.get(self.model, self.model)
         if known in available() and load_manifest(known).lifting != "exact":
             return False  # its numbers mean something else
-        layout = LAYOUTS["plane" if self.stage is None else "solid"]
-        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())
+        layout = LAYOUTS[2 if self.stage is None else 3]
+        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""

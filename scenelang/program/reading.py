@@ -10,9 +10,10 @@ from scenelang.elements.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
 from scenelang.elements.zoo import read_elements
 from scenelang.files import read_regular
 from scenelang.graph.stage import read_stage
+from scenelang.lifting.vector import WIDTH
 from scenelang.models.manifest import ALIASES, available
 from scenelang.program.paints import read_paints
-from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
+from scenelang.program.program import MOST_OBJECTS, Place, Program, ProgramError
 from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints

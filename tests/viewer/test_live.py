@@ -14,7 +14,7 @@ import pytest
 import scenelang as nsg
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.measure.sets import SETS
 from scenelang.measure.sets import random_scene as random_set_scene
 from scenelang.measure.solid_sets import SOLID_SETS, random_solid
@@ -107,7 +107,7 @@ def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> No
     ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
     for seed in range(60):
         program = nsg.compile(any_scene(seed))
-        blends = program.vectors[:, LAYOUTS["plane"].blend]
+        blends = program.vectors[:, LAYOUTS[2].places.width]
         known = felt(
             read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
         )

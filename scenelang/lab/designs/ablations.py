@@ -24,7 +24,7 @@ from scenelang.lab.designs.students import (
     Student,
     StudentConfig,
 )
-from scenelang.lifting.layout import PLANE_LAYOUT
+from scenelang.lifting.vector import PLANE_LAYOUT
 from scenelang.renderers.framed import Framed, Trace
 from scenelang.renderers.network import TOKENS, FramedConfig
 from scenelang.training.scenes import GEOMETRIES

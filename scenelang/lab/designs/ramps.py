@@ -16,7 +16,7 @@ import math
 import torch
 from torch import nn
 
-from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
+from scenelang.lifting.vector import PLANE_LAYOUT as LAYOUT
 from scenelang.renderers.streaming import Streaming
 
 SLOPE, WARP = 5.5, 0.9  # constants that keep entries of frames and strengths of warps positive
@@ -60,12 +60,13 @@ def _carry(layer: nn.ConvTranspose2d, half: float, *, first: bool) -> None:
 
 
 def _from_vector(tap: torch.Tensor, x: float, y: float) -> None:
-    a, b, s, c, d, t = range(LAYOUT.frame.start, LAYOUT.frame.stop)
+    a, b, s, c, d, t = range(LAYOUT.places.frame.start, LAYOUT.places.frame.stop)
     for channel, entries in ((0, (a, b, s)), (2, (c, d, t))):
         for entry, times in zip(entries, (x, y, 1.0), strict=True):
             tap[entry, channel], tap[entry, channel + 1] = times, -times
-    warp, colour = LAYOUT.inner_warps.start, LAYOUT.geometry + LAYOUT.colour.start
-    carried = (a, b, c, d, warp, warp + 1, *range(LAYOUT.code), *(colour + 5 * k for k in range(3)))
+    warp, colour = LAYOUT.places.inner.start, LAYOUT.places.rgb.start
+    code = range(LAYOUT.places.code.stop)
+    carried = (a, b, c, d, warp, warp + 1, *code, *(colour + 5 * k for k in range(3)))
     for channel, entry in enumerate(carried, 4):
         tap[entry, channel] = 1.0
 

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from scenelang.lab.designs.encoders import Encoders, LiftingConfig
 from scenelang.lab.designs.pictures import Scenes, exact_vectors, pixel_centres
-from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
+from scenelang.lifting.vector import PLANE_LAYOUT, WIDTH
 from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.framed import Framed, Trace
 from scenelang.renderers.frames import Affine, Warp, way_back
@@ -159,8 +159,8 @@ class FramedStudent(PointStudent):
         if isinstance(self.lifting, LearnedLifting):
             with torch.no_grad():  # start from frames that are frames, not from noise
                 codes = self.lifting.codes
-                codes[:, PLANE_LAYOUT.code :] = 0.0
-                for frame in (PLANE_LAYOUT.frame, PLANE_LAYOUT.middle):
+                codes[:, PLANE_LAYOUT.places.code.stop :] = 0.0
+                for frame, _ in PLANE_LAYOUT.ways:
                     codes[:, frame] = torch.tensor(PLANE_LAYOUT.identity)
         self.renderer = self.network(config.framed, len(GEOMETRIES), 1)
         # the codes are the lifting's
@@ -175,7 +175,7 @@ class FramedStudent(PointStudent):
     @property
     def leaf_codes(self) -> Tensor:
         """Codes (G, C) of the leaves as the decoder takes them."""
-        return self.lifting.codes[:, : PLANE_LAYOUT.code]
+        return self.lifting.codes[:, PLANE_LAYOUT.places.code]
 
     def read(self, g: Tensor, scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """What the decoder is shown at world points (B, P) of geometry vectors (B, N, 32).
@@ -184,21 +184,18 @@ class FramedStudent(PointStudent):
             Points (B, N, 2, P), distance scales (B, N), codes (B, N, C).
         """
         q, scale = read_points(g, x, y)
-        return q, scale, g[..., : PLANE_LAYOUT.code]
+        return q, scale, g[..., PLANE_LAYOUT.places.code]
 
     def trace(
         self, scenes: Scenes, x: Tensor, y: Tensor, given: tuple[Tensor, Tensor] | None = None
     ) -> Trace:
         """What the network answers along the streams at world points (B, P); see `Framed.trace`."""
         vectors = self.lifting.lift(scenes)
-        g, m = vectors[..., : PLANE_LAYOUT.geometry], vectors[..., PLANE_LAYOUT.geometry :]
-        q, scale, code = self.read(g, scenes, x, y)
+        parts = PLANE_LAYOUT.unpack(vectors)
+        q, scale, code = self.read(vectors[..., : PLANE_LAYOUT.geometry], scenes, x, y)
         b, n = scenes.leaf.shape
-        material = m[..., PLANE_LAYOUT.material_code].reshape(b * n, -1)
-        albedo = self.renderer.object_albedo(material).view(b, n, 3)
-        mix = m[..., PLANE_LAYOUT.colour].reshape(b, n, 3, 4)
-        colours = (mix[..., :3] @ albedo[..., None])[..., 0] + mix[..., 3]
-        return self.renderer.trace(q, scale, code, colours, scenes.tokens, given)
+        albedo = self.renderer.object_albedo(parts.material.reshape(b * n, -1)).view(b, n, 3)
+        return self.renderer.trace(q, scale, code, parts.rgb * albedo, scenes.tokens, given)
 
     def points(self, scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:
         trace = self.trace(scenes, x, y)
@@ -220,14 +217,14 @@ def read_points(g: Tensor, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
     """
     steps: list[Affine | Warp] = []
     layout = PLANE_LAYOUT
-    for frame, group in ((layout.frame, layout.outer_warps), (layout.middle, layout.inner_warps)):
+    for frame, group in layout.ways:
         numbers = g[..., frame, None].unbind(-2)  # each (B, N, 1)
         steps.append(Affine((numbers[:3], numbers[3:])))
         for start in range(group.start, group.stop, 3):
             twirl, *bend = g[..., start : start + 3, None].unbind(-2)
             steps.append(Warp(twirl, tuple(bend)))
     q = torch.stack(list(way_back(TORCH, steps, (x[:, None], y[:, None]))), 2)
-    last, middle = (g[..., s].reshape(*g.shape[:-1], 2, 3)[..., :2] for s in (layout.frame, layout.middle))
+    last, middle = (g[..., s].reshape(*g.shape[:-1], 2, 3)[..., :2] for s, _ in layout.ways)
     return q, 1 / largest_stretch(middle @ last).clamp_min(1e-3)
 
 
