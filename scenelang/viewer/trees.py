@@ -228,12 +228,14 @@ class Writer(Names):
 
     def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
+        table = OPERATIONS if inks else TRANSFORMS
+        if name not in table:
+            return ["no", f"`{name}` does not stand here"]
         if name in SOLID_TRANSFORMS and self.manifest.dimension == 2:
             return ["no", f"`{name}` leaves the plane"]
         if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
             return ["move", "even", self.expression(args[0].value, scope)]
-        params = (OPERATIONS if inks else TRANSFORMS)[name].params
-        return ["move", name, *self.given(bind(params, args), scope)]
+        return ["move", name, *self.given(bind(table[name].params, args), scope)]
 
     # ------------------------------------------------------------ elements
 
