@@ -84,9 +84,9 @@ def write_chart(path: Path, draw: Callable[[], bytes]) -> None:
 def model_to_measure(name: str, weights: Path | None) -> Model:
     """A shipped model, or one with other weights."""
     from scenelang.models.load import load_model
-    from scenelang.models.manifest import available
+    from scenelang.models.manifest import ALIASES, available
 
-    check_names("model", [name], available())
+    check_names("model", [name], [*available(), *ALIASES])
     if weights is not None and name in ("shapes2d-streaming", "shapes2d-reading"):
         from scenelang.lab.designs.export import trained_model
 
