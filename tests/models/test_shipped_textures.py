@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import scenelang as nsg
 from scenelang.elements.picture import pixels
 from scenelang.elements.textures import FILE, load_textures
 from scenelang.words import TEXTURES
@@ -42,3 +43,12 @@ def test_most_textures_show_flips_and_turns() -> None:
         off = [abs(other.astype(int) - colours).mean() for other in others]
         shows += min(off) > 2
     assert shows >= 8
+
+
+@pytest.mark.parametrize("shading", ["", "diffuse ", "volumetric "])
+def test_solids_wear_them(shading: str) -> None:
+    text = f"canvas(24, 24); torus {{ rotate(90deg, axis = X); material {shading}checker {{ scale(0.5); }} }}"
+    program = nsg.compile(nsg.loads(text))
+    assert (program.model, [paint.element.name for paint in program.palette]) == ("solids3d", ["checker"])
+    picture, plain = nsg.render(program), nsg.render(nsg.loads(text.replace("scale(0.5);", "")))
+    assert np.abs(np.asarray(picture) - np.asarray(plain)).max() > 0.1
