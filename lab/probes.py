@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 
 from lab.sets.plane import SETS, Rng, SetConfig, long_chain, random_object, random_scene
+from scenelang import words
 from scenelang.elements.element import TEXELS
-from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import (
     Bend,
     Chain,
@@ -136,8 +136,7 @@ def affine(base: Base, rng: Rng, steps: float) -> Scene:
     return rebuilt(base(rng), moves)
 
 
-BASE, TEXTURED = SETS["shapes2d"], "textures2d"
-NAMES = load_manifest(TEXTURED).textures
+BASE = SETS["shapes2d"]
 _BEYOND = 3.0  # scale of a square that covers the canvas however it is turned
 Make = Callable[[Rng, float], Scene]
 
@@ -287,7 +286,7 @@ def _texels(rng: Rng, texels: float) -> Scene:
     """A square beyond a small canvas, with so many texels of a texture to a pixel."""
     side = 48
     material = Material(
-        NAMES[int(rng.integers(len(NAMES)))],
+        words.TEXTURES[int(rng.integers(len(words.TEXTURES)))],
         (
             Scale.uniform(TEXELS / (texels * side * _BEYOND)),
             Rotate(angle=float(rng.uniform(-math.pi, math.pi))),
@@ -296,7 +295,7 @@ def _texels(rng: Rng, texels: float) -> Scene:
     )
     moves = Scale.uniform(_BEYOND), Rotate(angle=float(rng.uniform(-math.pi, math.pi)))
     scene = union_of([Object("square", moves, material)])
-    return scene.model_copy(update={"model": TEXTURED, "canvas": (side, side)})
+    return scene.model_copy(update={"model": "shapes2d", "canvas": (side, side)})
 
 
 def drifting(scene: Scene, frames: int) -> list[Scene]:

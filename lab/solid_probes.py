@@ -13,7 +13,7 @@ import numpy as np
 from lab.probes import Kit, Probe, blends, cell_of, common, rebuilt
 from lab.sets.plane import Rng
 from lab.sets.solids import SOLID_SETS, WARP, random_solid
-from scenelang.graph.solid import Solid
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.scene.schema import (
     Camera,
     Chain,
@@ -56,7 +56,7 @@ def thin(rng: Rng, thickness: float) -> Scene:
     """Opaque objects squeezed to that thickness where they are thinnest."""
 
     def squeezed(_: int, node: Object) -> list[Transform]:
-        y = thickness / Solid().thickness(node.geometry)
+        y = thickness / GEOMETRIES[node.geometry].thickness
         return [t.model_copy(update={"y": y}) if isinstance(t, Scale) else t for t in node.transforms]
 
     return rebuilt(scene(rng, media=0.0), squeezed)

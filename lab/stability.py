@@ -29,8 +29,8 @@ from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Step, Warp
 from scenelang.image import Image
 from scenelang.lifting import exact
-from scenelang.lifting.layout import LAYOUTS
 from scenelang.lifting.learned import lift_geometry
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.measure.metrics import flip, psnr
 from scenelang.measure.plan import reference_of
 from scenelang.models.load import Model
@@ -55,7 +55,7 @@ Row = dict[str, Any]
 
 def kit_of(manifest: Manifest) -> Kit:
     """What a model is measured with."""
-    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.textures else FLAT
+    return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.elements else FLAT
 
 
 class Errors(NamedTuple):
@@ -125,7 +125,7 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     vectors = program.vectors.copy()
-    layout, space = LAYOUTS[model.manifest.layout], SPACES[model.manifest.dimension]
+    layout, space = LAYOUTS[model.manifest.dimension], SPACES[model.manifest.dimension]
     nodes = [link.node for link in chain.children if isinstance(link.node, Object)]
     steps = [[step_of(transform, space) for transform in node.transforms] for node in nodes]
     lifting = model.codes.lifting
@@ -135,14 +135,14 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
         vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
         return dataclasses.replace(program, vectors=vectors)
     for row, chain_steps in zip(vectors, steps, strict=True):
-        g = exact.leaf_vector(row[: layout.code].tolist(), layout).astype(np.float32)
+        g = exact.leaf_vector(layout.unpack(row).code.tolist(), layout).astype(np.float32)
         for step in chain_steps:
             if isinstance(step, Affine):
                 matrix = exact.affine_matrix(step.rows, None, layout)
             else:
-                matrix = exact.warp_matrix(step, layout.inner_warps, layout)  # type: ignore[arg-type]
+                matrix = exact.warp_matrix(step, layout.places.inner, layout)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
-        row[: layout.geometry] = g
+        row[: layout.geometry] = g[: layout.geometry]
     return dataclasses.replace(program, vectors=vectors)
 
 

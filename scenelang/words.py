@@ -71,7 +71,7 @@ DECLARING: Final = _table(
     _word("nsg 1;", "The language version; the first statement.", "nsg 1;"),
     _word(
         'model "name";',
-        "Render with this model; without it the smallest one that has all names used.",
+        "Render with this model; without it the usual one of the scene's dimension.",
         'model "$1";',
     ),
     _word(
@@ -313,21 +313,45 @@ ANIMATED: Final = _table(
     _word("frames", "How many frames there are; 1 without `animate`."),
 )
 
-GEOMETRIES: Final[dict[str, str]] = {
-    "square": "Corners on the unit circle: sides of √2, half a side is 0.707. "
-    'For sides of your own, `import "std/shapes" as s;` and `s.rect(w, h)`.',
-    "triangle": "Regular, circumradius 1, a vertex at +y.",
-    "pentagon": "Regular, circumradius 1, a vertex at +y.",
-    "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",
-    "sphere": "Radius 1.",
-    "torus": "Radii 0.7 and 0.3, axis y.",
+LEAVES: Final[dict[int, dict[str, str]]] = {
+    2: {
+        "square": "Corners on the unit circle: sides of √2, half a side is 0.707. "
+        'For sides of your own, `import "std/shapes" as s;` and `s.rect(w, h)`.',
+        "triangle": "Regular, circumradius 1, a vertex at +y.",
+        "pentagon": "Regular, circumradius 1, a vertex at +y.",
+        "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",
+    },
+    3: {
+        "sphere": "Radius 1.",
+        "torus": "Radii 0.7 and 0.3, axis y.",
+    },
 }
+"""The geometries of the plane and of space."""
+SHADINGS: Final[dict[int, dict[str, str]]] = {
+    2: {"flat": "A constant colour, white without `color`."},
+    3: {
+        "diffuse": "Lambertian, lit by the model's point light.",
+        "volumetric": "A medium that absorbs and scatters.",
+    },
+}
+"""How a material is lit, in the plane and in space; the first of each is an object's without a material."""
+TEXTURES: Final = (
+    *("arrows", "bricks", "checker", "cobbles", "dots", "hexagons", "leaves", "letters"),
+    *("noise", "plaid", "stripes", "terrazzo", "tiles", "waves", "wood", "zigzag"),
+)
+"""Materials that are pictures, in the plane and in space."""
+GEOMETRIES: Final = LEAVES[2] | LEAVES[3]
+MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
+SOLID_TRANSFORMS: Final = "twist", "displace"
+"""Transforms that leave the plane."""
+SCENES: Final = {2: "flat", 3: "solid"}
+"""What scenes of a dimension are called."""
 
-MATERIALS: Final[dict[str, str]] = {
-    "flat": "A constant colour, white without `color`.",
-    "diffuse": "Lambertian, lit by the model's point light.",
-    "volumetric": "A medium that absorbs and scatters.",
-}
+
+def dimension_of(name: str) -> int | None:
+    """The dimension of scenes that have a geometry or a shading; None for a name that either may have."""
+    return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
+
 
 LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS))
 """Words that head a statement; no module, material or geometry can have such a name."""

@@ -23,7 +23,7 @@ API: dict[str, str | None] = json.loads((BEFORE / "api.json").read_text("utf-8")
 GONE = {"render": {"precision"}}
 
 
-@pytest.mark.parametrize(("name", "frame"), [("alpha", 2), ("white", 0), ("trees", 0)])
+@pytest.mark.parametrize(("name", "frame"), [("alpha", 2), ("white", 0), ("trees", 0), ("textures", 0)])
 def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path) -> None:
     saved = BEFORE / f"{name}.safetensors"
     loaded = nsg.load_program(saved)
@@ -39,7 +39,8 @@ def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path
     assert all(place is not None and place.line > 1 for place in loaded.places)
     assert np.array_equal(nsg.render(loaded, threads=1), nsg.render(compiled, threads=1))
     loaded.save(tmp_path / "again.safetensors")
-    assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
+    again = (tmp_path / "again.safetensors").read_bytes()
+    assert (again == saved.read_bytes()) == (name != "textures")  # whose model has another name now
 
 
 @pytest.mark.parametrize("name", sorted(name for name in API if "." not in name))

@@ -9,9 +9,10 @@ import pytest
 
 from lab.docs.make_words import made
 from scenelang import words
-from scenelang.evaluate import vocabulary
+from scenelang.elements.textures import load_textures
 from scenelang.evaluate.values import functions, transforms
 from scenelang.highlighting.lexer import OPERATORS
+from scenelang.models.manifest import available, load_manifest
 from scenelang.syntax.tables import tables
 
 ROOT = Path(__file__).parents[1]
@@ -30,11 +31,11 @@ def test_everything_called_has_a_meaning() -> None:
     assert functions.FUNCTIONS.keys() == words.FUNCTIONS.keys()
     assert functions.CONSTANTS.keys() == words.CONSTANTS.keys()
     assert transforms._BUILDS.keys() == words.TRANSFORMS.keys() | words.OPERATIONS.keys()
-    offered = {name for m in vocabulary.shipped() for name in (*m.transforms, *m.material_ops)}
-    assert offered <= words.LANGUAGE
-    for model in vocabulary.shipped():
-        assert words.GEOMETRIES.keys() >= {*model.geometries}
-        assert words.MATERIALS.keys() >= {*model.materials}
+    for model in map(load_manifest, available()):
+        assert words.LEAVES[model.dimension].keys() >= {*model.geometries}
+        assert [*words.SHADINGS[model.dimension]] == [*model.materials]
+    assert {*words.SOLID_TRANSFORMS} <= words.TRANSFORMS.keys()
+    assert (*load_textures(),) == words.TEXTURES
 
 
 CALLED = words.FUNCTIONS | words.TRANSFORMS | words.OPERATIONS | words.SETTINGS

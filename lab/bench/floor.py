@@ -36,7 +36,6 @@ from lab.sets.plane import SETS, random_scene
 from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.backend.options import keep_memory
 from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import load_manifest
 from scenelang.program.program import Program
 from scenelang.renderers.draw import draw_objects
 
@@ -88,9 +87,7 @@ def solids(frame: int, name: str, side: int = 256) -> Any:
 
 def of_set(frame: int, name: str) -> Any:
     """Scenes of an evaluation set."""
-    return random_scene(
-        np.random.default_rng([2021, frame]), SETS[name], load_manifest(model_of(name)).textures
-    )
+    return random_scene(np.random.default_rng([2021, frame]), SETS[name])
 
 
 def of_solid_set(frame: int, name: str) -> Any:
@@ -112,9 +109,7 @@ SCENES: dict[str, Callable[[int], Any]] = {
 
 def model_of(name: str) -> str:
     """What draws a scene."""
-    if name in SOLIDS or name.startswith("solids"):
-        return "solids3d"
-    return "textures2d" if name.startswith("textures") else "shapes2d"
+    return "solids3d" if name in SOLIDS or name.startswith("solids") else "shapes2d"
 
 
 def programs(name: str, frames: int) -> list[Program]:

@@ -63,7 +63,7 @@ def over(picture: Any) -> Any:
 
 def measured(name: str, index: int, seed: int) -> dict[str, float]:
     """Figures of a scene of a set."""
-    manifest = load_manifest("textures2d" if name.startswith("textures") else "shapes2d")
+    manifest = load_manifest("shapes2d")
     scene, graphs = sets_of(manifest)[name](np.random.default_rng([seed, index])), dict[str, Graph]()
     program = compile_scene(scene, model=manifest.name, after=graphs.__setitem__)
     given = graphs["lower"], graphs["flatten"], manifest

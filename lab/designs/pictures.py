@@ -15,8 +15,9 @@ import torch
 from torch import Tensor
 
 from lab.training.scenes import sectors
-from scenelang.lifting.layout import PLANE_LAYOUT, WIDTH
-from scenelang.reference.field import fold, map_back, sector_distance, warp_back
+from scenelang.graph.geometries import sector_distance
+from scenelang.lifting.vector import PLANE_LAYOUT, WIDTH
+from scenelang.reference.field import fold, map_back, warp_back
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,16 +147,12 @@ def exact_vectors(scenes: Scenes, codes: Tensor, material_codes: Tensor) -> Tens
         material_codes: (K, 12); all objects have the first.
     """
     b, n = scenes.leaf.shape
-    g = torch.zeros(b, n, PLANE_LAYOUT.geometry, device=codes.device)
-    g[..., PLANE_LAYOUT.one] = 1.0
-    g[..., PLANE_LAYOUT.frame] = frames(scenes).flatten(-2)
-    g[..., PLANE_LAYOUT.middle] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
-    g[..., PLANE_LAYOUT.inner_warps.start] = scenes.twirl
-    g[..., PLANE_LAYOUT.inner_warps.start + 1] = scenes.bend
-    m = torch.zeros(b, n, WIDTH - PLANE_LAYOUT.geometry, device=codes.device)
-    m[..., :6] = torch.tensor([1.0, 0, 0, 0, 1, 0], device=codes.device)
-    for channel in range(3):
-        m[..., PLANE_LAYOUT.colour.start + 5 * channel] = scenes.rgb[..., channel]
-    code = torch.nn.functional.pad(codes[scenes.leaf], (0, PLANE_LAYOUT.geometry - 4))
-    material = torch.nn.functional.pad(material_codes[0], (WIDTH - PLANE_LAYOUT.geometry - 12, 0))
-    return torch.cat([g + code, m + material], -1)
+    out, at = torch.zeros(b, n, WIDTH, device=codes.device), PLANE_LAYOUT.places
+    out[..., at.one] = 1.0
+    out[..., at.frame] = frames(scenes).flatten(-2)
+    out[..., at.middle] = out[..., at.texture] = torch.tensor(PLANE_LAYOUT.identity, device=codes.device)
+    out[..., at.inner.start] = scenes.twirl
+    out[..., at.inner.start + 1] = scenes.bend
+    out[..., at.rgb] = scenes.rgb
+    code = torch.nn.functional.pad(codes[scenes.leaf], (0, WIDTH - at.code.stop))
+    return out + code + torch.nn.functional.pad(material_codes[0], (at.material.start, 0))

@@ -22,9 +22,8 @@ from torch import Tensor, nn
 
 from lab.designs.pictures import Scenes, exact_vectors, pixel_centres
 from lab.training.scenes import GEOMETRIES
-from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
-from scenelang.lifting.layout import WIDTH
 from scenelang.lifting.learned import GEOMETRY_INPUTS, MATERIAL_INPUTS
+from scenelang.lifting.vector import PLANE_LAYOUT, WIDTH
 from scenelang.renderers.reading import Reading, ReadingConfig
 from scenelang.renderers.streaming import Streaming, StreamingConfig
 
@@ -218,6 +217,7 @@ def make_student(config: StudentConfig, *, grown: bool = False) -> Student:
 # through six layers is thereby there at the start and free to change; shapes, booleans and colours are
 # learned. Layers and their shapes stay those of the paper.
 
+AT = PLANE_LAYOUT.places
 SLOPE, WARP = 5.5, 0.9  # constants that keep entries of frames and strengths of warps positive
 CARRIED = 18  # channels: 4 of coordinates, 4 slopes, 2 warps, 4 of the code, 3 colours and a one
 
@@ -259,12 +259,13 @@ def _carry(layer: nn.ConvTranspose2d, half: float, *, first: bool) -> None:
 
 
 def _from_vector(tap: torch.Tensor, x: float, y: float) -> None:
-    a, b, s, c, d, t = range(LAYOUT.frame.start, LAYOUT.frame.stop)
+    every = torch.arange(WIDTH)
+    a, b, s, c, d, t = every[AT.frame].tolist()
     for channel, entries in ((0, (a, b, s)), (2, (c, d, t))):
         for entry, times in zip(entries, (x, y, 1.0), strict=True):
             tap[entry, channel], tap[entry, channel + 1] = times, -times
-    warp, colour = LAYOUT.inner_warps.start, LAYOUT.geometry + LAYOUT.colour.start
-    carried = (a, b, c, d, warp, warp + 1, *range(LAYOUT.code), *(colour + 5 * k for k in range(3)))
+    warp = AT.inner.start
+    carried = (a, b, c, d, warp, warp + 1, *every[AT.code].tolist(), *every[AT.rgb].tolist())
     for channel, entry in enumerate(carried, 4):
         tap[entry, channel] = 1.0
 

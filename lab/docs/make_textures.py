@@ -1,7 +1,6 @@
-"""Draw the sixteen textures of the model `textures2d`, and write them as its elements.
+"""Draw the sixteen textures that ship, and write them as elements.
 
-python -m lab docs textures               writes textures.safetensors into scenelang/models/textures2d, and
-                                           beside it the weights of `shapes2d`, whose shapes it draws
+python -m lab docs textures               writes scenelang/elements/textures.safetensors
 python -m lab docs textures --sheet OUT   draws all of them, one beside another
 
 Bytes are the same again with the same numpy and Pillow; texels are with others too.
@@ -20,9 +19,9 @@ import numpy.typing as npt
 from PIL import Image as Pillow
 
 from scenelang.elements.picture import painted
+from scenelang.elements.textures import FILE
 from scenelang.elements.zoo import zoo_bytes
 from scenelang.files import write_whole
-from scenelang.models.manifest import ROOT
 
 ABOUT: dict[str, str | float] = {"license": "MIT", "source": "docs/make_textures.py of scenelang"}
 SIDE = 256  # texels
@@ -328,6 +327,4 @@ if __name__ == "__main__":
         sheet().save(sys.argv[2])
     else:
         made = [painted(name, drawn(name), ABOUT) for name in TEXTURES]
-        write_whole(ROOT / "textures2d" / "textures.safetensors", zoo_bytes(made))
-        shapes = (ROOT / "shapes2d" / "weights.safetensors").read_bytes()
-        write_whole(ROOT / "textures2d" / "weights.safetensors", shapes)
+        write_whole(FILE, zoo_bytes(made))

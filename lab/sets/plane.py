@@ -2,7 +2,7 @@
 
 ``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
 rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
-uniform. The others change one thing each. `textures2d` has 1 to 4 squares with one of a model's textures
+uniform. The others change one thing each. `textures2d` has 1 to 4 squares with one of the textures
 each: scale and translation, and of the texture flip, rotation and hue; `textures2d-mixed` has the four
 shapes, warps and booleans, and any moves and colours of textures, one object in five being plain.
 """
@@ -10,7 +10,7 @@ shapes, warps and booleans, and any moves and colours of textures, one object in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,7 +38,7 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
-from scenelang.words import COMBINE, Combine
+from scenelang.words import COMBINE, TEXTURES, Combine
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 Rng = np.random.Generator
@@ -59,7 +59,7 @@ class SetConfig:
     shuffled: bool = False  # scale, rotate, translate and shear once each, in random order
     geometries: tuple[str, ...] = GEOMETRIES
     rotated: bool = True
-    # of a model's textures: "few" are flipped, rotated and their hue turned, "any" moved and coloured in any
+    # of textures: "few" are flipped, rotated and their hue turned, "any" moved and coloured in any
     # order, "" has none
     textures: Literal["", "few", "any"] = ""
     # how objects are put together: "chain", "groups" (each in two nested groups), "tree", which needs no
@@ -136,9 +136,9 @@ def _colour(rng: Rng) -> Color:
     return Color(rgb=(_uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0)))
 
 
-def _texture(rng: Rng, config: SetConfig, names: Sequence[str]) -> Material:
+def _texture(rng: Rng, config: SetConfig) -> Material:
     """One of the textures, moved and coloured."""
-    name = names[int(rng.integers(len(names)))]
+    name = TEXTURES[int(rng.integers(len(TEXTURES)))]
     turn, hue = (_uniform(rng, -math.pi, math.pi) for _ in range(2))
     flips: list[MaterialOp] = [Flip()] if rng.random() < 0.5 else []
     if config.textures == "few":
@@ -158,12 +158,12 @@ def _texture(rng: Rng, config: SetConfig, names: Sequence[str]) -> Material:
     )
 
 
-def random_object(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> Object:
+def random_object(rng: Rng, config: SetConfig) -> Object:
     colour = _colour(rng)
     geometry = config.geometries[int(rng.integers(len(config.geometries)))]
     moves = tuple(_moves(rng, config))
     if config.textures == "few" or (config.textures and rng.random() < 0.8):
-        return Object(geometry, moves, _texture(rng, config, textures))
+        return Object(geometry, moves, _texture(rng, config))
     return Object(geometry, moves, Material("flat", (colour,)))
 
 
@@ -206,15 +206,15 @@ def chained(rng: Rng, node: SceneNode) -> Chain:
     return Chain([Link(op=op, node=leaf) for op, leaf in zip(words, leaves, strict=True)])
 
 
-def random_scene(rng: Rng, config: SetConfig, textures: Sequence[str] = ()) -> Scene:
-    """One scene of a set; ``textures`` are the names of a model's."""
-    model = "textures2d" if textures else "shapes2d"
+def random_scene(rng: Rng, config: SetConfig) -> Scene:
+    """One scene of a set."""
+    model = "shapes2d"
     if config.nest in ("any", "leaves"):
-        tree = any_tree(rng, lambda: random_object(rng, config, textures))
+        tree = any_tree(rng, lambda: random_object(rng, config))
         node = tree if config.nest == "any" else chained(rng, tree)
         return Scene(model=model, canvas=config.canvas, nodes=(node,))
     count = int(rng.integers(config.objects[0], config.objects[1] + 1))
-    objects = [random_object(rng, config, textures) for _ in range(count)]
+    objects = [random_object(rng, config) for _ in range(count)]
     if config.nest == "tree":
         return Scene(model=model, canvas=config.canvas, nodes=(_tree(rng, list(objects)),))
     unions = rng.random() < config.unions

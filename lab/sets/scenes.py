@@ -48,11 +48,8 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     """What makes a random scene of each set that a model of a dimension draws."""
     if manifest.dimension == 3:
         return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
-    known = {name: config for name, config in SETS.items() if manifest.textures or not config.textures}
-    return {
-        name: partial(random_scene, config=config, textures=manifest.textures if config.textures else ())
-        for name, config in known.items()
-    }
+    known = {name: config for name, config in SETS.items() if manifest.elements or not config.textures}
+    return {name: partial(random_scene, config=config) for name, config in known.items()}
 
 
 def usual_set(manifest: Manifest) -> str:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from scenelang.reference.field import TORUS, leaf_distance
+from scenelang import words
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.solid.network import RADIUS, folded
 
-LEAVES = ("sphere", "torus")
+LEAVES = (*words.LEAVES[3],)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +34,9 @@ class Points:
 
 def leaf_points(leaf: str, count: int, g: torch.Generator, kind: torch.dtype) -> Points:
     """Half of the points near the surface at all scales, a quarter in its ball, a quarter farther out."""
-    if leaf == "sphere":
-        normal = _directions(count // 2, g)
-        near = normal
-    else:
-        u, v = math.tau * torch.rand((2, count // 2), generator=g)
-        ring = TORUS[0] + TORUS[1] * v.cos()
-        near = torch.stack([ring * u.cos(), TORUS[1] * v.sin(), ring * u.sin()], 1)
+    row = GEOMETRIES[leaf]
+    assert row.surface is not None
+    near = torch.stack(row.surface(torch.rand((2, count // 2), generator=g)), 1)
     near = near + torch.randn(near.shape, generator=g) * 10 ** (
         2.5 * torch.rand((len(near), 1), generator=g) - 3.5
     )
@@ -49,14 +45,13 @@ def leaf_points(leaf: str, count: int, g: torch.Generator, kind: torch.dtype) ->
     far[1::2] *= RADIUS
     q = torch.cat([near, far]).to(kind).requires_grad_()
     with torch.enable_grad():
-        distance = leaf_distance(leaf, q.T)
+        distance = row.distance(q.T)
         (gradient,) = torch.autograd.grad(distance.sum(), q)
     distance = distance.detach()
     by_value = torch.where(distance < -0.15, 0.2, 1.0) / (distance.abs() + 0.02)
     by_gradient = 0.003 / (distance.square() + 0.01)
-    bent = gradient.isnan().any(1) | (
-        distance < -0.9 * TORUS[1]
-    )  # next to a centre, where there is no gradient
+    # next to a centre there is no gradient
+    bent = gradient.isnan().any(1) | (distance < -0.45 * row.thickness)
     by_gradient = torch.where(bent, 0.0, by_gradient)
     weight = torch.cat([by_value[:, None], by_gradient[:, None].expand(-1, 3)], 1)
     return Points(q.detach(), distance, gradient.nan_to_num(), weight)
@@ -77,7 +72,7 @@ def half_rays(leaf: str, count: int, g: torch.Generator, cells: int = 128) -> tu
     half = (middle.square() - p.square().sum(1, keepdim=True) + 1).clip(0.0).sqrt()
     t = middle + half * torch.linspace(-1, 1, cells + 1)  # (count, cells + 1)
     line = p.T[..., None] + way.T[..., None] * t
-    depth = leaf_distance(leaf, line.reshape(3, -1)).view_as(t)
+    depth = GEOMETRIES[leaf].distance(line.reshape(3, -1)).view_as(t)
     a, b = depth[:, :-1], depth[:, 1:]
     share = torch.where(a < 0, torch.where(b < 0, 1.0, a / (a - b)), torch.where(b < 0, b / (b - a), 0.0))
     rest = (share * 2 * half / cells).flip(1).cumsum(1).flip(1)  # from each point on

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenelang.backend.options import RenderError
+from scenelang.graph.geometries import GEOMETRIES, SECTORS
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.program.groups import SMOOTH, SUBTRACT, UNION
-from scenelang.reference.field import SECTORS, TORUS, leaf_distance
+from scenelang.reference.field import leaf_distance
 from scenelang.renderers.arrays import Array, Smooth
 from scenelang.renderers.field import BLEND
 from scenelang.renderers.network import FramedArrays, FramedConfig
@@ -29,13 +30,29 @@ SHARP = 1e6  # per world unit: gates of the plane's cell open within a millionth
 
 
 class ExactShape:
-    """A leaf of the plane in place of a decoder: its distance, which changes by no more than a point moves.
+    """Distance of a leaf of the plane in place of a decoder; it changes by no more than a point moves."""
 
-    A point is mirrored into the half sector that one segment bounds (`scenelang.reference.field.SECTORS`) and
-    turned, so that the segment lies along an axis.
+    def __init__(self, geometry: str) -> None:
+        self.row = GEOMETRIES[geometry]
+
+    def distance(self, q: Array) -> Array:
+        """Distances (M,), in leaf units, at leaf coordinates (2, M)."""
+        return self.row.distance(q)
+
+    def rise(self, q: Floats, radius: Floats) -> Floats:
+        """By how much distances (M,) at leaf coordinates (2, M) differ at most from those within radii."""
+        return radius
+
+
+class ExactSectors(ExactShape):
+    """Distance of a shape of dihedral symmetry, without angles.
+
+    A point is mirrored into the half sector that one segment bounds (`Geometry.sectors`) and turned, so that
+    the segment lies along an axis.
     """
 
     def __init__(self, geometry: str) -> None:
+        super().__init__(geometry)
         n, phase, outer, inner = SECTORS[geometry]
         self._first = math.cos(phase), math.sin(phase)
         self._mirrors: list[tuple[float, float, bool]] = []
@@ -49,7 +66,6 @@ class ExactShape:
         self._along = u / self._length, v / self._length
 
     def distance(self, q: Array) -> Array:
-        """Distances (M,), in leaf units, at leaf coordinates (2, M)."""
         cos, sin = self._first
         x, y = q
         u, v = cos * x + sin * y, abs(cos * y - sin * x)
@@ -64,10 +80,6 @@ class ExactShape:
         gap -= gap.clip(0.0, self._length)
         return np.copysign(np.sqrt(gap * gap + off * off), off)
 
-    def rise(self, q: Floats, radius: Floats) -> Floats:
-        """By how much distances (M,) at leaf coordinates (2, M) differ at most from those within radii."""
-        return radius
-
 
 class ClosedPlane(FramedArrays):
     """What `FramedArrays` has learned, computed: distances, albedo, and a cell with the weights of the fold.
@@ -78,7 +90,8 @@ class ClosedPlane(FramedArrays):
 
     def __init__(self, model: str) -> None:
         self.__dict__.update(vars(load_arrays(model).network))
-        shapes = [ExactShape(geometry) for geometry in load_manifest(model).geometries]
+        names = load_manifest(model).geometries
+        shapes = [(ExactSectors if name in SECTORS else ExactShape)(name) for name in names]
         self.config = FramedConfig(self.config.code, self.config.material_code)
         self.slopes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
         self.read_slope = np.float32(math.log(4 * SHARP))
@@ -137,15 +150,9 @@ class ClosedSolids(SolidArrays):
         geometry = self.geometries[layers[0][0]]
         if not gradient:
             return leaf_distance(geometry, q)[None]
-        x, y, z = q
-        if geometry == "sphere":
-            length = np.sqrt(x * x + y * y + z * z).clip(1e-12)
-            return np.stack([length - 1, x / length, y / length, z / length])
-        around = np.sqrt(x * x + z * z).clip(1e-12)
-        ring = around - np.float32(TORUS[0])
-        tube = np.sqrt(ring * ring + y * y).clip(1e-12)
-        out = ring / (tube * around)
-        return np.stack([tube - np.float32(TORUS[1]), out * x, y / tube, out * z])
+        slopes = GEOMETRIES[geometry].slopes
+        assert slopes is not None
+        return np.stack(slopes(q))
 
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
         tokens, joined = cell.own[0], None
@@ -160,7 +167,7 @@ class ClosedSolids(SolidArrays):
         return np.concatenate([joined[:1], register]), joined[1]
 
     def box(self, layers: Smooth) -> np.ndarray:
-        half = np.array([1.0, TORUS[1] if self.geometries[layers[0][0]] == "torus" else 1.0, 1.0], np.float32)
+        half = np.array(GEOMETRIES[self.geometries[layers[0][0]]].half, np.float32)
         return np.stack([-half, half])
 
     def alone(self, reach: Array, cell: Cell) -> Array:

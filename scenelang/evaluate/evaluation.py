@@ -7,7 +7,7 @@ what they find and go on. A Scene comes out only where nothing is wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,6 @@ from scenelang.deep import deep_stack
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import FileContext
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_STEPS, Halt
@@ -28,8 +27,6 @@ from scenelang.evaluate.prepare.blocks import Body
 from scenelang.evaluate.prepare.settings import prepare_file
 from scenelang.evaluate.report.reporter import Reporter
 from scenelang.evaluate.session import Defines, Session, Watch
-from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
-from scenelang.models.manifest import Manifest
 from scenelang.records import Record
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap, Written
@@ -52,7 +49,6 @@ class Source(Record):
         fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
             seconds × fps frames, and t and u follow.
         texts: what imported files hold, by their resolved paths, instead of what is on the disk.
-        models: manifests that names are taken from; by default those of all shipped models.
     """
 
     path: str | os.PathLike[str] | None = None
@@ -64,7 +60,6 @@ class Source(Record):
     size: tuple[int, int] | None = None
     fps: float | None = None
     texts: Mapping[Path, str] | None = None
-    models: Iterable[Manifest] | None = None
 
     @property
     def values(self) -> dict[str, Any]:
@@ -161,7 +156,6 @@ class Evaluation:
         self._steps = self._objects = 0
         self._session = session = Session(
             Reporter(diagnostics),
-            _choose(file, vocabulary(source.models), source.model, diagnostics),
             EXPRESSIONS,
             STATEMENTS,
             frame,
@@ -231,10 +225,10 @@ class Evaluation:
             name_frame(self.diagnostics, before, frame)
         if self._body is None or len(self.diagnostics.errors) > self._errors:
             return None, session.spans
-        settings, chosen = session.settings, session.vocabulary.chosen
+        settings = session.settings
         fields = {
             "version": 1,
-            "model": self._model or (chosen.name if chosen else None),
+            "model": self._model or settings.model,
             "canvas": settings.canvas,
             "background": settings.background,
             **{word: settings.stage.get(word, "default") for word in STAGE},
@@ -248,21 +242,6 @@ class Evaluation:
         if written is not None:
             session.spans.record(scene, Written(written, written))
         return scene, session.spans
-
-
-def _choose(file: nodes.File, words: Vocabulary, model: str | None, diagnostics: Diagnostics) -> Vocabulary:
-    """The vocabulary of the model from outside, or of the one that the file names."""
-    name = model
-    if name is None:
-        stated = (stmt.name for stmt in file.statements if isinstance(stmt, nodes.Model))
-        name = next((stmt.value for stmt in stated if isinstance(stmt, nodes.String)), None)
-    if name is None:
-        return words
-    chosen = words.choose(name)
-    if chosen is None and model is not None:  # what the file names is reported at its statement
-        help = f"there is {listing(m.name for m in words.models)}"
-        diagnostics.add("E0210", f"unknown model `{name}`", None, help=help)
-    return chosen or Vocabulary(words.models, blind=True)
 
 
 def name_frame(diagnostics: Diagnostics, since: int, frame: int) -> None:

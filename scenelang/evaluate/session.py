@@ -13,7 +13,6 @@ from scenelang.diagnostics.suggest import listing, nearest
 from scenelang.evaluate.limits import MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
 from scenelang.evaluate.names import UNBOUND, Needs
 from scenelang.evaluate.report.reporter import Reporter
-from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.records import Record
 from scenelang.scene.schema import Animation, Elements
 from scenelang.scene.spans import SpanMap
@@ -31,12 +30,14 @@ class Settings(Record, frozen=False):
         background: colour as written, or None for transparency.
         stage: camera, light and ground, where they are stated.
         given: the place of each setting, by its word.
+        model: name of the model that the file names.
     """
 
     canvas: tuple[int, int] = (256, 256)
     background: tuple[float, float, float] | Unsaid | None = "default"
     stage: dict[str, Any] = field(default_factory=dict)
     animation: Animation | None = None
+    model: str | None = None
     given: dict[str, Span] = field(default_factory=dict)
 
 
@@ -57,7 +58,6 @@ class Session(Record, frozen=False):
     """
 
     report: Reporter
-    vocabulary: Vocabulary
     expressions: Mapping[type, Callable[..., Any]]
     statements: Mapping[type, Callable[..., Any]]
     frame: int = 0
@@ -84,14 +84,9 @@ class Session(Record, frozen=False):
         self.spans = SpanMap()
         self.steps = self.objects = self.parts = self.depth = self.node_depth = 0
         self.report.calls = None
-        self.settings = Settings(given=self.settings.given)
+        self.settings = Settings(given=self.settings.given, model=self.settings.model)
         for root in self.roots:
             root[:] = [UNBOUND] * len(root)
-
-    def model_label(self) -> tuple[Label, ...]:
-        """Where the scene names its model, if it does."""
-        given = self.settings.given.get("model")
-        return () if given is None else (Label(given, "the model of this scene"),)
 
     def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
         """Report a limit that was met; the caller raises what this returns."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.diagnostics.diagnostic import Diagnostics, Label
 from scenelang.diagnostics.span import Span
+from scenelang.diagnostics.suggest import listing
 from scenelang.elements.element import Element
+from scenelang.elements.textures import load_textures
 from scenelang.graph import affine
 from scenelang.graph.looks import MOST_STEPS, WHITE, Look, colour_steps, normal
 from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
@@ -16,10 +18,10 @@ from scenelang.graph.space import REACH, SINGULAR, Refusal, Space
 from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.stage import stage_of
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Rows, Step, Twist, Warp
-from scenelang.models.manifest import Manifest, load_textures
+from scenelang.models.manifest import Manifest
 from scenelang.scene import schema
 from scenelang.scene.elements import Brought
-from scenelang.words import BLEND, STAGE, Combine
+from scenelang.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
 
 
 def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
@@ -108,16 +110,12 @@ def lower(
         memory: of the frame before; holds this one afterwards.
     """
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
-    for word in (*STAGE, "background"):
-        stated = getattr(scene, word)
-        if stated != "default" and (refusal := manifest.refusal(word)):
+    for word in STAGE if manifest.dimension == 2 else ():
+        if (stated := getattr(scene, word)) != "default":
             place = None if spans is None else spans.span(stated) or spans.span(scene)
-            diagnostics.add(
-                *refusal,
-                place,
-                help="leave it out; flat scenes have none" if manifest.dimension == 2 else "leave it out",
-            )
-    space = replace(SPACES[manifest.dimension], outlines=manifest.outlines)
+            fact = f"model `{manifest.name}` is flat and has no {word}"
+            diagnostics.add("E0511", fact, place, help="leave it out; flat scenes have none")
+    space = SPACES[manifest.dimension]
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     brought = Brought.of(scene.elements)
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
@@ -187,12 +185,14 @@ class _Lowering:
     kept: Leaves | None
     brought: Brought
     objects: int = 0
+    origin: object = None  # what says that the scene is flat or solid: its model, else its first object
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: schema.Scene) -> Fold:
         stack = [_Open("union", 0.0, scene, None, _children(scene))]
+        self.origin = scene if scene.model else None
         while True:
             here = stack[-1]
             item = next(here.todo, None)
@@ -226,6 +226,7 @@ class _Lowering:
                 stack.append(_Open(op, k, node, material, _children(node)))
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
+        self.origin = self.origin or node
         seen = self.old.get(id(node))
         number = self.objects + 1
         if seen and seen[0] is node and seen[1] is material and seen[2].number == number:
@@ -235,7 +236,9 @@ class _Lowering:
                 self.element(node.geometry, self.brought.geometries, node, "E0501")
             elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
-            look = Look(self.manifest.default_material) if material is None else self.look(material)
+                if dimension_of(node.geometry) not in (None, self.space.dimension):
+                    material = None  # which is of the other kind of scene, too
+            look = Look(self.manifest.materials[0]) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.kept is None else {}
             leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)
         if self.kept is not None:
@@ -263,9 +266,6 @@ class _Lowering:
                 fact = "`displace` does not stand first in the block of an object"
                 self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
                 continue
-            if transform.kind not in self.manifest.transforms:
-                self.refuse("E0503", "transform", transform.kind, self.manifest.transforms, transform)
-                continue
             step = self.steps.get(id(transform))  # the Scene holds it, so that its id stays its own
             if step is None:
                 step = self.steps[id(transform)] = step_of(transform, self.space)
@@ -283,17 +283,17 @@ class _Lowering:
         if known is not None:
             return known
         name, manifest, element = material.name, self.manifest, None
-        shading = material.shading or manifest.default_material
+        shading = material.shading or manifest.materials[0]
         if "." in name:
             element = self.element(name, self.brought.materials, material, "E0502")
-        elif name in manifest.textures:
-            element = load_textures(manifest)[name]
+        elif name in TEXTURES:
+            element = self.element(name, load_textures(), material, "E0502")
         else:
             shading = name
             if material.shading is not None:
                 self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
         if shading not in manifest.materials:
-            offered = manifest.looks if shading is name else manifest.materials
+            offered = (*manifest.materials, *TEXTURES) if shading is name else manifest.materials
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
         colours = colour_steps(map(self.space.inked, material.ops))
@@ -306,11 +306,9 @@ class _Lowering:
         """The moves of a texture, which a constant material has as well and colours of space have not."""
         rows = IDENTITY
         for op in material.ops:
-            if op.kind not in self.manifest.material_ops:
-                self.refuse("E0504", "material operation", op.kind, self.manifest.material_ops, op)
-            elif isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
+            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
                 continue
-            elif element is not None and element.dimension == 3:
+            if element is not None and element.dimension == 3:
                 fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"
                 self.say("E0504", fact, op, "its colours lie on the shape: leave the move out")
             elif isinstance(step := step_of(op, PLANE), Refusal):
@@ -324,21 +322,34 @@ class _Lowering:
             self.say("E0406", fact, material, "scale less along one direction, or less often")
 
     def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
+        """Say that the model has no geometry or material of a name, or that this is of other scenes."""
         from difflib import get_close_matches
 
+        here, other = self.space.dimension, dimension_of(name)
+        listed = listing(f"`{k}`" for k in known)
+        if other not in (None, here):
+            fact = f"{what} `{name}` belongs to {SCENES[other]} scenes, and this one is {SCENES[here]}"
+            help = f"a scene is flat or solid; model `{self.manifest.name}` has {listed}"
+            if what == "material":
+                help = f"write material {' or '.join(self.manifest.materials)} in its place"
+            place = self.place(self.origin)
+            labels = () if place in (None, self.place(node)) else (Label(place, f"{SCENES[here]} by this"),)
+            self.say(code, fact, node, help, labels)
+            return
         near = get_close_matches(name, known, 1)
-        listed = ", ".join(f"`{k}`" for k in known)
         advice = f"did you mean `{near[0]}`? it has {listed}" if near else f"it has {listed}"
         self.say(code, f"model `{self.manifest.name}` has no {what} `{name}`", node, advice)
 
-    def say(self, code: str, message: str, node: object, help: str | None = None) -> None:
+    def say(
+        self, code: str, message: str, node: object, help: str | None = None, labels: tuple[Label, ...] = ()
+    ) -> None:
         """Add a diagnostic; without a place each message is said once."""
         span = self.place(node)
         if span is None:
             if (code, message) in self.said:
                 return
             self.said.add((code, message))
-        self.diagnostics.add(code, message, span, help=help)
+        self.diagnostics.add(code, message, span, help=help, labels=labels)
 
     def place(self, node: object) -> Span | None:
         return None if self.spans is None else self.spans.span(node)

@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from math import hypot, inf, sqrt
 
 from scenelang.graph import affine
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
 from scenelang.graph.stage import decoded, encoded
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist
@@ -32,9 +33,6 @@ _ALIKE = 1e-12
 
 _ROUNDING = 1e-9
 """Balls and boxes grow by this much, relative, to cover the rounding of float64."""
-
-
-_THICKNESS = {"sphere": 2.0, "torus": 0.6}
 
 
 class Solid(Space):
@@ -86,9 +84,6 @@ class Solid(Space):
         det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
         smallest = abs(det) / (largest * middle) if largest * middle > 0.0 else 0.0
         return min(smallest, middle), largest
-
-    def thickness(self, geometry: str) -> float:
-        return _THICKNESS.get(geometry, inf)
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """See the module for a proof."""
@@ -149,11 +144,11 @@ class Solid(Space):
         return centre, radius, pending
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A ball in a sphere; turns before the first affine map leave it in place."""
-        maps = [isinstance(step, Affine) for step in steps]
-        if geometry != "sphere" or any(maps[:-1]) or not all(maps[-1:]):
+        """Turns before the first affine map leave a ball about the origin in place."""
+        maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
+        if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
-        inner = 1.0 - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
+        inner = row.inner - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
         return (inner, affine.inverted(affine.composed(steps))) if inner > 0.0 else None
 
 

@@ -7,14 +7,12 @@ else in the compiler asks whether a scene is flat.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from math import inf
 from typing import ClassVar, Final, NamedTuple
 
 from scenelang.graph.affine import inverted
 from scenelang.graph.steps import Rows, Step, Turn
-from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
 Box = tuple[float, float, float, float, float, float]
@@ -41,15 +39,8 @@ class Refusal(NamedTuple):
     help: str
 
 
-@dataclass(frozen=True)
 class Space(ABC):
-    """The geometry of one dimension.
-
-    Args:
-        outlines: what the model's manifest says of its leaves' extent.
-    """
-
-    outlines: Mapping[str, Outline] = field(default_factory=dict, hash=False)
+    """The geometry of one dimension."""
 
     dimension: ClassVar[int]
     shown: ClassVar[tuple[tuple[int, ...], ...]]
@@ -80,10 +71,6 @@ class Space(ABC):
     @abstractmethod
     def stretches(self, rows: Rows) -> tuple[float, float]:
         """The smallest and largest singular value of the linear block."""
-
-    def thickness(self, geometry: str) -> float:
-        """How thick a leaf is where it is thinnest, before its moves; infinite where that says nothing."""
-        return inf
 
     @abstractmethod
     def before(self, rows: Rows, turn: Turn) -> Turn | None:

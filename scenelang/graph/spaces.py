@@ -15,10 +15,10 @@ from struct import pack, unpack
 from typing import Final
 
 from scenelang.graph import affine
+from scenelang.graph.geometries import GEOMETRIES, Corner
 from scenelang.graph.solid import Solid
 from scenelang.graph.space import EVERYWHERE, Box, Refusal, Space
 from scenelang.graph.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
-from scenelang.models.manifest import Outline
 from scenelang.scene import schema
 
 ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
@@ -89,16 +89,17 @@ class Plane(Space):
             reach = level / stretch
         if any(isinstance(step, Warp) for step in steps):
             return _grown(_warped(steps, 1.0 + reach))
-        return _grown(_straight(self.outlines.get(geometry), rows, reach))
+        row = GEOMETRIES.get(geometry)
+        return _grown(_straight(row.corners if row else (), rows, reach))
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
         """Warps before the first affine map leave a disc about the origin in place."""
-        outline = self.outlines.get(geometry)
-        if outline is None or not all(isinstance(step, Affine) for step in steps[-1:]):
+        row = GEOMETRIES.get(geometry)
+        if row is None or not row.inner or not all(isinstance(step, Affine) for step in steps[-1:]):
             return None
         if any(isinstance(step, Affine) for step in steps[:-1]):
             return None
-        return outline.inner, affine.inverted(affine.composed(steps))
+        return row.inner, affine.inverted(affine.composed(steps))
 
 
 def flattened(rows: Rows) -> Rows:
@@ -138,15 +139,15 @@ def _grown(box: tuple[float, float, float, float]) -> Box:
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
 
 
-def _straight(outline: Outline | None, rows: Rows, reach: float) -> tuple[float, float, float, float]:
+def _straight(corners: tuple[Corner, ...], rows: Rows, reach: float) -> tuple[float, float, float, float]:
     a, b, x = rows[0], rows[1], rows[3]
     c, d, y = rows[4], rows[5], rows[7]
     wide, high = reach * hypot(a, b), reach * hypot(c, d)
-    if outline is None:
+    if not corners:
         wide, high = wide + hypot(a, b), high + hypot(c, d)
         return x - wide, y - high, x + wide, y + high
-    across = [a * p + b * q for p, q in outline.corners]
-    along = [c * p + d * q for p, q in outline.corners]
+    across = [a * p + b * q for p, q in corners]
+    along = [c * p + d * q for p, q in corners]
     return x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high
 
 

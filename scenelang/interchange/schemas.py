@@ -81,12 +81,8 @@ def manifest_schema() -> dict[str, Any]:
             "dimension": {"enum": [2, 3]},
             "renderer": word,
             "lifting": word,
-            "layout": word,
             "geometries": {**words, "minItems": 1, "description": "in the order of the learned codes"},
-            "materials": {**words, "minItems": 1},
-            "default_material": {**word, "description": "one of the materials"},
-            "transforms": words,
-            "material_ops": words,
+            "materials": {**words, "minItems": 1, "description": "likewise, the default first"},
             "limits": {"type": "object", "additionalProperties": limit},
             "trained": {
                 "description": "ranges, beyond which is a warning",
@@ -100,17 +96,8 @@ def manifest_schema() -> dict[str, Any]:
                 "type": "array",
                 "items": size,
             },
-            "outlines": {
-                "description": "extents of geometries: corners of a convex hull, radius of a disc inside",
-                "type": "object",
-                "additionalProperties": _object(
-                    {"corners": {"type": "array", "items": pair, "minItems": 3}, "inner": {"type": "number"}}
-                ),
-            },
-            "fixed_stage": {"description": "whether camera and light are its own", "type": "boolean"},
             "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
             "white": {"description": "whether it draws over white alone", "type": "boolean"},
-            "textures": {**words, "description": "materials that are elements in textures.safetensors"},
         },
         optional=OPTIONAL,
         title="Manifest",

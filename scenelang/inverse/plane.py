@@ -16,9 +16,10 @@ from torch import Tensor
 
 from scenelang.inverse.soft import softened
 from scenelang.inverse.target import WHITE
+from scenelang.lifting.vector import STRENGTHS, WIDTH
 from scenelang.models.load import load_model
 from scenelang.program.groups import SMOOTH
-from scenelang.program.program import WIDTH, Program
+from scenelang.program.program import Program
 from scenelang.renderers.arrays_torch import TORCH
 from scenelang.renderers.field import BLEND
 from scenelang.renderers.framed import Framed
@@ -65,11 +66,11 @@ class SoftPlane:
         tokens = program.tokens.astype(np.int64)
         self.cell = [part[tokens][..., None] for part in network.cell_weights()]
         self.smooth = torch.from_numpy(tokens == SMOOTH)
-        self.widest = float(program.vectors[tokens == SMOOTH, layout.blend].max(initial=BLEND))
-        codes, self.shapes = np.unique(program.vectors[:, : layout.code], axis=0, return_inverse=True)
+        parts = layout.unpack(program.vectors)
+        self.widest = float(parts.width[tokens == SMOOTH].max(initial=BLEND))
+        codes, self.shapes = np.unique(parts.code, axis=0, return_inverse=True)
         self.decoders = network.decoders(torch.from_numpy(codes).to(dtype))
-        code = program.vectors[:, layout.geometry :][:, layout.material_code]
-        self.albedo = network.object_albedo(torch.from_numpy(code.copy()).to(dtype))
+        self.albedo = network.object_albedo(torch.from_numpy(parts.material.copy()).to(dtype))
         self.under = None if program.background else torch.tensor(under, dtype=dtype)[:, None]
         y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
         places = torch.stack([x + 0.5 - width / 2, height / 2 - 0.5 - y]).double() * px
@@ -80,12 +81,11 @@ class SoftPlane:
         still, moving = (self._read(torch.from_numpy(x).to(self.dtype)) for x in (base[:, None], rates))
         if self.under is not None:
             still, moving = still._replace(behind=self.under), moving._replace(behind=0 * moving.behind)
-        strengths = self.layout.strengths
         self.turning = [
             at
-            for warps in (self.layout.outer_warps, self.layout.inner_warps)
-            for at in range(warps.start, warps.stop, strengths)
-            if any(part.geometry[:, at : at + strengths].any() for part in (still, moving))
+            for _, warps in self.layout.ways
+            for at in range(warps.start, warps.stop, STRENGTHS)
+            if any(part.geometry[:, at : at + STRENGTHS].any() for part in (still, moving))
         ]
         moving.colours.mul_((still.colours >= 0) & (still.colours <= 1))
         still.colours.clamp_(0.0, 1.0)
@@ -101,10 +101,9 @@ class SoftPlane:
     def _read(self, numbers: Tensor) -> _Parts:
         """Parts of numbers (K, n), or of rates: all are linear in them."""
         vectors, behind = numbers[:-3].reshape(self.count, WIDTH, -1), numbers[-3:]
-        start = self.layout.geometry + self.layout.colour.start
-        matrix = vectors[:, start : start + 12].reshape(self.count, 3, 4, -1)
-        colours = (matrix[:, :, :3] * self.albedo[:, None, :, None]).sum(2) + matrix[:, :, 3]
-        return _Parts(vectors[:, : self.layout.geometry], colours, vectors[:, self.layout.blend], behind)
+        colours = vectors[:, self.layout.places.rgb] * self.albedo[:, :, None]
+        widths = vectors[:, self.layout.places.width]
+        return _Parts(vectors[:, : self.layout.geometry], colours, widths, behind)
 
     def _changes(self, p: Tensor, still: _Parts, moving: _Parts) -> tuple[Tensor, Tensor]:
         """Colours (3, M) of points (2, M), and their derivatives (3, M, n)."""
@@ -133,13 +132,13 @@ class SoftPlane:
         layout = self.layout
         steps: list[Affine | Warp] = []
         maps = []
-        for frame, warps in ((layout.frame, layout.outer_warps), (layout.middle, layout.inner_warps)):
+        for frame, warps in layout.ways:
             a, b, u, c, d, v = geometry[:, frame].unbind(1)
             maps.append((a, b, c, d))
             steps.append(Affine(((a, b, u), (c, d, v))))
-            for at in range(warps.start, warps.stop, layout.strengths):
+            for at in range(warps.start, warps.stop, STRENGTHS):
                 if at in self.turning:
-                    twirl, *bend = geometry[:, at : at + layout.strengths].unbind(1)
+                    twirl, *bend = geometry[:, at : at + STRENGTHS].unbind(1)
                     steps.append(Warp(twirl, tuple(bend)))
         points = way_back(TORCH, steps, [x.expand(self.count, -1) for x in p])
         q = torch.stack(list(points))

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.inverse.space import Point, Space
-from scenelang.lifting.layout import LAYOUTS
-from scenelang.models.manifest import load_manifest
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.program.groups import SMOOTH
 from scenelang.program.program import Program
 from scenelang.renderers.field import BLEND
@@ -25,7 +24,7 @@ STEP: Final = 1e-3  # of differences, shares of a range: vectors are rounded to 
 
 def numbers_of(program: Program) -> Floats:
     """Numbers (K,) of a Program that a picture changes smoothly with: vectors by row, then the background."""
-    at = LAYOUTS[load_manifest(program.model).layout].blend
+    at = LAYOUTS[2 if program.stage is None else 3].places.width
     vectors = program.vectors.astype(np.float64)
     vectors[:, at] = np.where((program.tokens == SMOOTH) & (vectors[:, at] <= 0), BLEND, vectors[:, at])
     return np.concatenate([vectors.reshape(-1), program.background or (0.0, 0.0, 0.0)])

@@ -12,12 +12,12 @@ from lsprotocol import types
 
 from scenelang import words
 from scenelang.elements.groups import told
-from scenelang.evaluate.vocabulary import Vocabulary
 from scenelang.lsp.callees import find_callee, word_of
 from scenelang.lsp.context import Cursor, cursor_at
 from scenelang.lsp.tokens import COLOURED
-from scenelang.lsp.values import vocabulary_of
+from scenelang.lsp.values import dimensions_of
 from scenelang.lsp.workspace import Document, Workspace, scenes_below
+from scenelang.models.manifest import available, load_manifest
 from scenelang.records import Record
 from scenelang.resolve.names import Names, Symbol
 from scenelang.scene import library
@@ -59,12 +59,10 @@ def units(typed: str) -> Iterator[Item]:
             yield Item(f"{number[0]}{unit}", Kind.Unit)
 
 
-def strings(
-    docs: Workspace, document: Document, words: Vocabulary, before: tuple[str, ...]
-) -> Iterator[Item]:
+def strings(docs: Workspace, document: Document, before: tuple[str, ...]) -> Iterator[Item]:
     """What a string may say: a model's name, a file to import."""
     if before == ("model",):
-        for manifest in words.models:
+        for manifest in map(load_manifest, available()):
             yield Item(manifest.name, Kind.Module, about=manifest.summary)
     elif before == ("import",):
         yield from (Item(name, Kind.File, rank="a") for name in library.names())
@@ -126,7 +124,10 @@ class _Maker:
 
     def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
         self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
-        self.words: Vocabulary = vocabulary_of(document)
+        dimensions = dimensions_of(document)
+        self.geometries = {name for d in dimensions for name in words.LEAVES[d]}
+        self.shadings = {name for d in dimensions for name in words.SHADINGS[d]}
+        self.transforms = set(words.TRANSFORMS) - set(words.SOLID_TRANSFORMS if 3 not in dimensions else ())
 
     def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before
@@ -134,7 +135,7 @@ class _Maker:
         if cursor.inside == "comment":
             return
         if cursor.inside == "string":
-            yield from strings(self.docs, self.document, self.words, before)
+            yield from strings(self.docs, self.document, before)
         elif cursor.inside == "number":
             yield from units(self.document.text[cursor.start : cursor.offset])
         elif cursor.inside == "colour":
@@ -151,8 +152,8 @@ class _Maker:
             if len(before) == 2:
                 yield Item("as", Kind.Keyword, "as ")
         elif last == "material":
-            yield from self._materials(self.words.materials)
-        elif before[-2:-1] == ("material",) and last in self.words.materials:
+            yield from self._materials(self.shadings)
+        elif before[-2:-1] == ("material",) and last in self.shadings:
             yield from self._materials(frozenset())
         elif (len(before) == 1 and last in COMBINE) or (before[0] in COMBINE and last == ")"):
             yield from self._children("a")
@@ -179,7 +180,7 @@ class _Maker:
         block = self.cursor.block
         kind = block.kind
         if kind == "material":
-            yield from self._calls(words.OPERATIONS, self.words.material_ops, "a")
+            yield from self._calls(words.OPERATIONS, words.OPERATIONS, "a")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
@@ -190,9 +191,9 @@ class _Maker:
             if nodes.Model not in given:
                 yield self._keyword("model", "q")
             yield from (self._keyword(word, "q") for word in ("param", "import"))
-            yield from self._calls(words.SETTINGS, set(words.SETTINGS), "q")
+            yield from self._calls(words.SETTINGS, words.SETTINGS, "q")
         if kind == "object":
-            yield from self._calls(words.TRANSFORMS, self.words.transforms, "a")
+            yield from self._calls(words.TRANSFORMS, self.transforms, "a")
             yield self._keyword("material", "b")
             yield from self._material_values("b")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
@@ -203,19 +204,18 @@ class _Maker:
                 yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
-            yield from self._calls(words.TRANSFORMS, self.words.transforms, "n")
+            yield from self._calls(words.TRANSFORMS, self.transforms, "n")
             yield self._keyword("material", "n")
             yield from self._material_values("n")
 
     def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[Item]:
         for name in sorted(offered):
-            if name in known:
-                yield _item(known[name], Kind.Method, rank)
+            yield _item(known[name], Kind.Method, rank)
 
     def _children(self, rank: str) -> Iterator[Item]:
-        for name in sorted(self.words.geometries):
+        for name in sorted(self.geometries):
             text = f"{name} {{ ${{1:scale(0.5);}} }}"
-            yield Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES.get(name, ""), True)
+            yield Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES[name], True)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind == "module":
                 yield self._symbol(symbol, statement=True)
@@ -230,8 +230,8 @@ class _Maker:
                 yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
     def _materials(self, constant: Collection[str]) -> Iterator[Item]:
-        """Materials of the model, and files that may hold others."""
-        for name in sorted({*constant, *self.words.textures}):
+        """Materials, and files that may hold others."""
+        for name in sorted({*constant, *words.TEXTURES}):
             text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
             yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
         for symbol in self.names.visible(self.cursor.offset):

@@ -16,9 +16,9 @@ from scenelang.lsp.callees import find_symbol, word_of
 from scenelang.lsp.check import Seen
 from scenelang.lsp.context import path_to
 from scenelang.lsp.server import Settings
-from scenelang.lsp.values import space_of, vocabulary_of
+from scenelang.lsp.values import space_of
 from scenelang.lsp.workspace import Document, Workspace
-from scenelang.models.manifest import Manifest
+from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.resolve.names import Symbol, Use
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
@@ -92,13 +92,17 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
             return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
         case "geometry":
-            about = _offered(document, text, "geometries", text, words.GEOMETRIES)
+            about = _offered(text, text, words.GEOMETRIES)
             node = next((n for n in _calls(document, use) if n.name.text == text), None)
             return about and about + _node_facts(document, node)
         case "material":
-            return _offered(document, f"material {text}", "looks", text, words.MATERIALS)
+            textures = dict.fromkeys(words.TEXTURES, "A texture, in flat and in solid scenes.")
+            return _offered(f"material {text}", text, words.MATERIALS | textures)
         case "model":
-            return next((_model(m) for m in vocabulary_of(document).models if m.name == text), None)
+            try:
+                return _model(load_manifest(text))
+            except KeyError:
+                return None
         case "argument":
             return _argument(use)
         case "path":
@@ -172,13 +176,13 @@ def describe_values(seen: Seen | None) -> str:
 # ---------------------------------------------------------------- what the model offers
 
 
-def _offered(document: Document, head: str, field: str, text: str, about: Mapping[str, str]) -> str | None:
-    """A geometry or a material, where a model has it: ``field`` of manifests lists such."""
-    owners = [f"model `{m.name}`" for m in vocabulary_of(document).models if text in getattr(m, field)]
-    if not owners:
+def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
+    """A geometry or a material, and what it is."""
+    if text not in about:
         return None
-    parts = [_code(f"{head} {{ … }}"), about.get(text, ""), "of " + ", ".join(owners)]
-    return "\n\n".join(part for part in parts if part)
+    dimension = words.dimension_of(text)
+    scenes = "" if dimension is None else f"\n\nof {words.SCENES[dimension]} scenes"
+    return f"{_code(f'{head} {{ … }}')}\n\n{about[text]}{scenes}"
 
 
 def _model(manifest: Manifest) -> str:
@@ -186,9 +190,7 @@ def _model(manifest: Manifest) -> str:
     ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
     rows = [
         ("geometries", ", ".join(manifest.geometries)),
-        ("materials", ", ".join(manifest.looks)),
-        ("transforms", ", ".join(manifest.transforms)),
-        ("texture operations", ", ".join(manifest.material_ops)),
+        ("materials", ", ".join(manifest.materials)),
         ("measured for", "; ".join(ranges)),
     ]
     table = "\n".join(f"| {name} | {text} |" for name, text in rows if text)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from functools import cache
+from contextlib import suppress
 from typing import Any
 
 from scenelang.evaluate.values.value import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
-from scenelang.evaluate.vocabulary import Vocabulary, vocabulary
 from scenelang.graph import affine
 from scenelang.graph.chain import merged
 from scenelang.graph.lower import step_of
@@ -17,31 +16,28 @@ from scenelang.graph.space import Refusal, Space
 from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lsp.workspace import Document
+from scenelang.models.manifest import load_manifest
 from scenelang.scene import text as to_nsg
 from scenelang.syntax import nodes
-from scenelang.words import TRANSFORMS
+from scenelang.words import LEAVES, TRANSFORMS
 
 _MOST_ITEMS = 8
 
 
-@cache
-def _all() -> Vocabulary:
-    return vocabulary()
-
-
-def vocabulary_of(document: Document) -> Vocabulary:
-    """The words of the model that a document names, or those of all models."""
+def dimensions_of(document: Document) -> tuple[int, ...]:
+    """The dimension of the model that a document names; both where it names none."""
     for stmt in document.file.statements:
         if isinstance(stmt, nodes.Model) and isinstance(stmt.name, nodes.String):
-            return _all().choose(stmt.name.value) or _all()
-    return _all()
+            with suppress(KeyError):
+                return (load_manifest(stmt.name.value).dimension,)
+    return (*LEAVES,)
 
 
 def space_of(document: Document) -> Space:
     """The space of the model which draws a document."""
     if document.checked is not None and document.checked.manifest is not None:
         return SPACES[document.checked.manifest.dimension]
-    return SPACES[vocabulary_of(document).dimension or 2]
+    return SPACES[dimensions_of(document)[0]]
 
 
 def show_value(value: Any) -> str | None:

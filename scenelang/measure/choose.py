@@ -14,8 +14,9 @@ import torch
 from scenelang.backend.load import Load
 from scenelang.backend.options import RenderError
 from scenelang.backend.render import exact_graph
+from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.lower import lower
 from scenelang.measure.frontier import Cost, Frontier, Limits, Point
-from scenelang.models.choose import lacking, paints, uses
 from scenelang.models.manifest import available, load_manifest
 from scenelang.program.program import Program
 from scenelang.scene.schema import Scene
@@ -88,15 +89,8 @@ def refusal(point: Point, scene: Scene | None, program: Program, only: str | Non
         except RenderError as error:  # an element has no original
             return str(error)
         return None
-    manifest = load_manifest(point.model)
-    if unknown := lacking(manifest, uses(scene)):
-        return f"has no `{unknown[0]}`"
-    if not paints(manifest, scene):
-        if manifest.sizes and scene.canvas not in manifest.sizes:
-            sizes = ", ".join(f"{w} x {h}" for w, h in manifest.sizes)
-            return f"draws {sizes} pixels only"
-        return "draws on white only"
-    return None
+    lower(scene, load_manifest(point.model), None, found := Diagnostics())
+    return found.errors[0].message if found.errors else None
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:

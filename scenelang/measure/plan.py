@@ -16,7 +16,7 @@ from scenelang.graph.nodes import Fold, Graph, nodes
 from scenelang.graph.steps import Affine
 from scenelang.image import Image
 from scenelang.measure.metrics import MOST_DB, flip, over_white, psnr
-from scenelang.models.choose import WHITE, choose_model, lacking, uses, why_chosen
+from scenelang.models.choose import why_chosen
 from scenelang.models.load import Model, place_of
 from scenelang.models.manifest import Manifest, available, load_manifest
 from scenelang.program.groups import OPERATOR
@@ -91,25 +91,21 @@ def plan_of(
 def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
     """Which model draws a scene, why (the command line ``asked`` for it), and what would have been next."""
     others = [load_manifest(name) for name in available() if name != chosen]
-    free = scene.model_copy(update={"model": None})
-    runner_up = choose_model(free, others)
-    unknown = {m.name: missing(free, m) for m in others}
+    refused = {model.name: refusals(scene, model) for model in others}
+    able = [model for model in others if not refused[model.name]]
+    runner_up = min(able, key=lambda model: (model.flip(), model.name), default=None)
     return {
         "model": chosen,
         "why": why_chosen(scene, asked),
         "runner_up": runner_up.name if runner_up else None,
-        "lacking": {name: names for name, names in unknown.items() if names},
+        "lacking": {name: facts for name, facts in refused.items() if facts},
     }
 
 
-def missing(scene: Scene, manifest: Manifest) -> list[str]:
-    """What a scene needs and a model does not have: names, its canvas, its background."""
-    names = sorted(lacking(manifest, uses(scene)))
-    if manifest.sizes and scene.canvas not in manifest.sizes:
-        names.append("a canvas of {} × {}".format(*scene.canvas))
-    if manifest.white and scene.background not in (WHITE, "default"):
-        names.append("a background that is not white")
-    return names
+def refusals(scene: Scene, manifest: Manifest) -> list[str]:
+    """What a model cannot draw of a scene, as messages, each once."""
+    lower(scene, manifest, None, found := Diagnostics())
+    return list(dict.fromkeys(error.message for error in found.errors))
 
 
 def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:

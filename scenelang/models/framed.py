@@ -6,7 +6,6 @@ import hashlib
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from scenelang.lifting.layout import LAYOUTS
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.slopes import load_slopes
 from scenelang.models.weights import ModelError, check_shapes, open_weights, shipped_weights
@@ -59,9 +58,7 @@ def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
     header, arrays = open_weights(data)
     config = framed_config(header.get("config", {}), len(data))
     check_shapes(arrays, parameter_shapes(config, len(manifest.geometries), len(manifest.materials)))
-    made = FramedArrays(config, arrays)
-    made.layout = LAYOUTS[manifest.layout]
-    return made
+    return FramedArrays(config, arrays)
 
 
 @lru_cache(maxsize=8)

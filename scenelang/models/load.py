@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from scenelang.lifting.layout import LAYOUTS, WIDTH
+from scenelang.lifting.vector import WIDTH
 from scenelang.models.framed import MOST_WIDTH, framed_config
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.slopes import load_slopes
@@ -89,9 +89,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 
 def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
-    made = Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
-    made.layout = LAYOUTS[manifest.layout]
-    return made
+    return Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
 
 
 def _solid(config: dict[str, Any], manifest: Manifest, size: int) -> Solids:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-from scenelang.elements.element import Element
-from scenelang.elements.zoo import load_zoo
 from scenelang.files import note_input, read_json, read_regular
-from scenelang.words import STAGE
 
 ROOT = Path(__file__).parent
 MOST: Final = 1e300  # bound of the numbers in ranges
 _MOST_BYTES: Final = 1 << 20
-OPTIONAL: Final = ("layout", "set", "sizes", "white", "outlines", "fixed_stage", "any_blend", "textures")
+OPTIONAL: Final = ("set", "sizes", "white", "any_blend")
+ALIASES: Final = {"textures2d": "shapes2d"}
+"""Earlier names of models, which scenes, Programs and commands may go on to use."""
+USUAL: Final = {2: "shapes2d", 3: "solids3d"}
+"""The model of scenes of a dimension that name none."""
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {
@@ -42,19 +42,6 @@ _DRAWN: Final = {
     "solid": ("element of space", "texture", "colouring of space"),
 }
 """What renderers draw of what users bring, of an exact lifting."""
-TEXTURES: Final = "textures.safetensors"
-
-
-class Outline(NamedTuple):
-    """What is known of a flat geometry's extent; of one without, that it stays within the unit disc.
-
-    Args:
-        corners: of a convex polygon that contains it, all within the unit disc.
-        inner: radius of a disc about the origin that lies inside.
-    """
-
-    corners: tuple[tuple[float, float], ...]
-    inner: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +54,8 @@ class Manifest:
         dimension: 2 or 3.
         renderer: name of the renderer.
         lifting: name of the lifting.
-        layout: of an exact lifting, where its numbers lie: a name in `scenelang.lifting.layout`.
-        geometries: leaf geometries it draws.
-        materials: materials it knows.
-        default_material: what an object without a material gets.
-        transforms: geometry transforms it accepts.
-        material_ops: texture and colour operations it accepts.
+        geometries: leaf geometries it draws, in the order of their codes.
+        materials: the ways of lighting it knows, likewise; an object without a material gets the first.
         limits: hard limits; beyond them a scene cannot be compiled for this model.
         trained: ranges that were trained or, where the network never sees the quantity because frames are
             exact, measured to hold its figures, ``name -> [low, high]``; beyond them is a warning.
@@ -80,10 +63,7 @@ class Manifest:
         set: name of the scenes it was trained on, which models of different speed and error share.
         sizes: canvases (width, height) that it draws; any within its limits where there are none.
         white: whether it draws only over white, knowing colours but no coverage.
-        outlines: of its geometries, for bounds; see `Outline`.
-        fixed_stage: whether camera, light, ground and sky are its own.
         any_blend: whether it draws `smooth` of any width k.
-        textures: materials of its own that are elements, in a file `TEXTURES` beside its weights.
     """
 
     name: str
@@ -93,20 +73,13 @@ class Manifest:
     lifting: str
     geometries: tuple[str, ...]
     materials: tuple[str, ...]
-    default_material: str
-    transforms: tuple[str, ...]
-    material_ops: tuple[str, ...]
     limits: dict[str, int]
     trained: dict[str, tuple[float, float]]
     measured: dict[str, Any]
     set: str = ""
     sizes: tuple[tuple[int, int], ...] = ()
     white: bool = False
-    layout: str = "plane"
-    outlines: dict[str, Outline] = field(default_factory=dict)
-    fixed_stage: bool = False
     any_blend: bool = False
-    textures: tuple[str, ...] = ()
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
@@ -127,43 +100,15 @@ class Manifest:
         for key, value in data.items():
             if not _KINDS[key](value):
                 raise ValueError(f"field `{key}` does not hold what it should")
-        if data["default_material"] not in data["materials"]:
-            raise ValueError("the default material is not one of the materials")
-        if set(data.get("textures", ())) & set(data["materials"]):
-            raise ValueError("a texture with the name of a material")
-        words = ("geometries", "materials", "transforms", "material_ops", "textures")
-        lists = {key: tuple(data[key]) for key in words if key in data}
+        lists = {key: tuple(data[key]) for key in ("geometries", "materials")}
         trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
         sizes = tuple((width, height) for width, height in data.get("sizes", ()))
-        outlines = {
-            name: Outline(tuple((float(x), float(y)) for x, y in shape["corners"]), float(shape["inner"]))
-            for name, shape in data.get("outlines", {}).items()
-        }
-        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes, "outlines": outlines})
-
-    def refusal(self, setting: str) -> tuple[str, str] | None:
-        """Code and message where it does not take a setting of a scene."""
-        if self.dimension == 2 and setting in STAGE:
-            return "E0511", f"model `{self.name}` is flat and has no {setting}"
-        if self.fixed_stage and setting in (*STAGE, "background"):
-            return "E0336", f"model `{self.name}` brings its own {setting}"
-        return None
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """What a scene may set and not every model takes."""
-        blend = ("smooth(k)",) if self.any_blend else ()
-        return *(word for word in (*STAGE, "background") if not self.refusal(word)), *blend
+        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes})
 
     @property
     def elements(self) -> tuple[str, ...]:
         """What it draws of what users bring."""
         return _DRAWN.get(self.renderer, ()) if self.lifting == "exact" else ()
-
-    @property
-    def looks(self) -> tuple[str, ...]:
-        """All materials that it has itself."""
-        return *self.materials, *self.textures
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
@@ -207,19 +152,6 @@ def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
-def _is_corner(value: Any) -> bool:
-    """A point of the unit disc, but for rounding."""
-    return _is_pair(value) and all(-1 <= v <= 1 for v in value) and math.hypot(*value) < 1.000001
-
-
-def _is_outline(value: Any) -> bool:
-    if not isinstance(value, dict) or value.keys() != {"corners", "inner"}:
-        return False
-    corners, inner = value["corners"], value["inner"]
-    fits = isinstance(corners, list) and len(corners) >= 3 and all(map(_is_corner, corners))
-    return fits and _is_range([0, inner]) and _is_range([inner, 1])
-
-
 def _is_figure(key: str, value: Any) -> bool:
     """Sets are objects of figures; the stability suite says a line of text of each quantity."""
     if key == "sets":
@@ -233,22 +165,15 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "dimension": lambda value: type(value) is int and value in (2, 3),
     "renderer": _is_word,
     "lifting": _is_word,
-    "layout": _is_word,
     "geometries": _are_words,
     "materials": lambda value: _are_words(value) and len(value) > 0,
-    "default_material": _is_word,
-    "transforms": _are_words,
-    "material_ops": _are_words,
     "limits": _are(lambda key, v: type(v) is int and 0 <= v <= _LIMITS.get(key, -1)),
     "trained": _are(lambda key, v: key in _RANGES and _is_range(v)),
     "measured": _are(_is_figure),
     "set": _is_name,
     "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
     "white": lambda value: type(value) is bool,
-    "outlines": _are(lambda _, value: _is_outline(value)),
-    "fixed_stage": lambda value: type(value) is bool,
     "any_blend": lambda value: type(value) is bool,
-    "textures": _are_words,
 }
 """What each field may hold."""
 
@@ -258,6 +183,11 @@ _READ: Final[dict[Path, tuple[tuple[int, int, int], Manifest]]] = {}
 """Manifests that were read, and their files' times, sizes and identities then."""
 
 
+def model_folder(name: str) -> Path:
+    """The folder of a shipped model's files, also by an earlier name of its."""
+    return ROOT / ALIASES.get(name, name)
+
+
 def available() -> list[str]:
     """Names of the shipped models, sorted."""
     # a page asks with each key: a glob takes a millisecond, this a fiftieth of one
@@ -265,12 +195,13 @@ def available() -> list[str]:
 
 
 def load_manifest(name: str) -> Manifest:
-    """The manifest of a shipped model.
+    """The manifest of a shipped model, also by an earlier name of its.
 
     Raises:
         KeyError: there is no such model.
         ValueError: it is damaged, or that of another model: its name leads to its files.
     """
+    name = ALIASES.get(name, name)
     if name not in available():
         raise KeyError(name)
     path = ROOT / name / _FILE
@@ -284,16 +215,3 @@ def load_manifest(name: str) -> Manifest:
         known = _READ[path] = stamp, found
     note_input(os.fspath(path))
     return known[1]
-
-
-def load_textures(manifest: Manifest) -> dict[str, Element]:
-    """The textures of a shipped model, by name.
-
-    Raises:
-        OSError: their file cannot be read.
-        ValueError: it is damaged, or has other names than the manifest.
-    """
-    found = load_zoo(ROOT / manifest.name / TEXTURES).materials if manifest.textures else {}
-    if found.keys() != {*manifest.textures}:
-        raise ValueError(f"the textures of `{manifest.name}` are not those of its manifest")
-    return found

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.files import read_regular
-from scenelang.models.manifest import ROOT
+from scenelang.models.manifest import model_folder
 from scenelang.models.weights import ModelError
 from scenelang.renderers.slopes import CELLS, NODE, RADII, STEEP, Slopes
 from scenelang.tensors import TensorError, read_tensors
@@ -24,7 +24,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 def slopes_path(name: str) -> Path:
     """Where the file of a shipped model lies."""
-    return ROOT / name / "slopes.safetensors"
+    return model_folder(name) / "slopes.safetensors"
 
 
 def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.files import read_regular
-from scenelang.models.manifest import ROOT, Manifest, load_manifest
+from scenelang.models.manifest import Manifest, load_manifest, model_folder
 from scenelang.tensors import TensorError, read_tensors
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Facts:
 
 def weights_path(name: str) -> Path:
     """Where a shipped model's weights lie."""
-    return ROOT / name / "weights.safetensors"
+    return model_folder(name) / "weights.safetensors"
 
 
 def shipped_weights(name: str, path: Path | None = None) -> bytes:
@@ -138,15 +138,14 @@ def codes_of(manifest: Manifest, data: bytes) -> Codes:
     Raises:
         ModelError: it is damaged, or not of this model.
     """
-    from scenelang.lifting.layout import LAYOUTS, WIDTH
+    from scenelang.lifting.vector import LAYOUTS, WIDTH
 
     tensors = open_weights(data).arrays
     prefix = "" if manifest.renderer in ("framed", "solid") else LIFTING
     learned = manifest.lifting == "learned"
-    layout = LAYOUTS.get(manifest.layout)
-    if layout is None:
-        raise ModelError(f"model `{manifest.name}` has the layout `{manifest.layout}`, which is not known")
-    sides = (WIDTH // 2, WIDTH // 2) if learned else (layout.code, layout.material)
+    at = LAYOUTS[manifest.dimension].places
+    own = at.code.stop - at.code.start, at.material.stop - at.material.start
+    sides = (WIDTH // 2, WIDTH // 2) if learned else own
     geometry = _rows(manifest.geometries, tensors, f"{prefix}codes", sides[0])
     material = _rows(manifest.materials, tensors, f"{prefix}material_codes", sides[1])
     lifting = None

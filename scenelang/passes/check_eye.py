@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import cos, exp, hypot, inf, sin
 from typing import Final
 
 from scenelang.graph.affine import composed, inverted
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.graph.nodes import Fold, Graph, Leaf
 from scenelang.graph.space import Space
 from scenelang.graph.stage import EXTINCTION
@@ -14,11 +15,6 @@ from scenelang.graph.steps import Affine, Displace, Step, Twist
 from scenelang.passes.context import Context
 
 Point = tuple[float, float, float]
-
-_DISTANCES: Final[dict[str, Callable[[float, float, float], float]]] = {
-    "sphere": lambda x, y, z: hypot(x, y, z) - 1.0,
-    "torus": lambda x, y, z: hypot(hypot(x, z) - 0.7, y) - 0.3,
-}
 
 _DIM: Final = 0.1
 """A medium around the eye that lets less of the light through, in any direction, hides the scene."""
@@ -55,7 +51,7 @@ def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
         node, k = link.node, link.width
         if isinstance(node, Fold):
             d, leaf = _folded(node, eye, space)
-        elif node.geometry in _DISTANCES:
+        elif node.geometry in GEOMETRIES:
             d, leaf = _distance(node.geometry, node.steps, eye), node
             d *= space.stretches(composed(node.steps))[0]
         else:
@@ -90,7 +86,7 @@ def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
         elif isinstance(step, Displace):
             f = step.frequency
             bump = step.amount * sin(f * x) * sin(f * y) * sin(f * z)
-            return _DISTANCES[geometry](x, y, z) + bump
+            return float(GEOMETRIES[geometry].distance(p)) + bump
         elif isinstance(step, Twist):
             s, c = sin(step.twist * y), cos(step.twist * y)
             p = c * x + s * z, y, c * z - s * x
@@ -98,4 +94,4 @@ def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
             angle = step.twirl * hypot(x, y, z) + step.bend[0] * x + step.bend[1] * y
             s, c = sin(angle), cos(angle)
             p = c * x + s * y, c * y - s * x, z
-    return _DISTANCES[geometry](*p)
+    return float(GEOMETRIES[geometry].distance(p))

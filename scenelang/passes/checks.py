@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from math import dist, hypot, sqrt, tan
+from math import dist, hypot, inf, sqrt, tan
 from operator import attrgetter, itemgetter
 
 from scenelang.diagnostics.diagnostic import Label
 from scenelang.diagnostics.span import Span
 from scenelang.graph import affine
 from scenelang.graph.chain import LevelsError, split_levels
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.graph.nodes import Graph, Leaf, Row, leaves
 from scenelang.graph.space import REACH, Space
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
@@ -186,7 +187,8 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     if smallest > 0:
         found.append(("thin", largest / smallest))
     if leaf.look.material == "diffuse":
-        found.append(("thickness", smallest * space.thickness(leaf.geometry)))
+        row = GEOMETRIES.get(leaf.geometry)
+        found.append(("thickness", smallest * (row.thickness if row else inf)))
     for step in leaf.steps:
         if isinstance(step, Warp):
             if step.twirl:

@@ -14,8 +14,8 @@ from scenelang.graph.nodes import Fold, Graph, Leaf, Row
 from scenelang.graph.space import Space
 from scenelang.graph.spaces import SPACES
 from scenelang.lifting.exact import lift_colours, lift_many
-from scenelang.lifting.layout import LAYOUTS, WIDTH
 from scenelang.lifting.learned import lift_geometry, lift_material
+from scenelang.lifting.vector import LAYOUTS, WIDTH
 from scenelang.models.manifest import Manifest
 from scenelang.models.weights import Codes
 from scenelang.program.groups import BEGINS, ENDS
@@ -97,7 +97,7 @@ def _blended(
     """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
     for at, row in enumerate(rows):
         if row.k and row.op != "union":
-            vectors[at, LAYOUTS[manifest.layout].blend] = row.k
+            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
     return vectors
 
 
@@ -110,15 +110,15 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         materials = [manifest.materials.index(leaf.look.material) for leaf in leaves]
         geometry = lift_geometry(codes.lifting, chains, geometries)
         material = lift_material(codes.lifting, colours, materials)
+        vectors = np.concatenate([geometry, material], 1)
     else:
-        layout, space = LAYOUTS[manifest.layout], SPACES[manifest.dimension]
+        layout, space = LAYOUTS[manifest.dimension], SPACES[manifest.dimension]
         levels = [split_levels(chain, manifest.limits, space) for chain in chains]
-        nothing = (0.0,) * layout.code  # an element is told by its row
+        nothing = (0.0,) * 4  # an element is told by its row
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
-        geometry = lift_many(levels, shapes, layout)
         painted = [codes.material[leaf.look.material] for leaf in leaves]
-        material = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
-    vectors = np.concatenate([geometry, material], 1)
+        vectors = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
+        vectors += lift_many(levels, shapes, layout)  # other places
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
     # one zero only, so that equal scenes give equal bytes

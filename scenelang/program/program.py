@@ -26,8 +26,8 @@ from scenelang.elements.element import Element
 from scenelang.elements.zoo import entry_of
 from scenelang.files import write_output
 from scenelang.graph.stage import Stage, stage_data
-from scenelang.lifting.layout import LAYOUTS
-from scenelang.models.manifest import available, load_manifest
+from scenelang.lifting.vector import LAYOUTS, WIDTH
+from scenelang.models.manifest import ALIASES, available, load_manifest
 from scenelang.notebook import bundle
 from scenelang.program.groups import OPERATOR, token_fault
 from scenelang.program.paints import Paint, paint_fault, paint_tensors
@@ -36,7 +36,6 @@ from scenelang.words import TOKENS
 
 MOST_OBJECTS = 100_000
 MOST_PIXELS = 8192
-WIDTH = 64
 
 
 class ProgramError(ValueError):
@@ -160,10 +159,11 @@ class Program:
         """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
         if (self.tokens > OPERATOR).any():
             return True
-        if self.model in available() and load_manifest(self.model).lifting != "exact":
+        known = ALIASES.get(self.model, self.model)
+        if known in available() and load_manifest(known).lifting != "exact":
             return False  # its numbers mean something else
-        layout = LAYOUTS["plane" if self.stage is None else "solid"]
-        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.blend] > 0.0).any())
+        layout = LAYOUTS[2 if self.stage is None else 3]
+        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""

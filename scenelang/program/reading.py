@@ -10,8 +10,10 @@ from scenelang.elements.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
 from scenelang.elements.zoo import read_elements
 from scenelang.files import read_regular
 from scenelang.graph.stage import read_stage
+from scenelang.lifting.vector import WIDTH
+from scenelang.models.manifest import ALIASES, available
 from scenelang.program.paints import read_paints
-from scenelang.program.program import MOST_OBJECTS, WIDTH, Place, Program, ProgramError
+from scenelang.program.program import MOST_OBJECTS, Place, Program, ProgramError
 from scenelang.tensors import MOST_HEADER, TensorError, TensorFile, read_tensors
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
@@ -97,7 +99,7 @@ def parse_program(data: bytes) -> Program:
         bounds=tensors["bounds"],
         canvas=tuple(header["canvas"]),
         background=None if background is None else tuple(background),
-        model=header["model"],
+        model=ALIASES.get(header["model"], header["model"]),
         weights=header["weights"],
         objects=tuple(geometries[index] for index in objects.tolist()),
         places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
@@ -155,12 +157,11 @@ def _count(file: TensorFile) -> int:
 
 def _shipped(model: str) -> str:
     """Digest of the weights shipped for a model."""
-    from scenelang.models.manifest import available
     from scenelang.models.weights import load_codes
 
-    if model not in available():
-        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
     try:
         return load_codes(model).digest
+    except KeyError:
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}") from None
     except FileNotFoundError:
         raise ProgramError(f"model `{model}` has no weights here") from None

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import ROOT, load_manifest
+from scenelang.models.manifest import load_manifest, model_folder
 from scenelang.models.slopes import read_proof
 from scenelang.proof.fold import Enclosure, Floats
 from scenelang.renderers.arrays import NUMPY, Layers
@@ -54,7 +54,7 @@ class Errors:
 
 def errors_path(name: str) -> Path:
     """Where the file of a shipped model lies."""
-    return ROOT / name / "errors.safetensors"
+    return model_folder(name) / "errors.safetensors"
 
 
 @lru_cache(maxsize=4)

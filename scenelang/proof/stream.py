@@ -8,7 +8,6 @@ from scenelang.graph.chain import split_levels
 from scenelang.graph.nodes import Graph
 from scenelang.graph.spaces import PLANE
 from scenelang.lifting.exact import lift_many
-from scenelang.lifting.layout import PLANE_LAYOUT as LAYOUT
 from scenelang.models.manifest import Manifest
 from scenelang.program.emit import tokens_of
 from scenelang.program.groups import anchored, felt, read_groups, widths_of
@@ -47,7 +46,7 @@ class Stream:
         rows = graph.rows()
         self._leaves = [row.leaf for row in rows]
         levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
-        self.frames = Frames(lift_many(levels, [(0.0,) * LAYOUT.code] * len(levels), LAYOUT))
+        self.frames = Frames(lift_many(levels, [(0.0,) * 4] * len(levels)))
         self.groups = groups = read_groups(tokens_of(rows))
         raw = np.array([TOKENS[row.op] for row in rows], np.intp)
         widths = widths_of(raw, np.array([row.k for row in rows]))

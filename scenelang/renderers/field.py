@@ -130,6 +130,7 @@ class Field:
         self._raw = np.asarray(tokens, np.intp) & OPERATOR
         self.brought, self.paints = brought or [None] * len(vectors), paints or [None] * len(vectors)
         self.layout = layout = network.layout
+        self.parts = layout.unpack(vectors)
         self.frames = Frames(vectors[:, : layout.geometry], layout)
         cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
         self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
@@ -144,10 +145,10 @@ class Field:
     def _shapes(self) -> None:
         """Decoders of the leaves in use, grids of elements, and which object has which."""
         xp, network = self.xp, self.network
-        every = np.ascontiguousarray(self.vectors[:, : self.layout.code])
+        every = np.ascontiguousarray(self.parts.code)
         found, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
         codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
-        self.codes = codes = codes.reshape(len(found), self.layout.code)
+        self.codes = codes = codes.reshape(len(found), every.shape[1])
         """Of the leaves in use (K, C): decoders are computed together."""
         self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
@@ -161,8 +162,7 @@ class Field:
     def _cells(self) -> None:
         """Cells by operator and width of the blend; behind them the same with gates that are open."""
         xp, groups = self.xp, self.groups
-        given = self.vectors[:, self.layout.blend].astype(np.float64)
-        widths = widths_of(self._raw, given)
+        widths = widths_of(self._raw, self.parts.width.astype(np.float64))
         self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
         """Of the blends by which objects join (N,), world units."""
         self.group_widths = widths[groups.rows]
@@ -192,22 +192,20 @@ class Field:
         self._host = Cell(*host)
 
     def _colours(self) -> None:
-        xp, m = self.xp, self.vectors[:, self.layout.geometry :]
-        albedo = self.network.object_albedo(xp.array(m[:, self.layout.material_code].copy(), self.like))
-        albedo = xp.concat([albedo, xp.full((len(m), 1), 1.0, self.like)], 1)
-        matrix = xp.array(m[:, self.layout.colour].reshape(-1, 3, 4).copy(), self.like)
-        self.colours = xp.packed((matrix @ albedo[:, :, None])[:, :, 0].clip(0.0, 1.0).T)
+        xp, parts = self.xp, self.parts
+        albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
+        self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
         """Of the objects (3, N); 0 where a texture is worn."""
         self.textures: list[Texture] = []
-        self.texture = np.full(len(m), NO_TEXTURE)
+        self.texture = np.full(len(self.paints), NO_TEXTURE)
         """Which of the textures an object wears (N,)."""
         known: dict[tuple[Paint, bytes], int] = {}
         for i, paint in enumerate(self.paints):
             if paint is None or not self.draws[i]:  # the others leave colours as they are
                 continue
-            self.texture[i] = known.setdefault((paint, m[i, :6].tobytes()), len(known))
+            self.texture[i] = known.setdefault((paint, parts.texture[i].tobytes()), len(known))
             if len(known) > len(self.textures):
-                self.textures.append(Texture(xp, paint, m[i, :6], self.like, light=False))
+                self.textures.append(Texture(xp, paint, parts.texture[i], self.like, light=False))
             self.colours[:, i] = 0.0
 
     @property

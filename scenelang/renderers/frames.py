@@ -1,6 +1,6 @@
 """From geometry vectors to frames: where a world point lies in each object's own space.
 
-The inverse reading of a `scenelang.lifting.layout`. All of it is linear algebra and turns by an
+The inverse reading of a `scenelang.lifting.vector`. All of it is linear algebra and turns by an
 angle; nothing here is learned. Points are one array (d, M), and d is whatever the frames are made for.
 """
 
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.lifting.layout import PLANE_LAYOUT, Layout
+from scenelang.lifting.vector import PLANE_LAYOUT, STRENGTHS, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import NUMPY, Array, Arrays
 
@@ -64,7 +64,7 @@ class Frames:
     """The ways of N objects back to their leaves: a map, warps, a map, warps, outermost first.
 
     Args:
-        g: geometry vectors (N, .), as a layout of the plane has them.
+        g: vectors (N, .), or as much of them as leads to the leaf.
 
     Attributes:
         scale: (N,) world distance per leaf distance, the smallest singular value of the composed map.
@@ -81,7 +81,8 @@ class Frames:
 
     def _read(self, numbers: Floats, layout: Layout) -> None:
         self.numbers = numbers
-        last, middle = numbers[layout.frame], numbers[layout.middle]
+        (last_at, outer_at), (middle_at, inner_at) = layout.ways
+        last, middle = numbers[last_at], numbers[middle_at]
         # from the leaf through the middle map, and on into the world; warps keep the distance to the origin
         a, b, c, d, x, y = _inverse(middle)
         e, f, g, h, u, v = _inverse(last)
@@ -89,15 +90,15 @@ class Frames:
         self._stages: list[_Stage] = []
         self.stretch = np.ones(numbers.shape[1])
         for frame, warps, radius in (
-            (layout.frame, layout.outer_warps, reach + moved),
-            (layout.middle, layout.inner_warps, 1.0),
+            (last_at, outer_at, reach + moved),
+            (middle_at, inner_at, 1.0),
         ):
             rows = numbers[frame]
             moves = (rows != np.reshape(layout.identity, (-1, 1))).any(0)
             steep = _stretches(*rows[[0, 1, 3, 4]])[1]
             self._stages.append(_Stage(frame, moves, steep, np.zeros_like(steep)))
-            for at in range(warps.start, warps.stop, layout.strengths):
-                strengths = slice(at, at + layout.strengths)
+            for at in range(warps.start, warps.stop, STRENGTHS):
+                strengths = slice(at, at + STRENGTHS)
                 twirl, *bend = numbers[strengths]
                 turns = (numbers[strengths] != 0.0).any(0)
                 rate = abs(twirl) + np.hypot(*bend)
@@ -105,12 +106,11 @@ class Frames:
                 self.stretch *= 1.0 + radius * rate
         p, q, r, s = e * a + f * c, e * b + f * d, g * a + h * c, g * b + h * d
         self.scale = _stretches(p, q, r, s)[0]
-        slots = [layout.frame, layout.outer_warps, layout.middle, layout.inner_warps]
-        largest = np.max([abs(numbers[slot]).max(0) for slot in slots], 0)
+        largest = abs(numbers[last_at.start : inner_at.stop]).max(0)
         if not ((largest < MOST) & (self.scale > 1 / MOST) & (self.scale < MOST)).all():
             raise ProgramError("a damaged program: a frame beyond float32")
         self.stretch = np.minimum(self.stretch, MOST)
-        outer = (numbers[layout.outer_warps] != 0.0).any(0)
+        outer = (numbers[outer_at] != 0.0).any(0)
         across, along = np.hypot(e, f), np.hypot(g, h)
         zero = np.zeros_like(moved)
         self._centre = np.where(outer, [u, v], [e * x + f * y + u, g * x + h * y + v])

@@ -27,7 +27,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from scenelang.lifting.layout import PLANE_LAYOUT, Layout
+from scenelang.lifting.vector import PLANE_LAYOUT, Layout
 from scenelang.renderers.arrays import NUMPY, Array, Arrays, Layers
 from scenelang.words import TOKENS as WORDS
 

@@ -20,7 +20,8 @@ class SceneData(Frozen):
     model: Annotated[
         str | None,
         Field(
-            pattern=r'^[^"\\\x00-\x1f]+$', description="the model to draw with; null: the smallest that fits"
+            pattern=r'^[^"\\\x00-\x1f]+$',
+            description="the model to draw with; null: the usual one",
         ),
     ] = None
     canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)

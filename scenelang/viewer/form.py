@@ -71,7 +71,7 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         "animates": evaluation.animates,
         "slots": writer.slots,
         "calls": writer.calls,
-        "plain": manifest.materials.index(manifest.default_material),
+        "plain": 0,
         "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
         "geometries": manifest.geometries,
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenelang.graph.stage import Stage
-from scenelang.lifting.layout import LAYOUTS, Layout
+from scenelang.lifting.vector import LAYOUTS, Layout
 from scenelang.models.manifest import Manifest
 from scenelang.program.groups import OPERATOR, widths_of
 from scenelang.program.program import Program, ProgramError
@@ -32,35 +32,33 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     Raises:
         ProgramError: a vector is not one that a scene compiles to.
     """
-    layout = LAYOUTS[manifest.layout]
+    layout = LAYOUTS[manifest.dimension]
+    parts = layout.unpack(program.vectors)
     forms = [at for at, element in enumerate(program.elements) if not element.material]
     paints = [element for element in program.elements if element.material]
-    scales, blends = _scales(program, layout), program.vectors[:, layout.blend]
-    widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, blends).tolist()
+    scales = _scales(program, layout)
+    widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
     rows = []
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
-        m = v[layout.geometry :]
-        matrix = m[layout.colour].reshape(3, 4)
-        if np.count_nonzero(matrix) != np.count_nonzero(matrix.diagonal()):
-            raise ProgramError("colours that mix channels, which no scene compiles to")
         row = {
             "token": int(program.tokens[i]),
-            "shape": _index(codes, v[: layout.code]) if form < 0 else len(codes) + forms.index(form),
-            "material": _index(material_codes, m[layout.material_code]),
+            "shape": _index(codes, parts.code[i]) if form < 0 else len(codes) + forms.index(form),
+            "material": _index(material_codes, parts.material[i]),
             "steps": _steps(v.astype(np.float64), layout),
             "scale": scales[i],
-            "colour": matrix.diagonal().tolist(),
+            "colour": parts.rgb[i].tolist(),
             "paint": -1,
             "amount": 0.0,
             "frequency": 0.0,
             "blend": widths[i],
             "object": program.numbers[i],
         }
-        if layout.extras:
-            row["amount"], row["frequency"] = v[layout.geometry - 3 : layout.geometry - 1].tolist()
+        if layout.dimension == 3:
+            row["amount"], row["frequency"] = parts.bulge[i].tolist()
         if worn >= 0:
             paint = program.palette[worn]
-            row |= {"paint": paints.index(paint.element), "place": m[:6].tolist(), "paintSteps": paint.steps}
+            row |= {"paint": paints.index(paint.element), "paintSteps": paint.steps}
+            row["place"] = parts.texture[i].tolist()
         rows.append(row)
     return rows
 
@@ -92,16 +90,15 @@ def _index(known: np.ndarray, code: np.ndarray) -> int:
 
 def _scales(program: Program, layout: Layout) -> list[float]:
     """World distances per leaf distance."""
-    g = program.vectors[:, : layout.geometry]
     if layout.dimension == 2:
-        return list(Frames(g, layout).scale.tolist())
-    return [read_solid_frame(one, layout).scale for one in g]
+        return list(Frames(program.vectors, layout).scale.tolist())
+    return [read_solid_frame(vector, layout).scale for vector in program.vectors]
 
 
 def _steps(v: np.ndarray, layout: Layout) -> list[Step]:
     """The way of a world point to the leaf, outermost first."""
     steps: list[Step] = []
-    for frame, warps in ((layout.frame, layout.outer_warps), (layout.middle, layout.inner_warps)):
+    for frame, warps in layout.ways:
         if tuple(v[frame]) != layout.identity:
             steps.append(["map", *v[frame].tolist()])
         for a, b, c in v[warps].reshape(-1, 3).tolist():

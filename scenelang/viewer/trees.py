@@ -10,16 +10,26 @@ from collections.abc import Iterable
 from typing import Final
 
 from scenelang.elements.element import Element
+from scenelang.elements.textures import load_textures
 from scenelang.evaluate.file_context import FileContext
 from scenelang.evaluate.values.functions import CONSTANTS
 from scenelang.evaluate.values.value import COMPONENTS, Vec
-from scenelang.models.manifest import Manifest, load_textures
+from scenelang.models.manifest import Manifest
 from scenelang.scene.elements import Brought
 from scenelang.scene.groups import objects_of
 from scenelang.scene.schema import Color, Matrix, Object, Scale, Translate
 from scenelang.syntax import nodes
 from scenelang.viewer.names import Bound, Json, Names, Scope, bind
-from scenelang.words import ANIMATED, FUNCTIONS, LANGUAGE, OPERATIONS, SETTINGS, TRANSFORMS
+from scenelang.words import (
+    ANIMATED,
+    FUNCTIONS,
+    LANGUAGE,
+    OPERATIONS,
+    SETTINGS,
+    SOLID_TRANSFORMS,
+    STAGE,
+    TRANSFORMS,
+)
 
 _VALUES: Final = ("let", "param", "argument", "loop")
 
@@ -45,7 +55,7 @@ class Writer(Names):
         self.manifest, listed = manifest, list(elements)
         self.files = {file.name: file.zoo for file in context.session.elements.values()}
         self.brought = Brought.of(tuple(context.session.elements.values()))
-        self.textures = load_textures(manifest)
+        self.textures = load_textures()
         self.shapes = [element for element in listed if not element.material]
         self.paints = [element for element in listed if element.material]
 
@@ -125,7 +135,7 @@ class Writer(Names):
 
     def _look(self, name: str, shading: nodes.Name | None, scope: Scope) -> tuple[str, int]:
         alias, dot, rest = name.partition(".")
-        lit = self.manifest.default_material if shading is None else shading.text
+        lit = self.manifest.materials[0] if shading is None else shading.text
         paint = -1
         if dot:
             file = scope.find(alias)
@@ -141,7 +151,7 @@ class Writer(Names):
         return lit, paint
 
     def _element(self, element: Element, known: list[Element], name: str) -> int:
-        if element not in known and name not in self.textures and element.kind not in self.manifest.elements:
+        if element not in known and element.kind not in self.manifest.elements:
             raise Lacking(f"model `{self.manifest.name}` does not draw `{name}`")
         if element not in known:
             known.append(element)
@@ -212,19 +222,20 @@ class Writer(Names):
     def _setting(self, stmt: nodes.Call, scope: Scope) -> Json:
         name, word = stmt.name.text, SETTINGS[stmt.name.text]
         args = self.given(bind(word.params, stmt.args), scope)
-        if refusal := self.manifest.refusal(name):
-            return ["no", refusal[1]]
+        if name in STAGE and self.manifest.dimension == 2:
+            return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
         return None if name == "canvas" else [name, *args]
 
     def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
-        known = self.manifest.material_ops if inks else self.manifest.transforms
-        if name not in known:
-            return ["no", f"model `{self.manifest.name}` has no transform `{name}`"]
+        table = OPERATIONS if inks else TRANSFORMS
+        if name not in table:
+            return ["no", f"`{name}` does not stand here"]
+        if name in SOLID_TRANSFORMS and self.manifest.dimension == 2:
+            return ["no", f"`{name}` leaves the plane"]
         if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
             return ["move", "even", self.expression(args[0].value, scope)]
-        params = (OPERATIONS if inks else TRANSFORMS)[name].params
-        return ["move", name, *self.given(bind(params, args), scope)]
+        return ["move", name, *self.given(bind(table[name].params, args), scope)]
 
     # ------------------------------------------------------------ elements
 
@@ -258,7 +269,7 @@ class Writer(Names):
             name = part.material.name
             element = self.brought.materials.get(name)
             paint = -1 if element is None else self._element(element, self.paints, name)
-            lit = self.manifest.default_material if element is not None else name
+            lit = self.manifest.materials[0] if element is not None else name
             inks = [op.rgb for op in part.material.ops if isinstance(op, Color)]
             ops = [["move", "color", ["[", *map(plain, rgb)]] for rgb in inks]
             if lit not in self.manifest.materials:

@@ -8,7 +8,8 @@ import pytest
 import scenelang as nsg
 from scenelang.backend.closed import ExactShape, closed_forms
 from scenelang.backend.options import Samples
-from scenelang.reference.field import SECTORS, leaf_distance
+from scenelang.graph.geometries import SECTORS
+from scenelang.reference.field import leaf_distance
 from scenelang.renderers.draw import draw_objects
 from tests.passes.random_scenes import blob_scene, random_scene
 from tests.pictures import premultiplied, psnr_db

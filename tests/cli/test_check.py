@@ -166,7 +166,7 @@ def test_several_frames_of_an_animation(folder: Folder, monkeypatch: pytest.Monk
 def test_models(folder: Folder) -> None:
     name = folder.write("a.nsg")
     assert folder.run("check", name, "--model", "shapes2d").exit_code == 0
-    assert "E0210" in folder.run("check", name, "--model", "shapes").stdout
+    assert "E0514" in folder.run("check", name, "--model", "shapes").stdout
 
 
 def test_text_that_is_no_scene(folder: Folder) -> None:

@@ -165,7 +165,7 @@ def test_verbose(folder: Folder) -> None:
     said = result.stderr
     assert "objects: 2 (1 square, 1 star)" in said
     assert "tokens: 2 union" in said
-    assert "model shapes2d (the smallest that has all it uses)" in said
+    assert "model shapes2d (the usual one of its dimension)" in said
     assert "drawn by numpy on one core: about " in said
     for stage in ("parse", "evaluate", "compile", "draw", "save"):
         assert f"{stage} " in said.rpartition("time (ms):")[2]

@@ -18,7 +18,7 @@ from scenelang.evaluate.evaluation import Source
 from scenelang.graph.lower import lower
 from scenelang.graph.nodes import Graph
 from scenelang.graph.stage import stage_data
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.models.manifest import load_manifest
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program
@@ -95,8 +95,8 @@ def run(name: str, given: Mapping[str, Any]) -> Outcome:
 
 def unlearned(program: Program) -> tuple[slice, slice]:
     """What of the geometry and of the material part of its vectors is not learned: all but the codes."""
-    layout = LAYOUTS[load_manifest(program.model).layout]
-    return slice(layout.code, layout.geometry), slice(layout.geometry, layout.geometry + layout.colour.stop)
+    at = LAYOUTS[2 if program.stage is None else 3].places
+    return slice(at.code.stop, at.texture.start), slice(at.texture.start, at.material.start)
 
 
 def stream_digest(program: Program) -> str:

@@ -19,28 +19,15 @@ from scenelang.evaluate.session import Defines
 from scenelang.evaluate.values import functions
 from scenelang.evaluate.values import value as values
 from scenelang.graph import lower
-from scenelang.models.manifest import available, load_manifest
 from scenelang.program.check import check_compiles, check_frames
 from scenelang.resolve.unused import find_unused
 from scenelang.scene import schema
 from scenelang.scene.schema import Scene
 from scenelang.syntax import lexer, parse, parser
 from scenelang.syntax.tables import tables
-from tests.models import SOLIDS, STUDIO
 
 PAGES = Path(scenelang.__file__).parent / "diagnostics/pages"
 ROOT = Path(__file__).parents[2]
-
-# Pages about what models lack need a second one.
-MODELS = [SOLIDS, STUDIO, *(load_manifest(name) for name in available() if name != SOLIDS.name)]
-
-
-@pytest.fixture(autouse=True)
-def two_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The compiler, too, finds `MODELS` and no others."""
-    by_name = {m.name: m for m in MODELS}
-    monkeypatch.setattr("scenelang.program.compile.available", lambda: tuple(by_name))
-    monkeypatch.setattr("scenelang.program.compile.load_manifest", by_name.__getitem__)
 
 
 def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
@@ -69,7 +56,7 @@ def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
         source = SourceFile("scene.nsg", example.text)
         path = folder / "scene.nsg"
         tree = parse(source, found)
-        evaluation = Source(path, tree=tree, params=defines, models=MODELS).evaluation(found, replays=True)
+        evaluation = Source(path, tree=tree, params=defines).evaluation(found, replays=True)
         scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
         defines.report_unused(found)
         if not found.errors:
@@ -118,17 +105,18 @@ def test_shape_of_a_page(page: Page) -> None:
     assert page.area in AREAS.values()
 
 
-def test_a_scene_for_two_models_is_shown_where_they_part() -> None:
+@pytest.mark.parametrize(("model", "label"), [("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')])
+def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part(model: str, label: str) -> None:
     found = Diagnostics()
-    source = SourceFile("scene.nsg", "square { scale(0.5); }\nsphere { scale(0.3); }\n")
-    scene, spans = Source(text=source, models=MODELS).scene(found)
+    source = SourceFile("scene.nsg", model + "square { scale(0.5); }\nsphere { scale(0.3); }\n")
+    scene, spans = Source(text=source).scene(found)
     assert scene is not None
-    assert check_compiles(scene, spans, found) is None
+    check_compiles(scene, spans, found)
     (only,) = found
-    assert only.message == "`square` belongs to flat scenes, `sphere` to solid ones: a scene is flat or solid"
+    assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
     assert only.span is not None
-    assert (only.span.text, only.labels[0].span.text) == ("sphere", "square")
-    assert only.labels[0].message == "of flat scenes"
+    assert (only.span.text, only.labels[0].span.text) == ("sphere", label)
+    assert only.labels[0].message == "flat by this"
 
 
 def test_pages_state_the_lists_and_limits_of_the_code() -> None:

@@ -12,7 +12,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Source
 from scenelang.scene.schema import Scene
 from scenelang.syntax.lexer import Report, scan
-from tests.diagnostics.test_every_fix import EXAMPLES, MODELS, TESTS, check, place
+from tests.diagnostics.test_every_fix import EXAMPLES, TESTS, check, place
 
 ROOT = TESTS.parent / "examples"
 
@@ -32,7 +32,6 @@ AMBIGUOUS = {
         "square { resize(0.5); }",
     ],
     "E0207": [f"square {{ scale({name}(0.5)); }}" for name in ("cot", "sinh", "cosh", "tanh", "sqr", "rad")],
-    "E0210": ['model "shapes3d";'],
     "E0302": [
         "let k = 45; square { rotate(k); }",
         "for (i in [1]) { square { rotate(360 * i / 5); } }",
@@ -147,5 +146,5 @@ def test_fixes_of_slips_bring_the_scene_back_or_leave_an_error(seed: int) -> Non
 
 
 def read(text: str) -> Scene | None:
-    scene, _ = Source(text=SourceFile("a.nsg", text), models=MODELS, root=ROOT).scene(Diagnostics())
+    scene, _ = Source(text=SourceFile("a.nsg", text), root=ROOT).scene(Diagnostics())
     return scene

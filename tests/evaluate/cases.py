@@ -1,4 +1,4 @@
-"""What the tests of evaluation share: a second model, and a way to run text."""
+"""A way to run text, which the tests of evaluation share."""
 
 from __future__ import annotations
 
@@ -10,12 +10,8 @@ from typing import Any
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Source
-from scenelang.models.manifest import load_manifest
 from scenelang.scene.schema import Scene
 from scenelang.scene.spans import SpanMap
-from tests.models import SOLIDS, STUDIO
-
-MODELS = (load_manifest("shapes2d"), SOLIDS, STUDIO)
 
 
 @dataclass
@@ -40,11 +36,10 @@ class Outcome:
 
 
 def run_text(text: str, *, name: str = "test.nsg", **options: Any) -> Outcome:
-    """Evaluate text with both models at hand."""
+    """Evaluate text."""
     found = Diagnostics()
     frame = options.pop("frame", 0)
-    source = Source(text=SourceFile(name, text), **{"models": MODELS, **options})
-    scene, spans = source.scene(found, frame)
+    scene, spans = Source(text=SourceFile(name, text), **options).scene(found, frame)
     return Outcome(scene, spans, found)
 
 

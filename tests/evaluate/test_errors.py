@@ -70,7 +70,6 @@ def apply_fix(text: str) -> str:
         ("let size = 1; square { scale(sise); }", "let size = 1; square { scale(size); }"),
         ("square { material falt; }", "square { material flat; }"),
         ("square { rotate(angel = 45deg); }", "square { rotate(angle = 45deg); }"),
-        ('model "shapes2";', 'model "shapes2d";'),
         ("chain { smooth square {} star {} }", "chain { square {} star {} }"),
         ("let m = material flat; square { material m; }", "let m = material flat; square { m; }"),
     ],
@@ -132,20 +131,6 @@ def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
     outcome = run_text("let size 5;\nsquare { scale(size); }")
     assert outcome.scene is None
     assert [code[:3] for code in outcome.codes] == ["E01"]
-
-
-@pytest.mark.parametrize(
-    ("text", "label"),
-    [
-        ('model "shapes2d"; sphere {}', ('model "shapes2d";', "the model of this scene")),
-        ('model "shapes2d"; square { material diffuse; }', ('model "shapes2d";', "the model of this scene")),
-        ('model "shapes2d"; square { twist(1); }', ('model "shapes2d";', "the model of this scene")),
-        ('model "solids3d-studio"; light();', ('model "solids3d-studio";', "the model of this scene")),
-    ],
-)
-def test_labels_show_the_model(text: str, label: tuple[str, str]) -> None:
-    found = run_text(text).only()
-    assert [(x.span.text, x.message) for x in found.labels] == [label]
 
 
 def test_a_late_version_moves_to_the_top() -> None:

@@ -14,7 +14,7 @@ from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Source
 from scenelang.evaluate.prepare import settings
 from scenelang.syntax import parse
-from tests.evaluate.cases import MODELS, Outcome, run_text, transform
+from tests.evaluate.cases import Outcome, run_text, transform
 from tests.work import lines_run
 
 
@@ -28,7 +28,7 @@ def write(folder: Path, **files: str) -> None:
 def load(path: Path, **options: Any) -> Outcome:
     found = Diagnostics()
     frame = options.pop("frame", 0)
-    scene, spans = Source(path, models=MODELS, **options).scene(found, frame)
+    scene, spans = Source(path, **options).scene(found, frame)
     return Outcome(scene, spans, found)
 
 

@@ -9,9 +9,6 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
-from scenelang.evaluate.vocabulary import shipped
-from scenelang.models.choose import choose_model
-from scenelang.models.manifest import load_manifest
 
 TEXT = "param k = 0.5 in 0..1; square { scale(0.1 + k); }"
 
@@ -75,36 +72,9 @@ def test_what_is_imported() -> None:
     assert not imported("import scenelang as nsg; nsg.loads('square {}')") & (heavy - {"pydantic"})
 
 
-def test_the_smallest_model_that_fits() -> None:
-    shapes = load_manifest("shapes2d")
-    assert choose_model(nsg.loads("square { twirl(1); }"), shipped()) == shapes
-    assert choose_model(nsg.Scene(nodes=(nsg.Object("sphere"),)), [shapes]) is None
-    assert choose_model(nsg.Scene(model="other"), [shapes]) is None
-    material = nsg.Material(name="volumetric")
-    group = nsg.Group(children=(nsg.Object("square", material=material),))
-    assert choose_model(nsg.Scene(nodes=(group,)), [shapes]) is None
-    assert choose_model(nsg.Scene(), []) is None
-
-
-def test_names_that_no_model_has_together() -> None:
-    """Told by the first two of them, in the order of the scene."""
-    from dataclasses import replace
-
-    from scenelang.models.choose import apart
-
-    flat = shipped()[0]
-    solid = replace(flat, name="solids", geometries=("sphere", "square"), transforms=("rotate",))
-    solid = replace(solid, materials=("diffuse",))
-    twirled = nsg.Group(
-        children=(nsg.Object("sphere"),), transforms=(nsg.Rotate(angle=1.0), nsg.Twirl(k=1.0))
-    )
-    scene = nsg.Scene(nodes=(nsg.Object("square"), twirled))
-    assert apart(scene, [flat, solid]) == (
-        ("twirl", "transforms", twirled.transforms[1]),
-        ("sphere", "geometries", twirled.children[0]),
-    )
-    scene = nsg.Scene(nodes=(nsg.Object("square", material=nsg.Material(name="diffuse")), twirled))
-    pair = apart(scene, [flat, solid])
-    assert pair is not None
-    assert [name for name, _, _ in pair] == ["diffuse", "twirl"]
-    assert apart(nsg.Scene(nodes=(nsg.Object("square"),)), [flat, solid]) is None
+def test_a_model_that_is_not_named_is_that_of_the_dimension() -> None:
+    for text, name in (("square { twirl(1); }", "shapes2d"), ("sphere;", "solids3d"), ("", "shapes2d")):
+        assert nsg.compile(nsg.loads(text)).model == name
+    assert nsg.compile(nsg.loads('model "textures2d"; square;')).model == "shapes2d"  # its earlier name
+    with pytest.raises(nsg.SceneError, match="E0514"):
+        nsg.compile(nsg.Scene(model="other"))

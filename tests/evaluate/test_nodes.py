@@ -146,7 +146,6 @@ def test_settings() -> None:
     )
     assert run_text("").good() == nsg.Scene()
     assert run_text("square {}", model="shapes2d").good().model == "shapes2d"
-    assert run_text("square {}", model="shapes4d").codes == ["E0210"]
 
 
 @pytest.mark.parametrize(

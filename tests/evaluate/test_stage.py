@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,13 @@ import scenelang as nsg
 from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.graph.lower import lower
 from scenelang.graph.stage import Camera, Ground, Light, Stage, decoded, stage_of
-from scenelang.models.choose import choose_model
+from scenelang.models.choose import scene_dimension
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.scene.schema import same_nodes
-from tests.evaluate.cases import MODELS, run_text
-from tests.models import SOLIDS, STUDIO
+from tests.evaluate.cases import run_text
 
-SHAPES = load_manifest("shapes2d")
+SHAPES, SOLIDS = load_manifest("shapes2d"), load_manifest("solids3d")
+OTHER, LEARNED = replace(SOLIDS, any_blend=False), load_manifest("shapes2d-streaming")
 
 
 @pytest.mark.parametrize(
@@ -90,20 +91,20 @@ def test_imported_files_have_no_stage(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "model"),
+    ("text", "dimension"),
     [
-        ("camera();", "solids3d"),
-        ("ground(none);", "solids3d"),
-        ("background(#000);", "shapes2d"),
-        ("light(); square;", None),
-        ("ground(); smooth(k = 0.3) { square; star; }", None),
-        ("smooth(k = 0.3) { sphere; torus; }", "solids3d"),
-        ("chain { square; smooth(k = 0.3) star; }", "shapes2d"),
+        ("", 2),
+        ("camera();", 3),
+        ("ground(none);", 3),
+        ("background(#000);", 2),
+        ("light(); square;", 2),
+        ("smooth(k = 0.3) { sphere; torus; }", 3),
+        ("group { group {} chain { square; smooth(k = 0.3) star; } } torus;", 2),
+        ("torus; square;", 3),
     ],
 )
-def test_settings_choose_the_model(text: str, model: str | None) -> None:
-    chosen = choose_model(run_text(text).good(), MODELS)
-    assert (chosen and chosen.name) == model
+def test_the_first_geometry_and_then_the_stage_say_the_dimension(text: str, dimension: int) -> None:
+    assert scene_dimension(run_text(text).good()) == dimension
 
 
 @pytest.mark.parametrize(
@@ -111,9 +112,12 @@ def test_settings_choose_the_model(text: str, model: str | None) -> None:
     [
         (nsg.Scene(camera=nsg.Camera(), ground=None), SHAPES, ["E0511", "E0511"]),
         (nsg.Scene(camera=nsg.Camera(), ground=None), SOLIDS, []),
-        (nsg.Scene(light=nsg.Light(), background=(1, 1, 1)), STUDIO, ["E0336", "E0336"]),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")] * 2, k=0.2)), STUDIO, ["E0512"]),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")], k=0.2)), STUDIO, []),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")] * 2, k=0.2)), OTHER, ["E0512"]),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")], k=0.2)), OTHER, []),
+        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("diffuse"))), SHAPES, ["E0502"]),
+        (nsg.Scene(nodes=nsg.Object("sphere", (), nsg.Material("wood", (), "volumetric"))), SOLIDS, []),
+        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("wood"))), LEARNED, ["E0509", "E0502"]),
+        (nsg.Scene(nodes=[nsg.Object("star"), nsg.Object("sphere")]), SHAPES, ["E0501"]),
         (nsg.Scene(nodes=nsg.Group(nsg.Object("sphere"), nsg.Displace(1, 2))), SOLIDS, ["E0407"]),
         (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Displace(1, 3)])), SOLIDS, ["E0407"]),
         (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Twist(3)])), SOLIDS, []),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,11 +16,9 @@ from scenelang.graph.chain import normal
 from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Leaf, Move
 from scenelang.graph.space import EVERYWHERE
-from scenelang.graph.spaces import SPACES, Plane
+from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.models.manifest import load_manifest
 
-PLANE = Plane(load_manifest("shapes2d").outlines)
 CORNERS = {
     "square": np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / np.sqrt(2),
     "triangle": np.array([[0, 1], [-np.sqrt(0.75), -0.5], [np.sqrt(0.75), -0.5]]),
@@ -97,8 +96,10 @@ def test_boxes_of_straight_leaves_are_tight() -> None:
     half = 2**-0.5
     expected = (0.2 - half / 2, -half / 4, 0.2 + half / 2, half / 4)
     assert leaf_box(leaf, 0.0, PLANE)[:4] == pytest.approx(expected, abs=1e-8)
-    # without an outline it is only known to lie in the unit disc
-    assert leaf_box(leaf, 0.0, Plane())[:4] == pytest.approx((-0.3, -0.25, 0.7, 0.25), abs=1e-8)
+    # an element is only known to lie in the unit disc
+    assert leaf_box(replace(leaf, geometry="zoo.square"), 0.0, PLANE)[:4] == pytest.approx(
+        (-0.3, -0.25, 0.7, 0.25), abs=1e-8
+    )
     # the distance scale is 0.25, so a level of 0.1 reaches 0.4 in the leaf, 0.2 and 0.1 in the world
     wider = (expected[0] - 0.2, expected[1] - 0.1, expected[2] + 0.2, expected[3] + 0.1)
     assert leaf_box(leaf, 0.1, PLANE)[:4] == pytest.approx(wider, abs=1e-8)

@@ -74,8 +74,8 @@ def test_rotations_are_counter_clockwise_seen_from_the_tip_of_the_axis() -> None
         (schema.Scale(x=1e-15, y=1, z=1), "E0312"),
         (schema.Scale(x=1e-40, y=1e-40, z=1), "E0312"),
         (matrix((1, 2, 0, 0), (2, 4 + 1e-11, 0, 0), (0, 0, 1, 0)), "E0312"),
-        (schema.Twist(k=1), "E0503"),
-        (schema.Displace(amount=1, frequency=1), "E0503"),
+        (schema.Twist(k=1), "E0505"),
+        (schema.Displace(amount=1, frequency=1), "E0505"),
     ],
 )
 def test_what_a_plane_refuses(transform, code: str) -> None:

@@ -14,7 +14,7 @@ from scenelang.graph.nodes import Leaf, Move
 from scenelang.graph.spaces import SPACES
 from scenelang.graph.steps import IDENTITY, Affine, Displace, Step, Twist, Warp
 from scenelang.lifting.exact import lift_many
-from scenelang.lifting.layout import SOLID_LAYOUT
+from scenelang.lifting.vector import SOLID_LAYOUT
 from scenelang.reference.solid.body import Body
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.solid.frames import read_solid_frame

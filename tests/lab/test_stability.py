@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.probes import PROBES, animated, apart, rng_of, union_of
+from lab.probes import PROBES, TEXTURES, animated, apart, rng_of, union_of
 from lab.sets.scenes import sized
 from lab.solid_probes import SOLIDS
 from lab.stability import (
@@ -104,7 +104,7 @@ def test_lifting_solids_one_map_after_the_other_gives_the_same_chain(solids: Mod
 
 @pytest.mark.parametrize(
     ("of", "name"),
-    [("shapes2d", n) for n in PROBES] + [("solids3d", n) for n in SOLIDS.probes] + [("textures2d", "texels")],
+    [("shapes2d", n) for n in TEXTURES.probes] + [("solids3d", n) for n in SOLIDS.probes],
 )
 def test_probes_vary_one_thing(of: str, name: str) -> None:
     probe = kit_of(load_manifest(of)).probes[name]
@@ -118,7 +118,7 @@ def test_probes_vary_one_thing(of: str, name: str) -> None:
 
 def test_textures_drawn_small_flicker() -> None:
     """Against many samples: of few texels to a pixel hardly any change is wrong, of many most of it."""
-    model = load_model("textures2d")
+    model = load_model("shapes2d")
     probe = kit_of(model.manifest).probes["texels"]
     small = dataclasses.replace(probe, values=(1.0, 16.0))
     with pytest.MonkeyPatch.context() as patch:

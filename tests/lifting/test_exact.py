@@ -9,7 +9,7 @@ import torch
 from scenelang.graph.chain import Levels
 from scenelang.graph.steps import Affine, Rows, Step, Warp
 from scenelang.lifting.exact import affine_matrix, leaf_vector, lift_colours, lift_many, warp_matrix
-from scenelang.lifting.layout import PLANE_LAYOUT, Layout
+from scenelang.lifting.vector import OTHERS, PLANE_LAYOUT, SOLID_LAYOUT, WIDTH, Layout, Parts
 from scenelang.reference.field import carry_back, distance_scale
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.arrays_torch import TORCH
@@ -44,10 +44,10 @@ def steps_of(levels: Levels) -> tuple[Step, ...]:
 def matrices(levels: Levels, layout: Layout = PLANE_LAYOUT) -> list[np.ndarray]:
     """The matrices of a chain, nearest the leaf first: g = M_n … M_1 leaf_vector(code)."""
     return [
-        *(warp_matrix(w, layout.inner_warps, layout) for w in levels.inner),
-        affine_matrix(levels.middle, layout.middle, layout),
-        *(warp_matrix(w, layout.outer_warps, layout) for w in levels.outer),
-        affine_matrix(levels.affine, layout.frame, layout),
+        *(warp_matrix(w, layout.places.inner, layout) for w in levels.inner),
+        affine_matrix(levels.middle, layout.places.middle, layout),
+        *(warp_matrix(w, layout.places.outer, layout) for w in levels.outer),
+        affine_matrix(levels.affine, layout.places.frame, layout),
     ]
 
 
@@ -153,21 +153,34 @@ def test_lengths_of_chains_do_not_matter() -> None:
 
 
 def test_material_vector_multiplies_the_albedo() -> None:
-    m = lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0]
-    np.testing.assert_allclose(m[8:20].reshape(3, 4) @ [1, 1, 1, 1], (0.2, 0.4, 0.6))
-    np.testing.assert_allclose(m[20:32], np.arange(12.0))
+    parts = PLANE_LAYOUT.unpack(lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0])
+    assert parts.rgb.tolist() == [0.2, 0.4, 0.6]
+    assert parts.material.tolist() == [*range(12)]
+    assert parts.texture.tolist() == [1, 0, 0, 0, 1, 0]
+
+
+@pytest.mark.parametrize("layout", [PLANE_LAYOUT, SOLID_LAYOUT], ids=["plane", "solid"])
+def test_parts_come_out_as_they_went_in_and_share_no_place(layout: Layout) -> None:
+    sizes = [np.arange(WIDTH)[at].shape for at in layout.places]
+    parts = Parts(*[np.random.default_rng(1).random((5, *size)) for size in sizes])
+    packed = layout.pack(5, **parts._asdict())
+    for name, value in layout.unpack(packed)._asdict().items():
+        assert (value == getattr(parts, name)).all(), name
+        assert np.shares_memory(value, packed) or not value.size
+    free = [layout.places.rgb.start + at for at in OTHERS]
+    assert (packed[:, free] == 0).all()
+    used = WIDTH - len(OTHERS) - (layout.dimension == 2)
+    assert np.count_nonzero(packed[0]) == sum(value[0].size for value in parts) == used
 
 
 def test_a_layout_of_space_lifts_as_its_matrices_do() -> None:
     """Frames of three rows of four numbers: the same code, another layout."""
-    layout = Layout(dimension=3, code=4, strengths=3, outer=2, inner=2, texture=6, material=3)
-    assert layout.geometry == 4 + 1 + 12 + 6 + 12 + 6
-    assert layout.geometry + layout.material_code.stop == 62
+    layout = SOLID_LAYOUT
     levels = random_levels(np.random.default_rng(3), 2, 2)
     g = leaf_vector(CODE, layout)
     for matrix in matrices(levels, layout):
         g = matrix @ g
     np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
-    for rows, slot in ((levels.affine, layout.frame), (levels.middle, layout.middle)):
+    for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
         map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
         np.testing.assert_allclose(g[slot].reshape(3, 4) @ map_, np.eye(4)[:3], atol=1e-12)

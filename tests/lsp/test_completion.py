@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from scenelang.models.manifest import available
+from scenelang.words import TEXTURES
 from tests.lsp.client import Client
 from tests.lsp.conftest import SCENE
 
@@ -35,7 +36,7 @@ def test_completion_in_a_material_offers_its_operations(client: Client, uri: str
     found = labels(client, client.at(uri, "{  }", 2))
     assert {"color", "hue", "grayscale", "flip"} <= set(found)
     assert not {"twirl", "square"} & set(found)
-    assert labels(client, client.at(uri, "material flat", 9)) == ["flat"]
+    assert set(labels(client, client.at(uri, "material flat", 9))) == {"flat", *TEXTURES}
 
 
 def test_completion_in_calls_names_arguments_and_values(client: Client, uri: str) -> None:

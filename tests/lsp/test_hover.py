@@ -42,7 +42,7 @@ def test_hover_tells_what_a_model_offers_and_words_mean(client: Client, uri: str
     assert "triangle" in text
     assert "sine" in hover(client, client.at(uri, "sin", 1))
     assert "2π" in hover(client, client.at(uri, "TAU", 1))
-    assert "smallest one" in hover(client, client.at(uri, "model", 1))
+    assert "usual one" in hover(client, client.at(uri, "model", 1))
 
 
 def test_hover_tells_the_stage_unless_a_module_hides_it(client: Client, uri: str) -> None:

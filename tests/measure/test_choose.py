@@ -244,7 +244,7 @@ def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyP
     assert refusal(one, scene, program) is None
     assert refusal(one, scene, program, "other") == "--model other"
     twisted = Scene(nodes=(Object(geometry="square", transforms=(Twist(k=0.3),)),))
-    assert refusal(one, twisted, program) == "has no `twist`"
+    assert refusal(one, twisted, program) == "`twist` leaves the plane"
     assert refusal(one, None, program) is None
     other = replace(program, model="other")
     assert refusal(one, None, other) == "the program was compiled for `other`"
@@ -255,11 +255,13 @@ def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyP
     assert refusal(point("x", 1, 0.1, model="none"), scene, program) == "not installed"
     fixed = replace(load_manifest("shapes2d"), sizes=((64, 64),), white=True)
     monkeypatch.setattr("scenelang.measure.choose.load_manifest", lambda _: fixed)
-    assert refusal(one, scene, program) == "draws 64 x 64 pixels only"
+    assert refusal(one, scene, program) == (
+        "a canvas of 256 x 256 pixels; model `shapes2d` draws only 64 x 64"
+    )
     small = scene.model_copy(update={"canvas": (64, 64)})
     assert refusal(one, small, program) is None
     grey = small.model_copy(update={"background": (0.5, 0.5, 0.5)})
-    assert refusal(one, grey, program) == "draws on white only"
+    assert refusal(one, grey, program) == "model `shapes2d` draws only over white"
 
 
 # ---------------------------------------------------------------- the file

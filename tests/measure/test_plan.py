@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,8 @@ import scenelang as nsg
 from scenelang.backend.neural import draw_program
 from scenelang.cli.main import cli
 from scenelang.graph.nodes import Graph
-from scenelang.measure.plan import choice, drawing_cost, missing, stages, token_counts
+from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
 from scenelang.models.load import load_model
-from scenelang.models.manifest import load_manifest
 from scenelang.passes import PASSES
 from scenelang.program.compile import compile_scene
 from scenelang.renderers.draw import draw
@@ -93,18 +91,13 @@ def test_pixels_that_no_object_reaches_are_not_evaluated() -> None:
 
 def test_the_choice_says_why() -> None:
     free, named = nsg.loads("star { }"), nsg.loads('model "shapes2d"; star { }')
-    assert choice(free, "shapes2d", asked=False)["why"] == "the smallest that has all it uses"
+    assert choice(free, "shapes2d", asked=False)["why"] == "the usual one of its dimension"
     assert choice(named, "shapes2d", asked=False)["why"] == "named by the scene"
     assert choice(named, "shapes2d", asked=True)["why"] == "by --model"
-    assert missing(free, load_manifest("shapes2d")) == []
-    sphere = nsg.Scene(nodes=(nsg.Object("sphere", transforms=(nsg.Twist(k=0.1),)),))
-    assert missing(sphere, load_manifest("shapes2d")) == ["sphere", "twist"]
-    lit = nsg.loads("camera(eye = [0, 1, 4]); sphere { material diffuse; }")
-    assert missing(lit, load_manifest("shapes2d")) == ["camera", "diffuse", "sphere"]
-    small = replace(load_manifest("shapes2d"), sizes=((32, 32),), white=True)
-    assert missing(nsg.loads("canvas(32, 32); star { }"), small) == []
-    other = nsg.loads("canvas(64, 32); background(none); star { }")
-    assert missing(other, small) == ["a canvas of 64 × 32", "a background that is not white"]
+    found = choice(free, "shapes2d", asked=False)
+    assert found["runner_up"] == "shapes2d-w16"
+    assert found["lacking"]["solids3d"] == ["geometry `star` belongs to flat scenes, and this one is solid"]
+    assert "shapes2d-w8" not in found["lacking"]
 
 
 @pytest.mark.parametrize("kind", ["text", "json"])

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import scenelang as nsg
 from lab.docs.make_textures import drawn
 from scenelang.elements.picture import pixels
-from scenelang.models.manifest import ROOT, load_manifest, load_textures
+from scenelang.elements.textures import FILE, load_textures
+from scenelang.words import TEXTURES
 
-MANIFEST = load_manifest("textures2d")
 COLOURS = {
     name: np.frombuffer(pixels(element), np.uint8).reshape(256, 256, 3)
-    for name, element in load_textures(MANIFEST).items()
+    for name, element in load_textures().items()
 }
 
 
@@ -24,8 +25,9 @@ def test_textures_are_drawn_again(name: str) -> None:
 
 def test_most_textures_show_flips_and_turns() -> None:
     """Half of them at least are not themselves mirrored, turned, or mirrored and shifted by half a period."""
-    assert sorted(COLOURS) == list(MANIFEST.textures)
+    assert tuple(sorted(COLOURS)) == TEXTURES
     assert len(COLOURS) == 16
+    assert FILE.stat().st_size < 100_000
     shows = 0
     for colours in COLOURS.values():
         others = [colours[:, ::-1], colours[::-1], colours[::-1, ::-1], np.rot90(colours)]
@@ -39,7 +41,10 @@ def test_most_textures_show_flips_and_turns() -> None:
     assert shows >= 8
 
 
-def test_the_whole_model_is_small() -> None:
-    files = [path for path in (ROOT / "textures2d").iterdir() if path.suffix == ".safetensors"]
-    assert len(files) == 3  # tensors, what is proved of them, textures
-    assert sum(path.stat().st_size for path in files) < 1_000_000
+@pytest.mark.parametrize("shading", ["", "diffuse ", "volumetric "])
+def test_solids_wear_them(shading: str) -> None:
+    text = f"canvas(24, 24); torus {{ rotate(90deg, axis = X); material {shading}checker {{ scale(0.5); }} }}"
+    program = nsg.compile(nsg.loads(text))
+    assert (program.model, [paint.element.name for paint in program.palette]) == ("solids3d", ["checker"])
+    picture, plain = nsg.render(program), nsg.render(nsg.loads(text.replace("scale(0.5);", "")))
+    assert np.abs(np.asarray(picture) - np.asarray(plain)).max() > 0.1

@@ -13,7 +13,7 @@ from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Source
 from scenelang.lifting.exact import affine_matrix
-from scenelang.lifting.layout import PLANE_LAYOUT
+from scenelang.lifting.vector import PLANE_LAYOUT
 from scenelang.models.weights import load_codes
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Place, Program, ProgramError
@@ -45,7 +45,7 @@ def test_a_chain_is_four_rows() -> None:
     assert (program.canvas, program.background, program.model) == ((256, 256), (1, 1, 1), "shapes2d")
     assert program.weights == load_codes("shapes2d").digest
     assert program.places[1] == Place("a.nsg", 3, 10, 3, 18)
-    frame = program.vectors[0, PLANE_LAYOUT.frame].reshape(2, 3)
+    frame = program.vectors[0, PLANE_LAYOUT.places.frame].reshape(2, 3)
     assert frame == pytest.approx(np.array([[1.25, 0, 0.25], [0, 1.25, 0]]))
 
 
@@ -62,8 +62,8 @@ def test_a_row_is_the_product_of_its_matrices() -> None:
             )
         )
     )
-    expected = affine_matrix(rows) @ bare.vectors[0, :32]
-    assert moved.vectors[0, :32] == pytest.approx(expected, abs=1e-6)
+    expected = affine_matrix(rows) @ bare.vectors[0]
+    assert moved.vectors[0] == pytest.approx(expected, abs=1e-6)
     assert tuple(bare.vectors[0, :4]) == pytest.approx(code)
 
 
@@ -150,7 +150,7 @@ def test_models() -> None:
     assert compile_scene(scene, model="shapes2d").model == "shapes2d"
     with pytest.raises(SceneError) as caught:
         compile_scene(scene, model="nosuch")
-    assert caught.value.diagnostics[0].code == "E0210"
+    assert caught.value.diagnostics[0].code == "E0514"
 
 
 def test_compiling_loads_no_torch_and_checking_no_numpy() -> None:

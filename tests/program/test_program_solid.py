@@ -14,7 +14,7 @@ from scenelang.graph.nodes import Fold, Graph, Leaf, Link, Move
 from scenelang.graph.spaces import PLANE, SPACES
 from scenelang.graph.stage import Camera, Light, Stage, read_stage, stage_data
 from scenelang.graph.steps import Displace, Twist, Warp
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import load_codes
 from scenelang.passes import PASSES
@@ -63,11 +63,11 @@ def test_balls_hold_what_a_row_changes() -> None:
 
 def test_widths_stand_in_the_vectors() -> None:
     solid = [Object("sphere"), Object("sphere", (moved(1, 0, 0),), token="smooth", k=0.3)]
-    assert program(graph(solid)).vectors[:, LAYOUTS["solid"].blend].tolist() == [0.0, np.float32(0.3)]
+    assert program(graph(solid)).vectors[:, LAYOUTS[3].places.width].tolist() == [0.0, np.float32(0.3)]
     links = [Link(op, Leaf("square", Look("flat")), k) for op, k in (("union", 0.3), ("smooth", 0.3))]
     flat = Graph(Fold("scene", tuple(links)), (64, 64), None, PLANE)
     wide = emit(flat, load_manifest("shapes2d"), load_codes("shapes2d")).vectors
-    assert wide[:, LAYOUTS["plane"].blend].tolist() == [0.0, np.float32(0.3)]
+    assert wide[:, LAYOUTS[2].places.width].tolist() == [0.0, np.float32(0.3)]
 
 
 def test_files_keep_the_stage() -> None:

@@ -15,7 +15,7 @@ from scenelang.diagnostics.diagnostic import Diagnostics
 from scenelang.elements.zoo import Zoo
 from scenelang.graph.nodes import Graph
 from scenelang.interchange.dumps import dump, graph_data, program_data
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.program.compile import compile_scene
 from scenelang.program.program import Program, program_bytes
 from scenelang.program.reading import parse_program
@@ -32,8 +32,7 @@ def compiled(*materials: nsg.Material, geometry: str = "square", **scene: Any) -
 
 
 def frame_of(program: Program) -> np.ndarray:
-    layout = LAYOUTS["plane" if program.stage is None else "solid"]
-    return program.vectors[0, layout.geometry :][:6].reshape(2, 3)
+    return LAYOUTS[2 if program.stage is None else 3].unpack(program.vectors).texture[0].reshape(2, 3)
 
 
 _number = st.floats(-2, 2).map(lambda v: round(v, 2))
@@ -225,9 +224,9 @@ def test_an_error_says_that_a_scene_is_flat_or_solid() -> None:
     with pytest.raises(nsg.SceneError):
         compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
     (only,) = found
-    assert only.code == "E0508"
-    assert only.message.startswith("`sphere` belongs to solid scenes, `square` to flat ones")
-    assert only.help == "leave out `square` or `sphere`"
+    assert only.code == "E0501"
+    assert only.message == "geometry `square` belongs to flat scenes, and this one is solid"
+    assert only.help == "a scene is flat or solid; model `solids3d` has `sphere`, `torus`"
 
 
 def test_models_of_the_paper_draw_no_textures() -> None:

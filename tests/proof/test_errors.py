@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from lab import errors as lab
+from scenelang.graph.geometries import SECTORS
 from scenelang.models.framed import load_arrays
 from scenelang.models.manifest import load_manifest
 from scenelang.models.weights import ModelError
 from scenelang.proof import errors
 from scenelang.proof.errors import PROVER, Errors, layers_of, load_errors
-from scenelang.reference.field import SECTORS, leaf_distance
+from scenelang.reference.field import leaf_distance
 from scenelang.renderers.network import RADIUS
 from tests.pictures import Array
 

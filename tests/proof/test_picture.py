@@ -37,7 +37,7 @@ def test_no_pixel_breaks_its_proof(name: str) -> None:
     """Scenes of every set and random trees, over backgrounds and none, drawn and redrawn."""
     shares = []
     made = {"blobs": blob_scene, "trees": random_scene}.get(name)
-    sets = sets_of(load_manifest("textures2d" if "texture" in name else "shapes2d"))
+    sets = sets_of(load_manifest("shapes2d"))
     for index, seed in enumerate((7, 19, 24, 36) if made else range(3)):  # the boolean rule refuses others
         scene = made(seed) if made else sets[name](RNG([7, seed]))
         look: dict[str, Any] = {"background": [(0.9, 0.1, 0.4), None][index % 2], "canvas": (77, 59)}

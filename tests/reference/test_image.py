@@ -10,9 +10,10 @@ import pytest
 import scenelang as nsg
 from lab.sets.plane import SETS, random_scene
 from scenelang.diagnostics.diagnostic import Diagnostics
+from scenelang.graph.geometries import SECTORS
 from scenelang.graph.lower import lower
 from scenelang.models.manifest import load_manifest
-from scenelang.reference.field import SECTORS, leaf_distance
+from scenelang.reference.field import leaf_distance
 from scenelang.reference.image import reference_image
 from scenelang.scene.schema import Chain, Color, Grayscale, Hue, Link, Material, Object, Rotate, Scale, Scene
 from tests.reference import oracle

@@ -13,7 +13,8 @@ from scenelang.graph.looks import Look
 from scenelang.graph.nodes import Fold, Leaf, Link, Move, Node
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.lifting.exact import inverse_frame
-from scenelang.lifting.layout import SOLID_LAYOUT as LAYOUT
+from scenelang.lifting.vector import SOLID_LAYOUT as LAYOUT
+from scenelang.lifting.vector import Parts
 from scenelang.models.solid import solid_arrays
 from scenelang.models.weights import shipped_weights
 from scenelang.program.paints import Paint
@@ -74,11 +75,10 @@ def turned(angle: float) -> Affine:
 def vector(o: Object, net: SolidNetwork) -> np.ndarray:
     """The 64 numbers of an object."""
     maps, turns = [np.eye(4)], [[]]  # maps and turns take turns, nearest the leaf first
-    g = np.zeros(LAYOUT.geometry)
-    g[-1] = o.k
+    bulge = 0.0, 0.0
     for step in o.steps:
         if isinstance(step, Displace):
-            g[-3:-1] = step.amount, step.frequency
+            bulge = step.amount, step.frequency
         elif isinstance(step, Affine):
             maps[-1] = np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)]) @ maps[-1]
         else:
@@ -89,20 +89,23 @@ def vector(o: Object, net: SolidNetwork) -> np.ndarray:
             turns[-1].insert(0, slot)
     if len(maps) == 1:
         maps, turns = [np.eye(4), maps[0]], [turns[0], []]
-    middle, last = maps
-    for slots, group in zip(turns, (LAYOUT.inner_warps, LAYOUT.outer_warps), strict=True):
-        flat = np.ravel(slots)
-        g[group.start : group.start + len(flat)] = flat
-    g[: LAYOUT.code] = net.xp.to_numpy(net.codes)[LEAVES.index(o.leaf)]
-    g[LAYOUT.one] = 1.0
-    for frame, matrix in ((LAYOUT.frame, last), (LAYOUT.middle, middle)):
-        g[frame] = inverse_frame(tuple(matrix[:3].ravel().tolist()), 3)
-    m = np.zeros(64 - len(g))
+    middle, last = (inverse_frame(tuple(matrix[:3].ravel().tolist()), 3) for matrix in maps)
+    inner, outer = (np.resize([*np.ravel(slots), *[0.0] * 6], 6) for slots in turns)
     rows = np.reshape(composed(o.texture), (3, 4))[:2, [0, 1, 3]]
-    m[:6] = np.linalg.inv(np.vstack([rows, (0, 0, 1)]))[:2].ravel()
-    m[LAYOUT.colour] = np.column_stack([np.diag(o.rgb), np.zeros(3)]).ravel()
-    m[LAYOUT.material_code] = net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)]
-    return np.concatenate([g, m]).astype(np.float32)
+    parts = Parts(
+        code=net.xp.to_numpy(net.codes)[LEAVES.index(o.leaf)],
+        one=1.0,
+        frame=last,
+        outer=outer,
+        middle=middle,
+        inner=inner,
+        bulge=bulge,
+        width=o.k,
+        texture=np.linalg.inv(np.vstack([rows, (0, 0, 1)]))[:2].ravel(),
+        rgb=o.rgb,
+        material=net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)],
+    )
+    return LAYOUT.pack(1, **parts._asdict())[0].astype(np.float32)
 
 
 def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidField:

@@ -19,7 +19,6 @@ from scenelang.backend import neural
 from scenelang.elements.zoo import Zoo
 from scenelang.models.framed import load_arrays
 from scenelang.models.load import load_model
-from scenelang.models.manifest import load_manifest
 from scenelang.program.groups import read_groups
 from scenelang.program.paints import Paint
 from scenelang.program.program import Program
@@ -71,8 +70,7 @@ def test_draws_what_numpy_draws(name: str) -> None:
 
 def evaluated(name: str, seed: int) -> nsg.Scene:
     """A scene of an evaluation set."""
-    textures = load_manifest("textures2d").textures if SETS[name].textures else ()
-    return random_scene(np.random.default_rng([7, seed]), SETS[name], textures)
+    return random_scene(np.random.default_rng([7, seed]), SETS[name])
 
 
 def test_draws_any_tree() -> None:

@@ -290,7 +290,7 @@ def test_a_tile_is_drawn_again_when_something_comes_near(network, shift: float) 
         (slice(5, 11), (3e-32, 0, 0, 0, 3e-32, 0)),
         (slice(5, 11), (3e-32, 0, 0, 0, 1, 0)),
         (slice(11, 12), 2e31),
-        (slice(44, 45), np.nan),  # a colour that is not a number, of one object among others
+        (slice(45, 46), np.nan),  # a colour that is not a number, of one object among others
         (slice(5, 6), np.nan),
     ],
 )

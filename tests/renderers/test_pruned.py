@@ -16,7 +16,6 @@ from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from scenelang.backend.closed import closed_forms
 from scenelang.elements.zoo import Zoo
 from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import load_manifest
 from scenelang.renderers.coverage import Coverage
 from scenelang.renderers.field import Field
 from scenelang.words import COMBINE
@@ -24,7 +23,6 @@ from tests.elements.shapes import element, noise, square
 from tests.passes.random_scenes import blob_scene
 from tests.passes.random_scenes import random_scene as random_tree
 
-TEXTURES = load_manifest("textures2d").textures
 EGG = element(lambda x, y: np.hypot(x, y / 0.6) - 0.5, "egg", d=2)
 ZOO = nsg.Elements.of("zoo", "zoo.safetensors", Zoo.of([element(square, "tile", d=2), EGG, noise(9, 7)]))
 
@@ -62,7 +60,7 @@ def of_sets(seed: int) -> Iterator[tuple[str, nsg.Scene]]:
         side = 64 if max(config.objects) > 16 else 88
         yield (
             name,
-            random_scene(rng_of(seed, 0), config, TEXTURES if config.textures else ()).sized((side, 80)),
+            random_scene(rng_of(seed, 0), config).sized((side, 80)),
         )
 
 
@@ -88,7 +86,7 @@ def test_nothing_that_shows_is_ruled_out(
     """By the network and, of every other scene, by formulas: true distances' bounds have no slack."""
     met = np.zeros(2)
     for at, (name, scene) in enumerate(kind(seed)):
-        model = "textures2d" if name.startswith("textures") else "shapes2d"
+        model = "shapes2d"
         try:
             p = nsg.compile(scene.model_copy(update={"background": None}), model=model)
         except nsg.SceneError:

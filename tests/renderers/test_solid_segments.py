@@ -12,7 +12,6 @@ from lab.training.checkpoint import save_tensors
 from scenelang.graph.stage import Light, Stage
 from scenelang.graph.steps import Displace, Step, Twist
 from scenelang.models.solid import solid_arrays
-from scenelang.reference.field import TORUS
 from scenelang.renderers.solid import draw
 from scenelang.renderers.solid.draw import draw_solids
 from scenelang.renderers.solid.field import SolidField
@@ -21,6 +20,7 @@ from scenelang.renderers.solid.network import SolidArrays, SolidConfig
 from scenelang.renderers.solid.parameters import Solids
 from tests.renderers.solids import Object, field, moved, network, psnr, scaled, turned, weights
 
+TORUS = 0.7, 0.3  # radii of its circle and of its tube
 LAMP = np.array([1.5, 2.6, 1.8], np.float32)
 PLACE = (scaled(0.6, 0.5, 0.8), turned(0.7), moved(0.2, 0.1, -0.1))
 MIST = Object("torus", PLACE, "volumetric", (0.9, 0.5, 0.2))

@@ -67,7 +67,7 @@ def test_frames_lead_back_step_by_step() -> None:
             rows = np.reshape(step.rows, (3, 4))
             q = np.linalg.solve(rows[:, :3], q - rows[:, 3:])
     net = network()
-    frame = read_solid_frame(vector(Object("torus", steps), net)[: net.layout.geometry])
+    frame = read_solid_frame(vector(Object("torus", steps), net))
     assert frame.local(net.xp, frame.outer(net.xp, p.astype(np.float32))) == pytest.approx(q, abs=1e-4)
     assert frame.scale == pytest.approx(0.7, rel=1e-6)
 

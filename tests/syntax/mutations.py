@@ -21,11 +21,9 @@ from lark.exceptions import LarkError
 from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
 from scenelang.diagnostics.span import SourceFile
 from scenelang.evaluate.evaluation import Source
-from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.syntax import nodes, parse
 from scenelang.syntax.lexer import Report, scan
 from scenelang.syntax.tables import grammar_path, tables
-from tests.models import SOLIDS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -124,12 +122,6 @@ def scenes() -> tuple[Scene, ...]:
         Scene(str(path.relative_to(REPOSITORY)), path.read_text(encoding="utf-8"), path)
         for path in sorted(paths)
     )
-
-
-@cache
-def models() -> tuple[Manifest, ...]:
-    """The shipped model, and one in space that some scenes name."""
-    return load_manifest("shapes2d"), load_manifest("textures2d"), SOLIDS
 
 
 # ---------------------------------------------------------------- making slips
@@ -263,7 +255,7 @@ def check(scene: Scene, text: str) -> tuple[list[Diagnostic], nodes.File, bool]:
     """All diagnostics of a text in a scene's place, its tree, and whether it means a scene."""
     diagnostics = Diagnostics()
     tree = parse(SourceFile(scene.name, text), diagnostics)
-    result, _ = Source(scene.path, tree=tree, models=models()).scene(diagnostics)
+    result, _ = Source(scene.path, tree=tree).scene(diagnostics)
     return list(diagnostics), tree, result is not None
 
 

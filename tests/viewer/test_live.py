@@ -17,7 +17,7 @@ from lab.sets.plane import random_scene as random_set_scene
 from lab.sets.solids import SOLID_SETS, random_solid
 from scenelang.diagnostics.error import SceneError
 from scenelang.diagnostics.span import SourceFile
-from scenelang.lifting.layout import LAYOUTS
+from scenelang.lifting.vector import LAYOUTS
 from scenelang.program.groups import OPERATOR, felt, read_groups, widths_of
 from scenelang.scene.schema import Camera, Scene
 from scenelang.viewer.view import view_of
@@ -107,7 +107,7 @@ def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> No
     ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
     for seed in range(60):
         program = nsg.compile(any_scene(seed))
-        blends = program.vectors[:, LAYOUTS["plane"].blend]
+        blends = program.vectors[:, LAYOUTS[2].places.width]
         known = felt(
             read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
         )

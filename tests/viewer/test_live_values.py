@@ -52,7 +52,7 @@ def evaluated(text: str) -> tuple[Any, Any] | None:
     tree = parse(SourceFile("", f"let v = {text};"), found)
     if found.errors:
         return None
-    evaluation = Source(tree=tree, models=(MODEL,)).evaluation(found)
+    evaluation = Source(tree=tree).evaluation(found)
     evaluation.run(0)
     context, stmt = evaluation.context, tree.statements[0]
     assert isinstance(stmt, nodes.Let)

@@ -37,7 +37,7 @@ from tests.renderers.test_pruned import of_sets, rng_of, wild
 from tests.test_examples import SCENES, sized
 
 LEAST_DB = 45.0
-MODELS = "shapes2d", "shapes2d-w16", "shapes2d-w8", "textures2d"
+MODELS = "shapes2d", "shapes2d-w16", "shapes2d-w8"
 
 ASK = """async ([message, points]) => {
   const view = await readView(JSON.parse(message));
@@ -165,9 +165,8 @@ def test_random_pictures_are_the_networks(page: Any) -> None:
     scenes += [(f"wild {seed}", wild(rng_of(seed, 0)).sized((88, 80))) for seed in range(12)]
     found = {}
     for name, scene in scenes:
-        model = "textures2d" if name.startswith("textures") else "shapes2d"
         try:
-            program = nsg.compile(scene.model_copy(update={"background": None}), model=model)
+            program = nsg.compile(scene.model_copy(update={"background": None}), model="shapes2d")
         except nsg.SceneError:
             continue
         found[name] = compared(page, program)

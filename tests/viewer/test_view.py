@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.lifting.layout import PLANE_LAYOUT, SOLID_LAYOUT
 from scenelang.program.program import Program
 from scenelang.renderers.arrays import NUMPY
 from scenelang.renderers.frames import Frames
@@ -37,10 +36,10 @@ def carried(steps: list[list[float]], p: np.ndarray) -> np.ndarray:
 def leaves(program: Program, points: np.ndarray) -> list[np.ndarray]:
     """Points in each object's leaf, by the renderers' frames."""
     if program.stage is None:
-        frames = Frames(program.vectors[:, : PLANE_LAYOUT.geometry])
+        frames = Frames(program.vectors)
         each = [np.full(points.shape[1], i) for i in range(len(program))]
         return [frames.local(NUMPY, which, points.astype(np.float32)) for which in each]
-    found = [read_solid_frame(v[: SOLID_LAYOUT.geometry]) for v in program.vectors]
+    found = [read_solid_frame(v) for v in program.vectors]
     return [f.local(NUMPY, f.outer(NUMPY, points.astype(np.float32))) for f in found]
 
 

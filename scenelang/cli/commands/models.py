@@ -35,9 +35,10 @@ def command(name: str | None, kind: Literal["human", "json"]) -> None:
             manifest = facts["manifest"]
             click.echo(f"{manifest['name']}  {manifest['dimension']}D  {manifest['summary']}")
         return
-    if name not in known:
-        raise click.UsageError(f"No model `{name}`; there is {', '.join(known)}.")
-    facts = _facts(load_manifest(name))
+    try:
+        facts = _facts(load_manifest(name))
+    except KeyError:
+        raise click.UsageError(f"No model `{name}`; there is {', '.join(known)}.") from None
     click.echo(json.dumps(facts, indent=2) if kind == "json" else _text(facts))
 
 
@@ -55,7 +56,7 @@ def _facts(manifest: Manifest) -> dict[str, Any]:
 def _text(facts: dict[str, Any]) -> str:
     manifest, weights = facts["manifest"], facts["weights"] or {"weights": "missing or damaged"}
     lines = [f"{manifest['name']}: {manifest['summary']}", ""]
-    lines += _tree({k: v for k, v in manifest.items() if v and k not in ("name", "summary", "outlines")}, "")
+    lines += _tree({k: v for k, v in manifest.items() if v and k not in ("name", "summary")}, "")
     return "\n".join([*lines, "", "weights", *_tree(weights, "  ")])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenelang.diagnostics.diagnostic import Edit, Fix
 from scenelang.diagnostics.span import Span
-from scenelang.diagnostics.suggest import did_you_mean, instead, listing
+from scenelang.diagnostics.suggest import did_you_mean, instead
 from scenelang.evaluate.file_context import Action, Place
 from scenelang.evaluate.names import Binding
 from scenelang.evaluate.prepare.blocks import prepare_inner
@@ -26,7 +26,19 @@ from scenelang.evaluate.report.undefined import (
     visible,
 )
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, COMBINE, CONSTANTS, FUNCTIONS, LANGUAGE, NODES, SETTINGS
+from scenelang.words import (
+    ANIMATED,
+    COMBINE,
+    CONSTANTS,
+    FUNCTIONS,
+    GEOMETRIES,
+    LANGUAGE,
+    MATERIALS,
+    NODES,
+    OPERATIONS,
+    SETTINGS,
+    TRANSFORMS,
+)
 
 
 def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
@@ -37,7 +49,7 @@ def prepare_headed(stmt: nodes.Call, place: Place) -> Action | None:
     if name in LANGUAGE:
         return prepare_move(stmt, place)
     if binding is None:
-        if name in place.session.vocabulary.geometries:
+        if name in GEOMETRIES:
             return prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
             if _boolean(stmt) is None:
@@ -98,7 +110,7 @@ def _lacks_module(stmt: nodes.Call, place: Place) -> bool:
 
 def _unknown(stmt: nodes.Call, place: Place) -> None:
     """Report a statement whose name stands for nothing."""
-    name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
+    name, text = stmt.name, stmt.name.text
     if "." in text:
         alias = place.scope.find(text.partition(".")[0])
         if alias is None:
@@ -108,15 +120,7 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
         else:
             wrong_kind(name, alias, place, "an imported file")
         return
-    if words.blind and place.kind in HOLDERS:
-        return  # it may be a geometry of the model that is not at hand
     if report_early(name, place):
-        return
-    owner = words.owner(text)
-    if owner is not None and words.chosen is not None:
-        message = f"geometry `{text}` belongs to model `{owner}`, not `{words.chosen.name}`"
-        help = f"model `{words.chosen.name}` draws {listing(words.geometries)}"
-        place.report.error("E0205", message, name.span, help=help, labels=place.session.model_label())
         return
     if text in FUNCTIONS:
         from scenelang.evaluate.report.advice import material_advice  # only mistakes need it
@@ -132,12 +136,12 @@ def _unknown(stmt: nodes.Call, place: Place) -> None:
 
 def _advice(stmt: nodes.Call, place: Place) -> Advice:
     """What may have been meant by a statement whose name stands for nothing."""
-    name, text, words = stmt.name, stmt.name.text, place.session.vocabulary
+    name, text = stmt.name, stmt.name.text
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
     if fix is None and text.lower() in foreign_words.STATEMENTS:
         help = None  # what is known of a word goes before what is only near
-    if place.kind == "object" and text in words.materials:
+    if place.kind == "object" and text in MATERIALS:
         return _lacks_material(stmt)
     if help is None and place.kind in HOLDERS:
         from scenelang.evaluate.report.advice import in_library  # only mistakes need it
@@ -152,15 +156,15 @@ def _advice(stmt: nodes.Call, place: Place) -> Advice:
         span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign_words.WORDS.get(text, "")
-    if help is None and place.kind == "object" and meant in words.material_ops - words.transforms:
+    if help is None and place.kind == "object" and meant in OPERATIONS.keys() - TRANSFORMS.keys():
         from scenelang.evaluate.report.advice import material_advice
 
         help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
     help = help or foreign_words.STATEMENTS.get(text.lower())
-    if help is None and place.kind in ("file", "group", "chain") and words.geometries:
+    if help is None and place.kind in ("file", "group", "chain"):
         from scenelang.evaluate.report.advice import drawn  # only mistakes need it
 
-        help = drawn(place, words.geometries)
+        help = drawn(place)
     return help, fix
 
 
@@ -178,17 +182,17 @@ def _lacks_material(stmt: nodes.Call) -> Advice:
 
 def _candidates(stmt: nodes.Call, place: Place) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
-    words, kind = place.session.vocabulary, place.kind
+    kind = place.kind
     if kind == "material":
-        return words.material_ops
+        return {*OPERATIONS}
     if kind == "object" and stmt.args is not None:
-        return words.transforms
+        return {*TRANSFORMS}
     names = visible(place, VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    found = words.geometries | names
+    found = {*GEOMETRIES, *names}
     if stmt.body is None:
-        return found if stmt.args is None else found | (words.transforms if kind != "file" else {*SETTINGS})
+        return found if stmt.args is None else found | {*(TRANSFORMS if kind != "file" else SETTINGS)}
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:

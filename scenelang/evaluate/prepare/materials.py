@@ -7,7 +7,6 @@ from typing import Any
 
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.span import Span
-from scenelang.diagnostics.suggest import listing
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.costs import MATERIAL_VALUE
 from scenelang.evaluate.file_context import Action, FileContext, Place
@@ -20,6 +19,7 @@ from scenelang.evaluate.values.value import POISON, MaterialValue, describe
 from scenelang.scene.schema import Material
 from scenelang.scene.spans import Written
 from scenelang.syntax import nodes
+from scenelang.words import GEOMETRIES, MATERIALS, TEXTURES
 
 
 def _stands(
@@ -78,10 +78,9 @@ def _prepare(
 def _called(name: nodes.Name, place: Place) -> str | None:
     """What a Scene calls a material; None after a report."""
     alias, dot, rest = name.text.partition(".")
-    words = place.session.vocabulary
     if not dot:
-        known = words.materials | words.textures
-        if not known or alias in known:
+        known = {*MATERIALS, *TEXTURES}
+        if alias in known:
             return alias
         _unknown(name, place, known)
         return None
@@ -105,13 +104,13 @@ def _called(name: nodes.Name, place: Place) -> str | None:
 
 def _shading(written: nodes.MaterialUse | nodes.MaterialExpr, place: Place) -> str | None:
     """The word before the name, None without one and empty after a report."""
-    word, name, words = written.shading, written.name, place.session.vocabulary
+    word, name = written.shading, written.name
     if word is None:
         return None
-    if words.materials and word.text not in words.materials:
-        _unknown(word, place, words.materials)
+    if word.text not in MATERIALS:
+        _unknown(word, place, {*MATERIALS})
         return ""
-    if name.text in words.materials - words.textures:
+    if name.text in MATERIALS:
         help = f"write material {name.text}"
         place.report.error("E0213", f"`{name.text}` is not a texture", name.span, help=help)
         return ""
@@ -134,18 +133,11 @@ def _operations(body: nodes.Block | None, place: Place) -> Callable[[Env], tuple
 
 
 def _unknown(name: nodes.Name, place: Place, known: set[str]) -> None:
-    """Report a name that no model in use has for a material."""
-    report, words, span = place.report, place.session.vocabulary, name.span
-    binding, owner = place.scope.find(name.text), words.owner(name.text)
-    if words.blind:
-        return
+    """Report a name that no material has."""
+    report, span, binding = place.report, name.span, place.scope.find(name.text)
     if binding is not None and binding.kind in ("let", "argument", "loop"):
         _is_value(name, place)
-    elif owner is not None and words.chosen is not None:
-        message = f"material `{name.text}` belongs to model `{owner}`, not `{words.chosen.name}`"
-        help = f"model `{words.chosen.name}` has {listing(known)}"
-        report.error("E0205", message, span, help=help, labels=place.session.model_label())
-    elif name.text in words.geometries:
+    elif name.text in GEOMETRIES:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
         from scenelang.evaluate.report.advice import unknown_material  # only mistakes need it

@@ -186,7 +186,7 @@ def literal(text: str, file: FileContext) -> Any:
     stmt = tree.statements[0] if len(tree.statements) == 1 else None
     if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
         return None
-    session = Session(Reporter(diagnostics), around.vocabulary, around.expressions, around.statements)
+    session = Session(Reporter(diagnostics), around.expressions, around.statements)
     alone = FileContext(SourceFile("", text), session, file.loader, Defines({}))
     value = prepare(stmt.value, Place(alone, alone.scope, "file")).run([])
     return None if value is POISON or diagnostics.errors else value

@@ -9,7 +9,6 @@ from typing import Any, Final
 from scenelang.diagnostics.diagnostic import Edit, Fix, Label
 from scenelang.diagnostics.fixes import removal
 from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.diagnostics.suggest import did_you_mean, listing
 from scenelang.elements.zoo import Zoo
 from scenelang.evaluate.builder import Builder, make
 from scenelang.evaluate.file_context import Action, FileContext, Place
@@ -77,15 +76,11 @@ def prepare_model(stmt: nodes.Model, place: Place) -> Action | None:
     session, name, span = place.session, stmt.name, stmt.name.span
     if not at_top_level(place, stmt.span, "'model'") or not _once(session, "model", stmt.span):
         return None
-    known = [m.name for m in session.vocabulary.models]
-    if not isinstance(name, nodes.String):
-        if not isinstance(name, nodes.BadExpr):
-            prepare(name, place)
-            session.report.error("E0301", "expected the model's name as a string", span)
-    elif name.value not in known:
-        help, fix = did_you_mean(name.value, known, Span(span.source, span.start + 1, span.end - 1))
-        help = help or f"there is {listing(known)}"
-        session.report.error("E0210", f"unknown model `{name.value}`", span, help=help, fix=fix)
+    if isinstance(name, nodes.String):
+        session.settings.model = name.value
+    elif not isinstance(name, nodes.BadExpr):
+        prepare(name, place)
+        session.report.error("E0301", "expected the model's name as a string", span)
     return None
 
 
@@ -94,10 +89,6 @@ def prepare_setting(stmt: nodes.Call, place: Place) -> Action | None:
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
     if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
-        return None
-    chosen = session.vocabulary.chosen
-    if chosen is not None and (refusal := chosen.refusal(name)):
-        session.report.error(*refusal, span, help="leave it out", labels=session.model_label())
         return None
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")

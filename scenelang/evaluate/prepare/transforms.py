@@ -27,7 +27,7 @@ def prepare_move(stmt: nodes.Call, place: Place) -> Action | None:
     name, report = stmt.name.text, place.report
     given = prepare_arguments(stmt.args, place, name)
     spec = _spec(stmt, place)
-    if spec is None or not _offered(stmt, place):
+    if spec is None:
         return None
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
@@ -74,20 +74,6 @@ def _skim(stmt: nodes.Call, place: Place) -> None:
     """Look through the block of a transform as one of children."""
     if stmt.body is not None and place.kind in ("file", "group", "chain"):
         prepare_inner(stmt.body, place.inner("group"))
-
-
-def _offered(stmt: nodes.Call, place: Place) -> bool:
-    """Whether the models in use have the operation; reports it if not."""
-    name, words = stmt.name.text, place.session.vocabulary
-    known = words.material_ops if place.kind == "material" else words.transforms | words.material_ops
-    if name in known or words.blind:
-        return True
-    owner = words.owner(name)
-    model = f"model `{words.chosen.name}` has" if words.chosen else "the models here have"
-    help = f"model `{owner}` has it" if owner else None
-    labels = place.session.model_label()
-    place.report.error("E0205", f"{model} no transform `{name}`", stmt.name.span, help=help, labels=labels)
-    return False
 
 
 def _action(spec: Spec, bound: Sequence[Given | None], stmt: nodes.Call, place: Place) -> Action:

@@ -14,10 +14,9 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.evaluate.session import Session
 from scenelang.evaluate.values.value import COMPONENTS, Problem
-from scenelang.models.manifest import Manifest
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import STAGE
+from scenelang.words import LEAVES, SHADINGS, STAGE
 
 _MESHES: Final = "learned from a mesh: scenelang learn part.obj -o zoo.safetensors"
 
@@ -57,7 +56,7 @@ def member_advice(name: nodes.Name) -> str | None:
 def in_library(stmt: nodes.Call, place: Place) -> str | None:
     """Help for a statement whose name is that of a shape of the library."""
     shape = foreign_words.SHAPES.get(stmt.name.text.lower())
-    if shape is None or {model.dimension for model in likely_models(place.session, stmt.span.source)} == {3}:
+    if shape is None or likely_dimensions(place.session, stmt.span.source) == (3,):
         return None
     for alias, binding in place.scope.visible():
         value = binding.value
@@ -69,19 +68,19 @@ def in_library(stmt: nodes.Call, place: Place) -> str | None:
 # ---------------------------------------------------------------- the plane or space
 
 
-def likely_models(session: Session, source: SourceFile) -> list[Manifest]:
-    """The models in use of the dimension of what a text draws, of all where nobody can tell."""
-    words, models = session.report.words(source), session.vocabulary.in_use
-    dimensions = {m.dimension for m in models if not words.isdisjoint(m.geometries)}
-    dimensions |= {3} if not words.isdisjoint(STAGE) else set()
-    dimensions |= ({2} if "shapes" in words else set()) | ({3} if "meshes" in words else set())
-    return [m for m in models if m.dimension in dimensions] if len(dimensions) == 1 else [*models]
+def likely_dimensions(session: Session, source: SourceFile) -> tuple[int, ...]:
+    """Dimension of what a text draws; both where nobody can tell."""
+    words = session.report.words(source)
+    likely = {d for d, leaves in LEAVES.items() if not words.isdisjoint(leaves)}
+    likely |= {3} if not words.isdisjoint(STAGE) else set()
+    likely |= ({2} if "shapes" in words else set()) | ({3} if "meshes" in words else set())
+    return (*likely,) if len(likely) == 1 else (*LEAVES,)
 
 
 def material_advice(place: Place, name: str, argument: str = "…") -> str:
     """Text of an operation on a colour, in the material of what a text draws if that is known."""
-    materials = {m.default_material for m in likely_models(place.session, place.file.source)}
-    material = materials.pop() if len(materials) == 1 else None
+    dimensions = likely_dimensions(place.session, place.file.source)
+    material = next(iter(SHADINGS[dimensions[0]])) if len(dimensions) == 1 else None
     written = f"material {material or 'flat'} {{ {name}({argument}); }}"
     return written if material else f"{written}, in space material diffuse"
 
@@ -89,8 +88,8 @@ def material_advice(place: Place, name: str, argument: str = "…") -> str:
 def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
     """Likely meaning of a name in the place of a material."""
     span, lower = name.span, name.text.lower()
-    models = likely_models(place.session, place.file.source)
-    there = known & {look for model in models for look in model.looks} or known
+    likely = likely_dimensions(place.session, place.file.source)
+    there = known.difference(*(SHADINGS[d] for d in SHADINGS.keys() - likely))
     help, fix = did_you_mean(name.text, there, span)
     here = foreign_words.MATERIALS.get(lower)
     if help is None and here in there:
@@ -100,13 +99,10 @@ def unknown_material(name: nodes.Name, place: Place, known: set[str]) -> Advice:
     return help or (here if here and " " in here else f"there is {listing(there)}"), fix
 
 
-def drawn(place: Place, known: set[str]) -> str:
+def drawn(place: Place) -> str:
     """Shapes that can be drawn, in the plane or in space."""
-    models = [m for m in likely_models(place.session, place.file.source) if known.intersection(m.geometries)]
-    spaces = sorted({model.dimension for model in models})
-    said = {n: listing({g for m in models if m.dimension == n for g in m.geometries}) for n in spaces}
+    dimensions = likely_dimensions(place.session, place.file.source)
+    said = {n: listing(LEAVES[n]) for n in dimensions}
     if len(said) == 1:
-        return f"there is {said[spaces[0]]}" + (f", and what is {_MESHES}" if spaces == [3] else "")
-    if not said:
-        return "no model is at hand"
+        return f"there is {said[dimensions[0]]}" + (f", and what is {_MESHES}" if dimensions == (3,) else "")
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"

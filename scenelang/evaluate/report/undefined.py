@@ -14,7 +14,7 @@ from scenelang.evaluate.report import foreign_words
 from scenelang.evaluate.report.reporter import Advice
 from scenelang.scene import library
 from scenelang.syntax import nodes
-from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, TRANSFORMS
+from scenelang.words import ANIMATED, CONSTANTS, FUNCTIONS, GEOMETRIES, MATERIALS, TRANSFORMS
 
 VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
@@ -109,23 +109,23 @@ def unknown(name: nodes.Name, place: Place, call: nodes.CallExpr | None = None) 
 
 def _advice(name: nodes.Name, place: Place, call: nodes.CallExpr | None) -> Advice:
     """What may have been meant by a name in an expression."""
-    text, span, words = name.text, name.span, place.session.vocabulary
+    text, span = name.text, name.span
     lower, source = text.lower(), span.source.text
     dotted = source[span.end : span.end + 1] == "."
     if call and text in foreign_words.FUNCTIONS:
         return foreign_words.FUNCTIONS[text], None
     if call and text in TRANSFORMS:
         return f"transforms are statements of a block: square {{ {call.span.text}; }}", None
-    if text in words.materials:
+    if text in MATERIALS:
         return f"a material is written material {text}" + " { color(…); }" * bool(call), None
-    if text in words.geometries:
+    if text in GEOMETRIES:
         moved = f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}"
         return moved if dotted else f"objects are not values; write module part() {{ {text}; }}", None
     if text in foreign_words.LIBRARIES and dotted:
         prefix = Span(span.source, span.start, span.end + 1)
         return "functions and constants stand alone", Fix(f"remove `{text}.`", (Edit(prefix, ""),))
     before = source[max(0, span.start - 20) : span.start].rstrip()
-    if before.endswith("model") and any(text == model.name for model in words.in_use):
+    if before.endswith("model") and place.scope.find(text) is None:
         return "a model is named by a string", Fix("put quotes around it", (Edit(span, f'"{text}"'),))
     if text in ("x", "y", "z") and before.replace(" ", "").endswith("axis="):
         return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))

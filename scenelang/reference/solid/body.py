@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from scenelang.graph.geometries import GEOMETRIES
 from scenelang.graph.nodes import Leaf
 from scenelang.graph.steps import Affine, Displace, Step, Twist, Warp
-from scenelang.reference.field import TORUS, Array, Brought, carry_back, distance_scale, leaf_distance
+from scenelang.reference.field import Array, Brought, carry_back, distance_scale, leaf_distance
 from scenelang.reference.textures import colour_at
 
 _REACH = 0.15
@@ -188,16 +189,13 @@ class Body:
         points = [p]
         for step in back:
             points.append(step(points[-1]))
-        x, y, z = q = points[-1]
+        q = points[-1]
         if self.geometry in self.brought:
             g = self.brought[self.geometry].slopes(q.T).T
-        elif self.geometry == "sphere":
-            g = q / (length(q) + _TINY)
         else:
-            around = np.sqrt(x * x + z * z) + _TINY
-            ring = around - TORUS[0]
-            tube = np.sqrt(ring * ring + y * y) + _TINY
-            g = np.stack([ring / tube * x / around, y / tube, ring / tube * z / around])
+            slopes = GEOMETRIES[self.geometry].slopes
+            assert slopes is not None
+            g = np.stack(slopes(q)[1:])
         if self.displace:
             f = self.displace.frequency
             (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)

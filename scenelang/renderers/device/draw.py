@@ -172,7 +172,7 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def _cell_at(field: Field) -> int:
     """Place in a row of the kernel at which its cell begins: behind the way to the leaf, scale and colour."""
-    return int(field.layout.inner_warps.stop - field.layout.frame.start + 4)
+    return int(field.layout.geometry - field.layout.places.frame.start + 4)
 
 
 def _rows(field: Field) -> np.ndarray:
@@ -180,7 +180,7 @@ def _rows(field: Field) -> np.ndarray:
     count, layout = len(field.tokens), field.layout
     whole = np.concatenate(
         [
-            field.vectors[:, layout.frame.start : layout.inner_warps.stop],
+            field.vectors[:, layout.places.frame.start : layout.geometry],
             field.frames.scale[:, None],
             field.colours.T,
         ],

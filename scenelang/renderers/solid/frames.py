@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.lifting.layout import SOLID_LAYOUT, Layout
+from scenelang.lifting.vector import SOLID_LAYOUT, Layout
 from scenelang.program.program import ProgramError
 from scenelang.renderers.arrays import Array, Arrays
 from scenelang.renderers.frames import MOST
@@ -148,21 +148,22 @@ class SolidFrame:
 
 
 def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame:
-    """The frame of one geometry vector.
+    """The frame of one vector (64,).
 
     Raises:
         ProgramError: it leads from the world to no leaf, which no compiled scene has.
     """
     g = g.astype(np.float64)
-    if not np.abs(g).max() < MOST:
+    if not np.abs(g[: layout.geometry]).max() < MOST:
         raise ProgramError("a frame beyond float32")
-    last, middle = (_map(g[frame]) for frame in (layout.frame, layout.middle))
-    outer, inner = (_turns(g[group]) for group in (layout.outer_warps, layout.inner_warps))
+    parts = layout.unpack(g)
+    last, middle = _map(parts.frame), _map(parts.middle)
+    outer, inner = _turns(parts.outer), _turns(parts.inner)
     whole = Map(middle.linear @ last.linear, middle.linear @ last.shift + middle.shift)
     stretches = np.linalg.svd(whole.linear, compute_uv=False)
     if not (stretches[2] > 1 / MOST and stretches[0] < MOST):
         raise ProgramError("a frame beyond float32")
-    amount, frequency, blend = g[layout.geometry - 3 : layout.geometry].tolist()
+    (amount, frequency), blend = parts.bulge.tolist(), float(parts.width)
     reach, moved = 1.0, 0.0
     steps: tuple[Turn | Map, ...] = tuple(inner)
     if outer:

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from scenelang.lifting.layout import SOLID_LAYOUT, Layout
+from scenelang.lifting.vector import SOLID_LAYOUT, Layout
 from scenelang.program.groups import SMOOTH, SUBTRACT
 from scenelang.renderers.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
 from scenelang.renderers.network import TOKENS

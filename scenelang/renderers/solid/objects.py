@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenelang.elements.element import Element
+from scenelang.lifting.vector import Parts
 from scenelang.program.groups import OPERATOR, SMOOTH, SUBTRACT, UNION, Floats, read_groups, widths_of
 from scenelang.program.paints import Paint
 from scenelang.renderers.arrays import Array, Smooth
@@ -46,13 +47,14 @@ class Objects:
     ) -> None:
         self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
         none = [None] * len(vectors)
-        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, vectors[:, network.layout.blend])
+        parts = network.layout.unpack(vectors)
+        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
         with self.xp.inference():
             self.solids = read_solids(network, vectors, self.tree, widths)
-            self._tables(vectors)
+            self._tables(parts)
             self._cells(widths)
-            self._textures(vectors[:, network.layout.geometry :], paints or none)
-            self._decoders(vectors, brought or none)
+            self._textures(parts.texture, paints or none)
+            self._decoders(parts.code, brought or none)
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
@@ -75,11 +77,10 @@ class Objects:
         adding = there.any(1) & ~drawn & (cuts % 2 == 0)
         return self.xp.array(adding.astype(np.float32), self.network.codes)
 
-    def _tables(self, vectors: np.ndarray) -> None:
+    def _tables(self, parts: Parts) -> None:
         """What pairs of points and objects look up: arrays (…, N)."""
-        xp, network, layout = self.xp, self.network, self.network.layout
-        m = vectors[:, layout.geometry :]
-        frames, count = [solid.frame for solid in self.solids], len(vectors)
+        xp, network = self.xp, self.network
+        frames, count = [solid.frame for solid in self.solids], len(self.solids)
 
         def table(values: object, *shape: int) -> Array:
             return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
@@ -92,9 +93,8 @@ class Objects:
         self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
         self.far = any(solid.radius > RADIUS for solid in self.solids)
         self.bumpy = any(frame.amount for frame in frames)
-        look = network.look(xp.array(m[:, layout.material_code].copy(), network.codes)).T
-        matrix = table(m[:, layout.colour].T, 3, 4)
-        colour = (matrix[:, :3] * look[:3]).sum(1) + matrix[:, 3]
+        look = network.look(xp.array(parts.material.copy(), network.codes)).T
+        colour = table(parts.rgb.T, 3) * look[:3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
         """Of each object colour and medium (R, N); where some have textures, a plain colour between these."""
 
@@ -119,7 +119,7 @@ class Objects:
             for each in zip(*cells, strict=True)
         ]
 
-    def _textures(self, m: np.ndarray, paints: Sequence[Paint | None]) -> None:
+    def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
         """What objects wear in place of a colour.
 
         In place of a texture's colours theirs is a plain one, unlike any other's, that tells where one
@@ -127,7 +127,7 @@ class Objects:
         """
         xp, like = self.xp, self.network.codes
         worn = {
-            i: Texture(xp, paint, m[i, :6], like, light=True)
+            i: Texture(xp, paint, frames[i], like, light=True)
             for i, paint in enumerate(paints)
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
@@ -141,10 +141,9 @@ class Objects:
             plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
             self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
 
-    def _decoders(self, vectors: np.ndarray, brought: Sequence[Element | None]) -> None:
+    def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
         """What tells distances, and which of them is each object's."""
         xp, network = self.xp, self.network
-        codes = vectors[:, : network.layout.code]
         keys = [
             code.tobytes() if element is None else element
             for code, element in zip(codes, brought, strict=True)

@@ -71,7 +71,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     """
     xp, layout, like = network.xp, network.layout, network.codes
     solids: list[Solid] = []
-    frames = [read_solid_frame(vector[: layout.geometry], layout) for vector in vectors]
+    frames = [read_solid_frame(vector, layout) for vector in vectors]
     deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
     matters, seen = felt(groups, widths), showing(groups)
     # what is taken away says how deep points inside others lie

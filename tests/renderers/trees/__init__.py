@@ -72,7 +72,7 @@ def tree_field(tree: Tree | Sequence[Row], net: SolidNetwork | None = None) -> S
     """The field of a tree, or of its rows."""
     net, stream = net or network(), rows(tree) if isinstance(tree, Tree) else tree
     vectors = np.array([vector(row.o._replace(k=0.0), net) for row in stream])
-    vectors[:, LAYOUT.blend] = [row.k for row in stream]
+    vectors[:, LAYOUT.places.width] = [row.k for row in stream]
     return SolidField(net, vectors, np.array([row.token for row in stream], np.int8))
 
 
