@@ -192,5 +192,5 @@ def paint(
         return draw_small(program, kept=kept, progress=progress, threads=threads, split=split).image
     from scenelang.backend.neural import draw_program, open_model
 
-    model = open_model(program.model, place)
+    model = open_model(program.model, place, program.weights)
     return draw_program(program, model, threads=threads, split=split, kept=kept, progress=progress).image

@@ -135,7 +135,7 @@ def render(
         return draw_small(program, samples=samples, progress=progress, threads=threads, exact=exact).image
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
-    model = open_model(program.model, choose_device(device))
+    model = open_model(program.model, choose_device(device), program.weights)
     return draw_program(program, model, threads=threads, samples=samples, progress=progress).image
 
 

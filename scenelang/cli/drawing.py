@@ -51,7 +51,7 @@ def neural(
                 from scenelang.backend.neural import choose_device, draw_program, open_model
             place = choose_device(device)
             with clock("load model"):
-                model = open_model(job.program.model, place)
+                model = open_model(job.program.model, place, job.program.weights)
             with clock("draw"):
                 drawing = draw_program(
                     job.program, model, threads=threads, samples=samples, progress=progress
