@@ -173,7 +173,7 @@ def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:
 def _last_word(tokens: npt.NDArray[np.int8]) -> str:
     if not tokens.any():
         return "all_union"
-    return COMBINE[tokens[-1] & OPERATOR]
+    return COMBINE[int(tokens[-1]) & OPERATOR]
 
 
 def _summary(cases: list[Case]) -> dict[str, Any]:
