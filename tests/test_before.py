@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,17 @@ def test_pages_of_saved_programs_have_their_weights() -> None:
     assert replaced(old.data["model"]["weights"])
     assert not replaced(new.data["model"]["weights"])
     assert old.blob != new.blob
+
+
+@pytest.mark.parametrize("model", ["solids3d", "shapes2d-streaming"])
+def test_weights_of_another_model_are_refused(model: str, tmp_path: Path) -> None:
+    forged = replace(nsg.load_program(BEFORE / "trees.safetensors"), model=model)
+    forged.save(tmp_path / "forged.safetensors")
+    with pytest.raises(nsg.ProgramError, match="weights of another model"):
+        nsg.load_program(tmp_path / "forged.safetensors")
+    for device in ("auto", "cpu"):
+        with pytest.raises(nsg.RenderError):
+            nsg.render(forged, device=device)
 
 
 @pytest.mark.parametrize("weights", ["", "0" * 64, "..", "../shapes2d"])

@@ -156,12 +156,16 @@ def _count(file: TensorFile) -> int:
 def _shipped(program: Program) -> str:
     """Digest of the weights that ship for a Program: replaced ones where it was compiled for them."""
     from scenelang.models.manifest import available
-    from scenelang.models.weights import load_codes, replaced
+    from scenelang.models.weights import ModelError, load_codes, replaced
 
-    model = program.model
+    model, old = program.model, replaced(program.weights)
     if model not in available():
         raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
     try:
-        return load_codes(model, replaced(program.weights)).digest
+        return load_codes(model, old).digest
+    except ModelError as error:
+        if not old:
+            raise
+        raise ProgramError(f"the program was compiled for weights of another model than `{model}`") from error
     except FileNotFoundError:
         raise ProgramError(f"model `{model}` has no weights here") from None
