@@ -215,7 +215,7 @@ def worst_cases(name: str, count: int, model: str = "shapes2d", folder: str = ""
     """The worst cases of an evaluation: network, exact picture, FLIP map."""
     report = json.loads((DOCS / "results" / folder / f"{name}.json").read_text("utf-8"))
     cases = [
-        Case(c["index"], c["last"], {"psnr": c["psnr"], "flip": c["flip"]}) for c in report["worst_cases"]
+        Case(c["index"], c["last"], 0, {"psnr": c["psnr"], "flip": c["flip"]}) for c in report["worst_cases"]
     ]
     shown = sheet(load_model(model), name, report["seed"], cases[:count]).to_pil()
     shown.thumbnail((1100, 1100))
