@@ -30,8 +30,9 @@ from scenelang.measure.metrics import (
 from scenelang.measure.plan import reference_of
 from scenelang.models.load import Model
 from scenelang.models.manifest import Manifest
+from scenelang.program.groups import OPERATOR
 from scenelang.scene.schema import Scene
-from scenelang.words import TOKENS
+from scenelang.words import COMBINE, TOKENS
 
 SHOWN = 12  # worst cases
 
@@ -173,7 +174,7 @@ def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:
 def _last_word(tokens: npt.NDArray[np.int8]) -> str:
     if not tokens.any():
         return "all_union"
-    return next(word for word, value in TOKENS.items() if value == tokens[-1])
+    return COMBINE[int(tokens[-1]) & OPERATOR]
 
 
 def _summary(cases: list[Case]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import pytest
 import scenelang as nsg
 from scenelang.backend import neural
 from scenelang.backend.options import Device, keep_memory
-from scenelang.models.framed import load_arrays
+from scenelang.models import framed
 from scenelang.renderers.draw import draw
 
 SMALL = "canvas(64, 64);"
@@ -137,8 +137,8 @@ def test_other_weights(device: Device) -> None:
 def test_missing_weights(device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiled = program(SMALL)
     neural._load.cache_clear()
-    load_arrays.cache_clear()
-    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name: tmp_path / "none")
+    framed._load.cache_clear()
+    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name, digest: tmp_path / "none")
     with pytest.raises(nsg.RenderError, match="cannot read the weights"):
         nsg.render(compiled, device=device)
 

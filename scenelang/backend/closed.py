@@ -195,7 +195,7 @@ def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
         RenderError: no formulas do.
     """
     formulas = closed_forms(program.model) if exact else None
-    network, digest = load_arrays(program.model)
+    network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
     return formulas or network
 

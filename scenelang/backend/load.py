@@ -50,7 +50,7 @@ def load_of(program: Program) -> Load:
     if program.stage is not None:
         scale = PROBE / (width * height) ** 0.5
         small = replace(program, canvas=(max(1, round(width * scale)), max(1, round(height * scale))))
-        drawn = draw_objects(load_arrays(program.model).network, small, samples="one")
+        drawn = draw_objects(load_arrays(program.model, program.weights).network, small, samples="one")
         each = drawn.pairs / drawn.met  # of a pixel
         return Load(len(program), width * height, each * width * height, each * min(width, height))
     unit = min(width, height) / 2  # pixels of a world unit

@@ -22,6 +22,7 @@ from scenelang.backend.options import Care, keep_memory, threads_for
 from scenelang.backend.options import usable_cores as usable_cores
 from scenelang.elements.element import credit_of
 from scenelang.models.load import Model, ModelError, Network, load_model, place_of
+from scenelang.models.weights import replaced
 from scenelang.program.program import Program, ProgramError
 from scenelang.renderers.draw import Drawing, Kept, draw_objects
 from scenelang.renderers.framed import Framed
@@ -52,20 +53,26 @@ def choose_device(device: str) -> str:
 
 
 @lru_cache(maxsize=8)
-def _load(name: str, device: str) -> Model:
+def _load(name: str, device: str, weights: str) -> Model:
     keep_memory()
-    return load_model(name, device)
+    return load_model(name, device, weights=weights)
 
 
-def open_model(name: str, device: str = "cpu") -> Model:
+def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
     """A shipped model, loaded once for each process and device.
+
+    Args:
+        name: of the model.
+        device: of torch.
+        weights: SHA-256 of those that a Program was compiled for, hex: where others replaced them since, they
+            are loaded.
 
     Raises:
         RenderError: there is no such model, or its weights are missing or damaged.
     """
     try:
         with _loading:
-            return _load(name, device)
+            return _load(name, device, replaced(weights))
     except KeyError:
         raise RenderError(f"unknown model `{name}`") from None
     except ModelError as error:

@@ -103,7 +103,7 @@ def draw(
         )
     from scenelang.backend.neural import choose_device, draw_program, open_model
 
-    model = open_model(program.model, choose_device(place))
+    model = open_model(program.model, choose_device(place), program.weights)
     return draw_program(
         program, model, threads=how.threads, split=split, kept=kept, progress=progress, **how.care
     )

@@ -47,7 +47,7 @@ def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Ima
             from scenelang.backend.neural import choose_device, open_model
         device = place = choose_device(how.device)
         with clock("load model"):
-            open_model(program.model, device)
+            open_model(program.model, device, program.weights)
     with clock("draw"):
         drawing = draw(program, how, place=device, progress=progress)
     if drawing.work is not None and drawing.work.lost:

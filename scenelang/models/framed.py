@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenelang.models.manifest import Manifest, load_manifest
 from scenelang.models.slopes import load_slopes
-from scenelang.models.weights import ModelError, check_shapes, open_weights, shipped_weights
+from scenelang.models.weights import ModelError, check_shapes, open_weights, replaced, shipped_weights
 from scenelang.renderers.network import FramedArrays, FramedConfig, parameter_shapes
 
 if TYPE_CHECKING:
@@ -61,15 +61,22 @@ def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
     return FramedArrays(config, arrays)
 
 
-@lru_cache(maxsize=8)
-def load_arrays(name: str) -> ArrayModel:
+def load_arrays(name: str, weights: str = "") -> ArrayModel:
     """Load a shipped model.
+
+    Args:
+        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
 
     Raises:
         KeyError: there is no such model.
         ModelError: its weights are missing or damaged.
     """
-    manifest, data = load_manifest(name), shipped_weights(name)
+    return _load(name, replaced(weights))
+
+
+@lru_cache(maxsize=8)
+def _load(name: str, weights: str) -> ArrayModel:
+    manifest, data = load_manifest(name), shipped_weights(name, weights)
     digest = hashlib.sha256(data).hexdigest()
     if manifest.renderer == "solid":
         from scenelang.models.solid import solid_arrays

@@ -121,14 +121,17 @@ _Make = Callable[[dict[str, Any], Manifest, int], Network]
 _MAKERS: dict[str, _Make] = {"framed": _framed, "solid": _solid, "streaming": _streaming, "reading": _reading}
 
 
-def load_model(name: str, device: str = "cpu", path: Path | None = None) -> Model:
+def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
     """Load a shipped model, or one whose weights lie at ``path``.
+
+    Args:
+        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
 
     Raises:
         KeyError: there is no such model.
         ModelError: its weights are missing or damaged.
     """
-    manifest, data = load_manifest(name), shipped_weights(name, path)
+    manifest, data = load_manifest(name), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
     if isinstance(network, Framed):
         host = network.codes.cpu().numpy()

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.files import read_regular
-from scenelang.models.manifest import model_folder
-from scenelang.models.weights import ModelError
+from scenelang.models.weights import ModelError, weights_folder
 from scenelang.renderers.slopes import CELLS, NODE, RADII, STEEP, Slopes
 from scenelang.tensors import TensorError, read_tensors
 
@@ -22,9 +21,9 @@ MOST_BYTES = 1 << 20
 Arrays = dict[str, npt.NDArray[Any]]
 
 
-def slopes_path(name: str) -> Path:
-    """Where the file of a shipped model lies."""
-    return model_folder(name) / "slopes.safetensors"
+def slopes_path(name: str, digest: str = "") -> Path:
+    """File of a shipped model's weights, those of today or those `replaced`."""
+    return weights_folder(name, digest) / "slopes.safetensors"
 
 
 def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:
@@ -58,7 +57,7 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
         ModelError: it is damaged.
     """
     header = {"weights": digest, "node": NODE, "steep": STEEP}
-    arrays = read_proof(slopes_path(name), header, {"cells": (len(codes), len(RADII), CELLS, CELLS)})
+    arrays = read_proof(slopes_path(name, digest), header, {"cells": (len(codes), len(RADII), CELLS, CELLS)})
     if arrays is None:
         return {}
     if (arrays["cells"] < 0).any():

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from scenelang.files import read_regular
-from scenelang.models.manifest import Manifest, load_manifest, model_folder
+from scenelang.models.manifest import ROOT, Manifest, load_manifest, model_folder
 from scenelang.tensors import TensorError, read_tensors
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from scenelang.lifting.learned import Lifting
 
 MOST_BYTES = 64 << 20
+REPLACED: Final = ROOT / "replaced"
+"""Folders of weights that others took the place of, by digest: what was saved draws with them as ever."""
 LIFTING = "lifting."
 """In front of the names of a lifting's tensors, where a file holds it beside a renderer's."""
 
@@ -59,19 +62,29 @@ class Facts:
     training: dict[str, Any]
 
 
-def weights_path(name: str) -> Path:
-    """Where a shipped model's weights lie."""
-    return model_folder(name) / "weights.safetensors"
+def replaced(digest: str) -> str:
+    """The digest of weights that Programs were saved for and that others replaced; of any other, ""."""
+    return digest if digest in os.listdir(REPLACED) else ""
 
 
-def shipped_weights(name: str, path: Path | None = None) -> bytes:
+def weights_folder(name: str, digest: str = "") -> Path:
+    """Folder of a model's weights and of what is proved of them: today's, or those `replaced`, by digest."""
+    return REPLACED / digest if replaced(digest) else model_folder(name)
+
+
+def weights_path(name: str, digest: str = "") -> Path:
+    """File of a shipped model's weights, those of today or those `replaced`."""
+    return weights_folder(name, digest) / "weights.safetensors"
+
+
+def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:
     """The bytes of a shipped model's weights file, or of the one at ``path``; of one too large, the first.
 
     Raises:
         ModelError: it cannot be read.
     """
     try:
-        return read_regular(path or weights_path(name), MOST_BYTES)
+        return read_regular(path or weights_path(name, digest), MOST_BYTES)
     except OSError as error:
         why = (error.strerror or str(error)).lower()
         raise ModelError(f"cannot read the weights of `{name}`: {why}") from error
@@ -121,15 +134,15 @@ def read_facts(name: str) -> Facts:
 
 
 @lru_cache(maxsize=8)
-def load_codes(name: str) -> Codes:
-    """Read the codes of a shipped model.
+def load_codes(name: str, digest: str = "") -> Codes:
+    """Read the codes of a shipped model, of its weights of today or of those `replaced`.
 
     Raises:
         KeyError: there is no such model.
         FileNotFoundError: it has no weights.
         ModelError: its weights are damaged.
     """
-    return codes_of(load_manifest(name), read_regular(weights_path(name), MOST_BYTES))
+    return codes_of(load_manifest(name), read_regular(weights_path(name, digest), MOST_BYTES))
 
 
 def codes_of(manifest: Manifest, data: bytes) -> Codes:

@@ -49,14 +49,14 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
 
     Args:
         path: the file.
-        weights: SHA-256 of the weights it is to be drawn with, hex; by default those shipped for its model.
+        weights: SHA-256 of the weights it is to be drawn with, hex; by default any that ship for its model.
 
     Raises:
         ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
         OSError: the file cannot be read.
     """
     program = parse_program(read_regular(path, MOST_BYTES))
-    program.check_weights(weights if weights is not None else _shipped(program.model))
+    program.check_weights(_shipped(program) if weights is None else weights)
     return program
 
 
@@ -155,13 +155,19 @@ def _count(file: TensorFile) -> int:
     return count
 
 
-def _shipped(model: str) -> str:
-    """Digest of the weights shipped for a model."""
-    from scenelang.models.weights import load_codes
+def _shipped(program: Program) -> str:
+    """Digest of the weights that ship for a Program: replaced ones where it was compiled for them."""
+    from scenelang.models.manifest import ALIASES
+    from scenelang.models.weights import ModelError, load_codes, replaced
 
+    model, old = program.model, replaced(program.weights)
+    if ALIASES.get(model, model) not in available():
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
     try:
-        return load_codes(model).digest
-    except KeyError:
-        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}") from None
+        return load_codes(model, old).digest
+    except ModelError as error:
+        if not old:
+            raise
+        raise ProgramError(f"the program was compiled for weights of another model than `{model}`") from error
     except FileNotFoundError:
         raise ProgramError(f"model `{model}` has no weights here") from None

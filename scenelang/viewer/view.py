@@ -68,7 +68,7 @@ def view_of(
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
     if manifest.lifting != "exact":
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
-    network, digest = load_arrays(program.model)
+    network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
     elements = (*form.shapes, *form.paints) if form else program.elements
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
