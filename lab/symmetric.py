@@ -26,8 +26,8 @@ import numpy.typing as npt
 from safetensors.numpy import save
 
 from scenelang.files import write_whole
+from scenelang.graph.geometries import sector_distance
 from scenelang.models.weights import open_weights, shipped_weights
-from scenelang.reference.field import sector_distance
 from scenelang.renderers.network import RADIUS
 
 Floats = npt.NDArray[np.float64]
