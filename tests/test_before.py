@@ -3,7 +3,7 @@
 `before/api.json` has each public name of that revision and its parameters: ``/x`` by place alone, ``*x`` by
 name alone, ``...x`` and ``***x`` any number, ``x?`` may be left out; null where it was not a call. `render`'s
 ``precision`` went with 8-bit inference, and `Scene.to_python` with the code that it wrote.
-`before/trees.safetensors` is the first of format 4, that of groups. Pictures beside the Programs were drawn by
+`before/trees.safetensors` is the first of format 4, that of groups. Pictures next to them were drawn by
 the weights that they were compiled for.
 """
 

@@ -80,14 +80,14 @@ def enclosed(
         nest = flat_nesting(meetings)
     state = _State.empty(count * nest.levels)
 
-    def pair(turn: Turn, places: Index) -> tuple[Mask, Mask]:
+    def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
         part = turn.part
         own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
         return state.join(places, *own, joins.some(part), turn.fresh)
 
-    def group(top: Index, below: Index, ended: Index) -> tuple[Mask, Mask]:
+    def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
         assert groups is not None
-        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(top), bool))
+        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(ended), bool))
         state.clear(top)
         return joined
 
@@ -113,11 +113,11 @@ class _State(NamedTuple):
     def empty(cls, count: int) -> _State:
         return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
 
-    def at(self, columns: Index) -> tuple[Enclosure, Enclosure]:
+    def at(self, columns: Index | slice) -> tuple[Enclosure, Enclosure]:
         """Return distances and colours in some columns."""
         return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
 
-    def clear(self, columns: Index) -> None:
+    def clear(self, columns: Index | slice) -> None:
         """Empty it in some columns."""
         for side, colour in zip(self.distance, self.colour, strict=True):
             side[columns], colour[:, columns] = NOTHING, 0.0

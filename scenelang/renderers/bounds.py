@@ -77,15 +77,17 @@ def shown(
         fresh = np.concatenate([turn.fresh for turn in nest.turns])
         gates = _Gates.of(cell, distance, given | fresh)
 
-        def pair(turn: Turn, places: Columns) -> tuple[Mask, Mask]:
+        def pair(turn: Turn, places: Columns | slice) -> tuple[Mask, Mask]:
             part = turn.part
             own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
             keeps, hides = state.join(places, own, gates.some(part))
             return keeps, hides | given[part]
 
-        def group(top: Columns, below: Columns, ended: Columns) -> tuple[Mask, Mask]:
+        def group(top: Columns | slice, below: Columns | slice, ended: Columns) -> tuple[Mask, Mask]:
             operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
-            joined = state.join(below, operand, _Gates.of(cells, operand.distance, np.zeros(len(top), bool)))
+            joined = state.join(
+                below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool))
+            )
             state.clear(top, empty)
             return joined
 
@@ -152,12 +154,12 @@ class _State(NamedTuple):
             Interval(*np.zeros((2, 3, count), np.float32)),
         )
 
-    def at(self, columns: Columns) -> _Operand:
+    def at(self, columns: Columns | slice) -> _Operand:
         """Return its distances and colours in some columns, as an operand."""
         parts = ((low[..., columns], high[..., columns]) for low, high in self)
         return _Operand(*(Interval(*part) for part in parts))
 
-    def clear(self, columns: Columns, distance: float) -> None:
+    def clear(self, columns: Columns | slice, distance: float) -> None:
         """Empty it in some columns."""
         for side, colour in zip(self.distance, self.colour, strict=True):
             side[columns], colour[:, columns] = distance, 0.0

@@ -163,8 +163,8 @@ class Nesting(NamedTuple):
         blocks: int,
         shut: Mask,
         opened: Mask,
-        pair: Callable[[Turn, Index], tuple[Mask, Mask]],
-        group: Callable[[Index, Index, Index], tuple[Mask, Mask]],
+        pair: Callable[[Turn, Index | slice], tuple[Mask, Mask]],
+        group: Callable[[Index | slice, Index | slice, Index], tuple[Mask, Mask]],
     ) -> None:
         """Fold pairs and groups; fill in which pairs change nothing or are hidden, and which hide the rest.
 
@@ -177,15 +177,23 @@ class Nesting(NamedTuple):
                 the same.
         """
         done = []  # of groups that ended, round by round: where they join, and what came of it
+        every = np.arange(blocks)
+
+        def places(columns: Index, level: Index) -> Index | slice:
+            first, last = (columns[0], columns[-1]) if len(columns) else (0, -1)
+            if last - first + 1 == len(columns) and (level == level[:1]).all():  # numpy is faster with slices
+                start = int(first + blocks * level[0]) if len(level) else 0
+                return slice(start, start + len(columns))
+            return level * blocks + columns
 
         def close(closings: list[Closing]) -> None:
             for columns, ended, level in closings:
-                top, below = level * blocks + columns, (level - 1) * blocks + columns
+                top, below = places(columns, level), places(columns, level - 1)
                 done.append((top, below, group(top, below, ended)))
 
         for turn in self.turns:
             close(turn.before)
-            shut[turn.part], opened[turn.part] = pair(turn, turn.level * blocks + np.arange(len(turn.level)))
+            shut[turn.part], opened[turn.part] = pair(turn, places(every[: len(turn.level)], turn.level))
             close(turn.after)
         hidden = np.zeros(self.levels * blocks, bool)
 
@@ -197,9 +205,9 @@ class Nesting(NamedTuple):
 
         for part, level, _, before, after in reversed(self.turns):
             reopen(after)
-            places = level * blocks + np.arange(len(level))
-            shut[part] |= hidden[places]
-            hidden[places] |= opened[part]
+            at = places(every[: len(level)], level)
+            shut[part] |= hidden[at]
+            hidden[at] |= opened[part]
             reopen(before)
 
 

@@ -45,7 +45,7 @@ def stars(count: int, tokens: list[int], widths: np.ndarray | None = None) -> Pr
     program = nsg.compile(nsg.loads(text), model="shapes2d", without=("drop_hidden",))
     vectors = program.vectors.copy()
     if widths is not None:
-        vectors[:, Field(NETWORK, vectors, program.tokens).layout.blend] = widths
+        vectors[:, Field(NETWORK, vectors, program.tokens).layout.places.width] = widths
     return replace(program, tokens=np.array(tokens, np.int8), vectors=vectors)
 
 

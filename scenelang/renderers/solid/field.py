@@ -159,7 +159,7 @@ class SolidField(Objects):
         found = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
         if most < 2 or not self.tree.deepest:
             return found
-        places, closings, depth = self._stacks.followed(places, objects, every)
+        places, closings, depth = self._stacks.followed(places, rays, objects, every)
         return found._replace(places=places, closings=closings, depth=depth)
 
     def answer(

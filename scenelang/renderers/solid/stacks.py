@@ -41,16 +41,18 @@ class Stacks:
         self._path = placed(groups.path.T)  # (D, N)
         self._open = placed(there @ bits)
         self._cuts = placed((there & (groups.joins[groups.path] >= SUBTRACT)) @ bits)
+        self._ways = placed(np.unique(groups.path, axis=0, return_inverse=True)[1].reshape(-1))
         self._states = placed(np.array([bin(i).count("1") for i in range(2 << groups.deepest)]))
 
     def followed(
-        self, places: list[Array | None], objects: Array, every: Array
+        self, places: list[Array | None], rays: Array, objects: Array, every: Array
     ) -> tuple[list[Array | None], list[list[Closing]], int]:
         """Follow points through their objects.
 
         Args:
             places: as of `Pairs`, without states.
-            objects: numbers (P,), place by place.
+            rays: numbers of their points (P,), place by place.
+            objects: numbers (P,).
             every: numbers of all points (M,).
 
         Returns:
@@ -58,6 +60,11 @@ class Stacks:
             have at most.
         """
         xp, count = self._xp, len(every)
+        ways, begun = xp.take(self._ways, objects), 0 * every
+        met = count if places[0] is None else len(places[0])
+        xp.put(begun, rays[:met], ways[:met])
+        if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
+            return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
         found: list[Array | None] = []
         closings: list[list[Closing]] = []
         stacks, paths = 0 * every, xp.take(self._path, 0 * every)
