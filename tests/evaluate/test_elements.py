@@ -172,7 +172,7 @@ def test_meshes_that_ship_are_at_hand_everywhere(tmp_path: Path) -> None:
     assert all(element.about["license"] and element.about["source"] for element in program.elements)
     assert sum(len(element.data) for element in program.elements) < 500_000
     with pytest.raises(
-        nsg.RenderError, match=r"`bunny\.obj`, which is not in .* `--originals FOLDER` .*meshes\.py"
+        nsg.RenderError, match=r"`bunny\.obj`, which is not in .* `--originals FOLDER` .*lab docs meshes"
     ):
         nsg.render(scenes[0], backend="reference")
 

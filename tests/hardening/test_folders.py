@@ -108,7 +108,7 @@ def test_an_output_that_is_the_input(scenes: Folder, name: str, link: object) ->
 
 
 @pytest.mark.parametrize(
-    "command", [("convert", "--to", "nsg"), ("convert", "--to", "json"), ("dump",), ("graph", "--to", "dot")]
+    "command", [("convert", "--to", "nsg"), ("convert", "--to", "json"), ("dump",), ("dump", "--format", "dot")]
 )
 @pytest.mark.parametrize("out", ["a.nsg", "./a.nsg", "lib.nsg"])
 def test_outputs_by_the_inputs_own_names(folder: Folder, command: tuple[str, ...], out: str) -> None:

@@ -22,7 +22,7 @@ LONG = {
     "fmt": (("fmt", "--check", "long.nsg"), 1.0),
     "compile": (("compile", "long.nsg", "-o", "out.safetensors"), 1.5),
     "convert": (("convert", "long.nsg", "-o", "out.json"), 1.0),
-    "graph": (("graph", "long.nsg", "-o", "out.dot"), 1.0),
+    "graph": (("dump", "long.nsg", "-o", "out.dot"), 1.0),
     "render": (("render", "many.nsg", "-o", "out.png", "--size", "3000x3000"), 5.0),
     "reference": (
         ("render", "many.nsg", "-o", "out.png", "--size", "2000x2000", "--backend", "reference"),

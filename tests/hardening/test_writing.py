@@ -27,7 +27,7 @@ WRITERS = {
     "convert-nsg": ("convert", "a.nsg", "-o", "{}out.nsg"),
     "schema": ("schema", "-o", "{}out.json"),
     "dump": ("dump", "a.nsg", "-o", "{}out.txt"),
-    "graph": ("graph", "a.nsg", "-o", "{}out.mmd"),
+    "graph": ("dump", "a.nsg", "-o", "{}out.mmd"),
 }
 SCENE = "for (i in 0..<20) { square { scale(0.1); translate(i / 20, 0); } }\n"
 

@@ -195,7 +195,7 @@ def test_diagnostics_are_valid() -> None:
     validator = Draft202012Validator(SCHEMAS["diagnostics"]())
     found = nsg.Diagnostics()
     text = "square { scale(foo); rotate(30); } let a = 1 let b = [; subtract star {} strr {} let a = 2;"
-    for source in (text, 'fn f(x) = f(x); let y = f(1); import "a.nsg" as a;', "chain { subtract star { } }"):
+    for source in ("square { rotate(30); }", text, 'fn f(x) = f(x); let y = f(1); import "a.nsg" as a;', "chain { subtract star { } }"):
         with pytest.raises(nsg.SceneError):
             nsg.loads(source, diagnostics=found)
     data = json.loads(render_json(found))
