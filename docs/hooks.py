@@ -1,6 +1,6 @@
 """What mkdocs does for the site beyond turning ``docs/*.md`` into pages.
 
-- A page for each diagnostic, ``errors/E0401.html``, from ``scenelang/diagnostics/pages/E0401.md``, and the
+- A page for each diagnostic, ``errors/E0401.html``, from ``scenelang/language/pages/E0401.md``, and the
   changelog and the contributors' guide as pages.
 - What each command's ``--help`` says, as a page.
 - The scenes of ``examples/`` as files to download.
@@ -27,14 +27,12 @@ from mkdocs.structure.pages import Page
 
 from lab.docs.blocks import pictured
 from scenelang.cli.main import Commands, cli
-from scenelang.evaluate.evaluation import Source
-from scenelang.viewer.export import viewed
-from scenelang.viewer.page import control_rows
-from scenelang.viewer.page import page as page_of
-from scenelang.viewer.view import View
+from scenelang.language.evaluation import Source
+from scenelang.web.export import View, control_rows, viewed
+from scenelang.web.export import page as page_of
 
 ROOT = Path(__file__).parents[1]
-CODE_PAGES = "scenelang/diagnostics/pages"
+CODE_PAGES = "scenelang/language/pages"
 ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 COMMANDS_PAGE = "commands.md"
 _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")

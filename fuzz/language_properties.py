@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.target import Failure, hold, load_target
 from fuzz.targets.parse import BEYOND
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import loads
-from scenelang.syntax import parse
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import loads
+from scenelang.language.parser import parse
+from scenelang.language.reports import SceneError
 
 # ---------------------------------------------------------------- sentences of the grammar
 
@@ -38,7 +37,7 @@ def _rules() -> dict[str, list[list[str]]]:
     from lark import Lark
     from lark.lexer import PatternStr
 
-    from scenelang.syntax.tables import grammar_path
+    from scenelang.language.tables import grammar_path
 
     lark = Lark(
         grammar_path().read_text(encoding="utf-8"), parser="lalr", lexer="basic", maybe_placeholders=False

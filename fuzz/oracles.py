@@ -9,17 +9,14 @@ from itertools import pairwise
 from typing import Any
 
 from fuzz.target import Failure, hold
-from scenelang.diagnostics import render_machine as machine
-from scenelang.diagnostics import render_text
-from scenelang.diagnostics.diagnostic import Diagnostic
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.pages import CODES
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import program_bytes
-from scenelang.program.reading import parse_program
-from scenelang.scene.schema import Scene
-from scenelang.syntax import nodes
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import parse_program, program_bytes
+from scenelang.language import machine, reports
+from scenelang.language import tree as nodes
+from scenelang.language.diagnostics import Diagnostic, SourceFile, Span
+from scenelang.language.pages import CODES
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
 
 
 def check_tree(tree: nodes.File, source: SourceFile) -> bool:
@@ -85,9 +82,9 @@ def check_compiling(scene: Scene) -> bytes | None:
 
 def check_rendering(found: Sequence[Diagnostic]) -> None:
     """Every format takes the diagnostics, says each once, and lets no text break out of its place."""
-    plain = render_text.render_text(found)
+    plain = reports.render_text(found)
     hold(all(c.isprintable() or c == "\n" for c in plain), "text output has no control characters", plain)
-    coloured = render_text.render_text(found, color=True)
+    coloured = reports.render_text(found, color=True)
     hold("\x1b" not in plain and len(coloured) >= len(plain), "colours only where asked for")
     for name, text in (
         ("json", machine.render_json(found)),

@@ -11,19 +11,17 @@ from random import Random
 from typing import Final
 
 from fuzz import text
+from scenelang.assets.tensors import TensorError
+from scenelang.assets.zoo import read_zoo
 from scenelang.cli.checking import Scenes
 from scenelang.cli.inputs import Request
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render_machine import render_github, render_json, render_sarif
-from scenelang.diagnostics.render_text import render_text
-from scenelang.diagnostics.span import SourceFile
-from scenelang.elements.zoo import read_zoo
-from scenelang.evaluate.evaluation import Source
-from scenelang.evaluate.session import Defines
-from scenelang.formatting import format_text
-from scenelang.program.program import ProgramError
-from scenelang.program.reading import parse_program
-from scenelang.tensors import TensorError
+from scenelang.compiler.program import ProgramError, parse_program
+from scenelang.language.diagnostics import SourceFile
+from scenelang.language.evaluation import Source
+from scenelang.language.formatting import format_text
+from scenelang.language.machine import render_github, render_json, render_sarif
+from scenelang.language.reports import SceneError, render_text
+from scenelang.language.session import Defines
 
 NUMBER: Final = "¤"
 """Stands in a unit for the number of the repetition, so that pieces may differ."""
@@ -105,8 +103,9 @@ def _edit(scene: str) -> None:
     """What an editor asks for when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.lsp import callees, completion, hover, navigation, tokens
-    from scenelang.lsp.workspace import Workspace
+    from scenelang.editors import completion, context, hover, navigation
+    from scenelang.editors import completion as tokens
+    from scenelang.editors.workspace import Workspace
 
     docs = Workspace()
     document = docs.put("untitled:pump", scene, 1)
@@ -121,7 +120,7 @@ def _edit(scene: str) -> None:
     for place in (offset, len(document.text)):
         tokens.semantic_tokens(docs, document)
         completion.complete(docs, document, place, snippets=True)
-        callees.signature_help(docs, document, place)
+        context.signature_help(docs, document, place)
 
 
 def _program(header: str) -> None:

@@ -8,13 +8,13 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from scenelang.evaluate.values.functions import CONSTANTS, FUNCTIONS
-from scenelang.syntax.lexer import FOREIGN, UNIT_ALIASES
-from scenelang.syntax.tables import tables
-from scenelang.words import ANIMATED, LANGUAGE
+from scenelang.language.lexer import FOREIGN, UNIT_ALIASES
+from scenelang.language.tables import tables
+from scenelang.language.values import CONSTANTS, FUNCTIONS
+from scenelang.language.words import ANIMATED, LANGUAGE
 
 ROOT: Final = Path(__file__).resolve().parent.parent
-FOLDERS: Final = ("examples", "examples/lib", "tests/syntax", "tests/evaluate", "tests/conformance/cases")
+FOLDERS: Final = ("examples", "examples/lib", "tests/language", "tests/language", "tests/conformance/cases")
 
 NUMBERS: Final = [
     "0",

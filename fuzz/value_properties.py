@@ -12,17 +12,15 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.oracles import check_diagnostics
 from fuzz.target import hold, load_target
-from scenelang.backend.options import RenderError
-from scenelang.backend.render import render
-from scenelang.diagnostics.diagnostic import Diagnostic, Edit, Fix, Label
-from scenelang.diagnostics.pages import CODES
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.formatting import format_text
-from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.models.weights import load_codes
-from scenelang.program.program import WIDTH, Place, Program, ProgramError, program_bytes
-from scenelang.program.reading import parse_program
-from scenelang.scene.schema import Scene
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.program import WIDTH, Place, Program, ProgramError, parse_program, program_bytes
+from scenelang.compiler.weights import load_codes
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.render import render
+from scenelang.language.diagnostics import Diagnostic, Edit, Fix, Label, SourceFile, Span
+from scenelang.language.formatting import format_text
+from scenelang.language.pages import CODES
+from scenelang.language.scene import Scene
 from tests.strategies import scenes
 
 # ---------------------------------------------------------------- Scenes, Programs, weights, manifests
@@ -112,8 +110,8 @@ def networks_of_any_size_load_as_they_were_saved(data: st.DataObject) -> None:
     import torch
     from safetensors.torch import save
 
-    from scenelang.renderers.framed import Framed
-    from scenelang.renderers.network import FramedConfig
+    from scenelang.drawing.neural.network import FramedConfig
+    from scenelang.drawing.neural.torch_networks import Framed
 
     sizes = {
         name: data.draw(st.integers(1, 6), name)

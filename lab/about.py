@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import torch
 
-from scenelang.files import write_whole
+from scenelang.assets.files import write_whole
 
 Report = Callable[[str, int, int], None]
 """Called with what is measured, how much of it is done, and all."""

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scenelang.measure.metrics import MOST_DB
+from scenelang.drawing.metrics import MOST_DB
 
 INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
 COLUMNS = 3

@@ -16,16 +16,15 @@ import click
 
 from lab import ROOT
 from lab.about import about, write_json
-from scenelang.cli import options
+from scenelang.assets.files import read_regular, write_whole
+from scenelang.cli import inputs
 from scenelang.cli.main import Reporting
-from scenelang.cli.progress import Bar
-from scenelang.cli.say import need_metrics
-from scenelang.files import read_regular, write_whole
+from scenelang.cli.say import Bar, need_metrics
 
 if TYPE_CHECKING:
     from lab.training.config import SolidsConfig
-    from scenelang.measure.frontier import Frontier
-    from scenelang.models.load import Model
+    from scenelang.drawing.neural.load import Model
+    from scenelang.output.frontier import Frontier
 
 SEED, VERIFY_SEED = 2021, 4042  # of measurements; of scenes that promises are verified on
 _FOLDER: Final = click.Path(path_type=Path, file_okay=False)
@@ -89,8 +88,8 @@ def _model_to_measure(name: str, weights: Path | None) -> Model:
     """A shipped model, or one with other weights, on one thread."""
     import torch
 
-    from scenelang.models.load import load_model
-    from scenelang.models.manifest import available
+    from scenelang.compiler.manifest import available
+    from scenelang.drawing.neural.load import load_model
 
     torch.set_num_threads(1)
     _check_names("model", [name], available())
@@ -123,12 +122,12 @@ def command() -> None:
 @_count("--scenes", 1000, 1, 1_000_000, "Number of scenes.")
 @_count("--side", None, 1, 8192, "Shorter side of the canvas in pixels; by default as the set says.")
 @_kept
-@options.originals
+@inputs.originals
 @_seed
 @_out
 @_weights
 @_threads
-@options.cluster
+@inputs.cluster
 def evaluate(
     model: str,
     sets: tuple[str, ...],
@@ -154,8 +153,8 @@ def evaluate(
 
     from lab.evaluate import evaluate_set, sheet
     from lab.sets.scenes import sets_of
-    from scenelang.backend.options import keep_memory
-    from scenelang.elements.zoo import SUFFIX
+    from scenelang.assets.zoo import SUFFIX
+    from scenelang.drawing.how import keep_memory
 
     loaded = _model_to_measure(model, weights)
     known = sets_of(loaded.manifest)
@@ -353,7 +352,7 @@ def frontier(
     With --verify draws other scenes and counts in how many the promised errors of the shipped frontier are
     kept, writes verified.json, and exits with 1 if that is under 95 %.
     """
-    from scenelang.models.manifest import available, load_manifest
+    from scenelang.compiler.manifest import available, load_manifest
 
     if promises is not None and not verify:
         raise click.UsageError("--promises goes with --verify.")
@@ -372,7 +371,7 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int, kept: P
     from lab.frontier.chart import frontier_chart
     from lab.frontier.measure import measure_frontier
     from lab.frontier.page import frontier_page
-    from scenelang.measure.frontier import NAME
+    from scenelang.output.frontier import NAME
 
     with Bar() as bar:
         frontier, pictures, exact = measure_frontier(base, scenes, seed, threads, bar, kept)
@@ -384,7 +383,7 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int, kept: P
 
 def _table(frontier: Frontier) -> str:
     """All points, the fastest first."""
-    from scenelang.measure.frontier import between
+    from scenelang.output.frontier import between
 
     lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
     for p in frontier.points:
@@ -400,7 +399,7 @@ def _verify(
     base: str, out: Path, scenes: int, seed: int | None, promises: Path | None, kept: Path | None
 ) -> bool:
     from lab.frontier.verify import KEPT, verify
-    from scenelang.measure.frontier import MOST_BYTES, Frontier, frontier_path
+    from scenelang.output.frontier import MOST_BYTES, Frontier, frontier_path
 
     path = promises or frontier_path(base)
     try:
@@ -441,7 +440,7 @@ def _verify(
 @click.option(
     "--budget",
     "budget_s",
-    type=options.Real(0, min_open=True),
+    type=inputs.Real(0, min_open=True),
     callback=lambda ctx, param, minutes: math.inf if minutes is None else 60 * minutes,
     metavar="MINUTES",
     help="Stop after this time, with a checkpoint; of long trainings processor time.",
@@ -452,8 +451,8 @@ def _verify(
     metavar="WEIGHTS",
     help="Weights that a long training begins from; their time and curve go on.",
 )
-@options.device
-@options.threads
+@inputs.device
+@inputs.threads
 @click.option(
     "--every",
     type=click.IntRange(1),
@@ -464,7 +463,7 @@ def _verify(
 )
 @click.option(
     "--save-every",
-    type=options.Real(0),
+    type=inputs.Real(0),
     default=60.0,
     show_default=True,
     metavar="SECONDS",
@@ -622,8 +621,8 @@ def _prepare_torch(device: str, threads: int | None) -> str:
     """Set torch up for a long computation; returns the device."""
     import torch
 
-    from scenelang.backend.neural import choose_device
-    from scenelang.backend.options import keep_memory
+    from scenelang.drawing.how import keep_memory
+    from scenelang.drawing.torch_backend import choose_device
 
     keep_memory()
     torch.set_num_threads(threads or 1)
@@ -645,7 +644,7 @@ def _say_begin(model: str, reached: str, done: int, device: str, out: Path) -> N
     "--budget",
     default=0.01,
     show_default=True,
-    type=options.Real(0, min_open=True),
+    type=inputs.Real(0, min_open=True),
     metavar="MINUTES",
     help="Processor time of each training.",
 )

@@ -7,10 +7,10 @@ lies, cell by cell of the disc that the decoder sees, by branch and bound. In a 
 derivatives (`lab.slopes`), and so has e. The mean value theorem makes one of f - e of both. Boxes
 whose interval reaches farther than what was seen in their cell are cut in four.
 
-Within half a sector (`scenelang.graph.geometries.SECTORS`) e is the distance to one segment, with a sign. Its
-gradient is the segment's normal beside the segment. Elsewhere it is the direction from the nearest point. As
-p less its nearest point of a convex set changes by no more than p does, that direction changes by at most
-2 r / (2 d - r) within r of where the distance is d. Where a box meets more half sectors, it may be any's.
+Within half a sector (`SECTORS` of `scenelang.compiler.geometries`) e is the distance to one segment, with a
+sign. Its gradient is the segment's normal beside the segment. Elsewhere it is the direction from the nearest
+point. As p less its nearest point of a convex set changes by no more than p does, that direction changes by at
+most 2 r / (2 d - r) within r of where the distance is d. Where a box meets more half sectors, it may be any's.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ import numpy.typing as npt
 from safetensors.numpy import save
 
 from lab.slopes import Floats, answered, bounded, short
-from scenelang.files import write_whole
-from scenelang.graph.geometries import SECTORS
-from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import load_manifest
-from scenelang.proof.errors import CELLS, errors_path, layers_of
-from scenelang.reference.field import leaf_distance
-from scenelang.renderers.arrays import Layers
-from scenelang.renderers.network import RADIUS, FramedArrays
+from scenelang.assets.files import write_whole
+from scenelang.compiler.geometries import SECTORS
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.arrays import Layers
+from scenelang.drawing.exact.field import leaf_distance
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.network import RADIUS, FramedArrays
+from scenelang.drawing.proof import CELLS, errors_path, layers_of
 
 _FINEST = 1e-6  # leaf units: smaller boxes are not cut
 _UNSEEN = 6e4  # leaf units: a bound of what is beyond the disc

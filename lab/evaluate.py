@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from lab.about import Report, about, silent
 from lab.sets.scenes import draw_scene, scenes_of, spread, summarise
-from scenelang.backend.neural import open_model
-from scenelang.files import write_whole
-from scenelang.image import Image
-from scenelang.measure.metrics import (
+from scenelang.assets.files import write_whole
+from scenelang.compiler.groups import OPERATOR
+from scenelang.compiler.manifest import Manifest
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import (
     MOST_DB,
     UNCAPPED_DB,
     compare,
@@ -27,12 +28,11 @@ from scenelang.measure.metrics import (
     psnr,
     side_by_side,
 )
-from scenelang.measure.plan import reference_of
-from scenelang.models.load import Model
-from scenelang.models.manifest import Manifest
-from scenelang.program.groups import OPERATOR
-from scenelang.scene.schema import Scene
-from scenelang.words import COMBINE, TOKENS
+from scenelang.drawing.neural.load import Model
+from scenelang.drawing.torch_backend import open_model
+from scenelang.language.scene import Scene
+from scenelang.language.words import COMBINE, TOKENS
+from scenelang.output.plan import reference_of
 
 SHOWN = 12  # worst cases
 
@@ -113,7 +113,7 @@ def evaluate_set(
     if cluster is None:
         found: Iterable[Case] = (_case(model, scene_at, index, kept, threads) for index in range(count))
     else:
-        from scenelang.cluster import by_workers
+        from scenelang.output.workers import by_workers
 
         asked = ((index, (model.manifest.name, name, seed, side, index)) for index in range(count))
         found = (result() for _, result in by_workers(cluster, _case_of, asked))

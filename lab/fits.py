@@ -14,16 +14,15 @@ from lab.about import Report, about, silent
 from lab.sets.plane import SETS, Rng, random_scene
 from lab.sets.scenes import interval
 from lab.sets.solids import SOLID_SETS, random_solid
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import loads
-from scenelang.image import Image
-from scenelang.inverse.api import fit
-from scenelang.inverse.fitted import Number
-from scenelang.measure.metrics import over_white, psnr
-from scenelang.measure.plan import reference_of
-from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.records import Record
-from scenelang.scene.text import to_nsg
+from scenelang.assets.records import Record
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import over_white, psnr
+from scenelang.inverse.fit import Number, fit
+from scenelang.language.diagnostics import SourceFile
+from scenelang.language.evaluation import loads
+from scenelang.language.scene_text import to_nsg
+from scenelang.output.plan import reference_of
 
 FAR_DB: Final = 25.0
 """A start's picture is at most so near to the target."""

@@ -11,16 +11,16 @@ from typing import Any
 import torch
 
 from lab.about import about
-from scenelang.backend.neural import open_model
-from scenelang.evaluate.evaluation import load
-from scenelang.graph.nodes import Graph
-from scenelang.measure.metrics import over_white, psnr
-from scenelang.measure.plan import plan_of, reference_of
-from scenelang.models.load import Model
-from scenelang.passes import OPTIONAL
-from scenelang.program.compile import compile_scene
-from scenelang.renderers.draw import draw
-from scenelang.scene.schema import Scene
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.passes import OPTIONAL
+from scenelang.drawing.metrics import over_white, psnr
+from scenelang.drawing.neural.draw import draw
+from scenelang.drawing.neural.load import Model
+from scenelang.drawing.torch_backend import open_model
+from scenelang.language.evaluation import load
+from scenelang.language.scene import Scene
+from scenelang.output.plan import plan_of, reference_of
 
 REPEATS = 2
 

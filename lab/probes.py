@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 
 from lab.sets.plane import SETS, Rng, SetConfig, long_chain, random_object, random_scene
-from scenelang import words
-from scenelang.elements.element import TEXELS
-from scenelang.scene.schema import (
+from scenelang.assets.element import TEXELS
+from scenelang.language import words
+from scenelang.language.scene import (
     Bend,
     Chain,
     Color,
@@ -32,7 +32,7 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
-from scenelang.words import BLEND, Combine
+from scenelang.language.words import BLEND, Combine
 
 LARGE = 3.0  # times the size of the base set's objects
 Base = Callable[..., Scene]

@@ -16,12 +16,12 @@ import numpy.typing as npt
 from lab.about import Report, about, silent
 from lab.sets.scenes import draw_scene, spread
 from lab.solid_probes import shadow
-from scenelang.image import Image
-from scenelang.measure.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
-from scenelang.measure.plan import reference_of
-from scenelang.models.load import Model
-from scenelang.models.manifest import Manifest
-from scenelang.scene.schema import Scene
+from scenelang.compiler.manifest import Manifest
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
+from scenelang.drawing.neural.load import Model
+from scenelang.language.scene import Scene
+from scenelang.output.plan import reference_of
 
 SEEN = 4 / 255  # by how much light has to change where there is a shadow
 LEAST = 0.01  # share of the canvas that is in shadow

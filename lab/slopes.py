@@ -29,12 +29,10 @@ import numpy as np
 import numpy.typing as npt
 from safetensors.numpy import save
 
-from scenelang.files import write_whole
-from scenelang.models.framed import load_arrays
-from scenelang.models.slopes import slopes_path
-from scenelang.renderers.arrays import Layers
-from scenelang.renderers.network import RADIUS, FramedArrays
-from scenelang.renderers.slopes import CELLS, NODE, RADII, STEEP
+from scenelang.assets.files import write_whole
+from scenelang.drawing.arrays import Layers
+from scenelang.drawing.neural.files import load_arrays, slopes_path
+from scenelang.drawing.neural.network import CELLS, NODE, RADII, RADIUS, STEEP, FramedArrays
 
 Floats = npt.NDArray[np.float64]
 ROUNDING = 1e-5  # leaf units: of float32, in which nodes are compared

@@ -13,8 +13,8 @@ import numpy as np
 from lab.probes import Kit, Probe, blends, cell_of, common, rebuilt
 from lab.sets.plane import Rng
 from lab.sets.solids import SOLID_SETS, WARP, random_solid
-from scenelang.graph.geometries import GEOMETRIES
-from scenelang.scene.schema import (
+from scenelang.compiler.geometries import GEOMETRIES
+from scenelang.language.scene import (
     Camera,
     Chain,
     Displace,
@@ -29,7 +29,7 @@ from scenelang.scene.schema import (
     Transform,
     Translate,
 )
-from scenelang.words import BLEND
+from scenelang.language.words import BLEND
 
 BASE = replace(SOLID_SETS["solids3d"], canvas=(64, 64))
 EYE = Camera().eye

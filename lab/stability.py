@@ -23,25 +23,23 @@ from lab.sets.scenes import LEAST_COVER, coverage, sized, spread
 from lab.sets.solids import SIDES
 from lab.sets.solids import WARP as SOLID_WARP
 from lab.solid_probes import SOLIDS
-from scenelang.backend.neural import draw_program
-from scenelang.graph.lower import step_of
-from scenelang.graph.spaces import SPACES
-from scenelang.graph.steps import Affine, Step, Warp
-from scenelang.image import Image
-from scenelang.lifting import exact
-from scenelang.lifting.learned import lift_geometry
-from scenelang.lifting.vector import LAYOUTS
-from scenelang.measure.metrics import flip, psnr
-from scenelang.measure.plan import reference_of
-from scenelang.models.load import Model
-from scenelang.models.manifest import Manifest
-from scenelang.passes import OPTIONAL
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program
-from scenelang.renderers.draw import draw
-from scenelang.renderers.framed import Framed
-from scenelang.renderers.solid.parameters import Solids
-from scenelang.scene.schema import Chain, Object, Scene
+from scenelang.compiler import lifting as exact
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.lifting import LAYOUTS, lift_geometry
+from scenelang.compiler.lower import step_of
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.passes import OPTIONAL
+from scenelang.compiler.program import Program
+from scenelang.compiler.spaces import SPACES
+from scenelang.compiler.steps import Affine, Step, Warp
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import flip, psnr
+from scenelang.drawing.neural.draw import draw
+from scenelang.drawing.neural.load import Model
+from scenelang.drawing.neural.torch_networks import Framed, Solids
+from scenelang.drawing.torch_backend import draw_program
+from scenelang.language.scene import Chain, Object, Scene
+from scenelang.output.plan import reference_of
 
 EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
 FRAMES = 8

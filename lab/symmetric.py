@@ -25,10 +25,10 @@ import numpy as np
 import numpy.typing as npt
 from safetensors.numpy import save
 
-from scenelang.files import write_whole
-from scenelang.graph.geometries import sector_distance
-from scenelang.models.weights import open_weights, shipped_weights
-from scenelang.renderers.network import RADIUS
+from scenelang.assets.files import write_whole
+from scenelang.compiler.geometries import sector_distance
+from scenelang.compiler.weights import open_weights, shipped_weights
+from scenelang.drawing.neural.network import RADIUS
 
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -1,7 +1,7 @@
 """A language for scene graphs and a compiler from it to neural render calls.
 
-The pipeline, in order: ``syntax`` reads text into a tree, ``evaluate`` runs that to concrete nodes,
-``graph`` lowers those, ``passes`` rewrite them, ``program`` makes vectors and tokens, ``renderers`` draw.
+The pipeline, in order: ``language`` reads text and evaluates it to a Scene, ``compiler`` lowers that to a
+graph, rewrites it and lifts it to the vectors and tokens of a Program, ``drawing`` draws.
 
 Importing this package imports nothing else; each name below is fetched when it is first used.
 """
@@ -12,94 +12,90 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from scenelang.animation.api import animate as animate
-    from scenelang.animation.api import render_frames as render_frames
-    from scenelang.animation.timing import FramesError as FramesError
-    from scenelang.backend.options import RenderError as RenderError
-    from scenelang.backend.outputs import render_outputs as render_outputs
-    from scenelang.backend.prove import prove as prove
-    from scenelang.backend.render import render as render
-    from scenelang.diagnostics.diagnostic import Diagnostic as Diagnostic
-    from scenelang.diagnostics.diagnostic import Diagnostics as Diagnostics
-    from scenelang.diagnostics.error import SceneError as SceneError
-    from scenelang.evaluate.evaluation import load as load
-    from scenelang.evaluate.evaluation import loads as loads
-    from scenelang.fitting.api import FitError as FitError
-    from scenelang.fitting.api import learn as learn
-    from scenelang.formatting.format import format_text as format_text
-    from scenelang.image import Image as Image
-    from scenelang.inverse.api import fit as fit
-    from scenelang.inverse.fitted import Fit as Fit
-    from scenelang.measure.metrics import compare as compare
-    from scenelang.notebook import set_notebook as set_notebook
-    from scenelang.outputs import Outputs as Outputs
-    from scenelang.outputs import Proof as Proof
-    from scenelang.program.check import check as check
-    from scenelang.program.check import check_text as check_text
-    from scenelang.program.check import fix_text as fix_text
-    from scenelang.program.compile import compile as compile
-    from scenelang.program.program import Place as Place
-    from scenelang.program.program import Program as Program
-    from scenelang.program.program import ProgramError as ProgramError
-    from scenelang.program.reading import load_program as load_program
-    from scenelang.scene.schema import Animation as Animation
-    from scenelang.scene.schema import Bend as Bend
-    from scenelang.scene.schema import Boolean as Boolean
-    from scenelang.scene.schema import Camera as Camera
-    from scenelang.scene.schema import Chain as Chain
-    from scenelang.scene.schema import Color as Color
-    from scenelang.scene.schema import Displace as Displace
-    from scenelang.scene.schema import Elements as Elements
-    from scenelang.scene.schema import Flip as Flip
-    from scenelang.scene.schema import Grayscale as Grayscale
-    from scenelang.scene.schema import Ground as Ground
-    from scenelang.scene.schema import Group as Group
-    from scenelang.scene.schema import Hue as Hue
-    from scenelang.scene.schema import Light as Light
-    from scenelang.scene.schema import Link as Link
-    from scenelang.scene.schema import Material as Material
-    from scenelang.scene.schema import Matrix as Matrix
-    from scenelang.scene.schema import Object as Object
-    from scenelang.scene.schema import Rotate as Rotate
-    from scenelang.scene.schema import Scale as Scale
-    from scenelang.scene.schema import Scene as Scene
-    from scenelang.scene.schema import Shear as Shear
-    from scenelang.scene.schema import Translate as Translate
-    from scenelang.scene.schema import Twirl as Twirl
-    from scenelang.scene.schema import Twist as Twist
-    from scenelang.scene.schema import load_elements as load_elements
-    from scenelang.sweep.api import render_many as render_many
-    from scenelang.viewer.export import export as export
+    from scenelang.assets.notebook import set_notebook as set_notebook
+    from scenelang.compiler.check import check as check
+    from scenelang.compiler.check import check_text as check_text
+    from scenelang.compiler.check import fix_text as fix_text
+    from scenelang.compiler.compile import compile as compile
+    from scenelang.compiler.program import Place as Place
+    from scenelang.compiler.program import Program as Program
+    from scenelang.compiler.program import ProgramError as ProgramError
+    from scenelang.compiler.program import load_program as load_program
+    from scenelang.drawing.how import RenderError as RenderError
+    from scenelang.drawing.image import Image as Image
+    from scenelang.drawing.image import Outputs as Outputs
+    from scenelang.drawing.image import Proof as Proof
+    from scenelang.drawing.metrics import compare as compare
+    from scenelang.drawing.render import prove as prove
+    from scenelang.drawing.render import render as render
+    from scenelang.drawing.render import render_outputs as render_outputs
+    from scenelang.inverse.fit import Fit as Fit
+    from scenelang.inverse.fit import fit as fit
+    from scenelang.inverse.learn import FitError as FitError
+    from scenelang.inverse.learn import learn as learn
+    from scenelang.language.diagnostics import Diagnostic as Diagnostic
+    from scenelang.language.diagnostics import Diagnostics as Diagnostics
+    from scenelang.language.evaluation import load as load
+    from scenelang.language.evaluation import loads as loads
+    from scenelang.language.formatting import format_text as format_text
+    from scenelang.language.reports import SceneError as SceneError
+    from scenelang.language.scene import Animation as Animation
+    from scenelang.language.scene import Bend as Bend
+    from scenelang.language.scene import Boolean as Boolean
+    from scenelang.language.scene import Camera as Camera
+    from scenelang.language.scene import Chain as Chain
+    from scenelang.language.scene import Color as Color
+    from scenelang.language.scene import Displace as Displace
+    from scenelang.language.scene import Elements as Elements
+    from scenelang.language.scene import Flip as Flip
+    from scenelang.language.scene import Grayscale as Grayscale
+    from scenelang.language.scene import Ground as Ground
+    from scenelang.language.scene import Group as Group
+    from scenelang.language.scene import Hue as Hue
+    from scenelang.language.scene import Light as Light
+    from scenelang.language.scene import Link as Link
+    from scenelang.language.scene import Material as Material
+    from scenelang.language.scene import Matrix as Matrix
+    from scenelang.language.scene import Object as Object
+    from scenelang.language.scene import Rotate as Rotate
+    from scenelang.language.scene import Scale as Scale
+    from scenelang.language.scene import Scene as Scene
+    from scenelang.language.scene import Shear as Shear
+    from scenelang.language.scene import Translate as Translate
+    from scenelang.language.scene import Twirl as Twirl
+    from scenelang.language.scene import Twist as Twist
+    from scenelang.language.scene import load_elements as load_elements
+    from scenelang.output.animate import animate as animate
+    from scenelang.output.animate import render_frames as render_frames
+    from scenelang.output.frames import FramesError as FramesError
+    from scenelang.output.sweep import render_many as render_many
+    from scenelang.web.export import export as export
+
 
 # Module -> public names it defines. A new public name is added here and above.
 _HOME: Final = {
-    "scenelang.animation.api": "animate render_frames",
-    "scenelang.animation.timing": "FramesError",
-    "scenelang.backend.options": "RenderError",
-    "scenelang.backend.outputs": "render_outputs",
-    "scenelang.backend.prove": "prove",
-    "scenelang.backend.render": "render",
-    "scenelang.notebook": "set_notebook",
-    "scenelang.outputs": "Outputs Proof",
-    "scenelang.diagnostics.diagnostic": "Diagnostic Diagnostics",
-    "scenelang.diagnostics.error": "SceneError",
-    "scenelang.evaluate.evaluation": "load loads",
-    "scenelang.fitting.api": "FitError learn",
-    "scenelang.formatting.format": "format_text",
-    "scenelang.image": "Image",
-    "scenelang.inverse.api": "fit",
-    "scenelang.inverse.fitted": "Fit",
-    "scenelang.measure.metrics": "compare",
-    "scenelang.program.check": "check check_text fix_text",
-    "scenelang.program.compile": "compile",
-    "scenelang.program.program": "Place Program ProgramError",
-    "scenelang.program.reading": "load_program",
-    "scenelang.scene.schema": (
-        "Animation Bend Boolean Camera Chain Color Displace Elements Flip Grayscale Ground Group Hue Light "
-        "Link Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist load_elements"
+    "scenelang.assets.notebook": "set_notebook",
+    "scenelang.compiler.check": "check check_text fix_text",
+    "scenelang.compiler.compile": "compile",
+    "scenelang.compiler.program": "load_program Place Program ProgramError",
+    "scenelang.drawing.how": "RenderError",
+    "scenelang.drawing.image": "Image Outputs Proof",
+    "scenelang.drawing.metrics": "compare",
+    "scenelang.drawing.render": "prove render render_outputs",
+    "scenelang.inverse.fit": "fit Fit",
+    "scenelang.inverse.learn": "FitError learn",
+    "scenelang.language.diagnostics": "Diagnostic Diagnostics",
+    "scenelang.language.evaluation": "load loads",
+    "scenelang.language.formatting": "format_text",
+    "scenelang.language.reports": "SceneError",
+    "scenelang.language.scene": (
+        "Animation Bend Boolean Camera Chain Color Displace Elements Flip Grayscale Ground Group Hue "
+        "Light Link load_elements Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist"
     ),
-    "scenelang.sweep.api": "render_many",
-    "scenelang.viewer.export": "export",
+    "scenelang.output.animate": "animate render_frames",
+    "scenelang.output.frames": "FramesError",
+    "scenelang.output.sweep": "render_many",
+    "scenelang.web.export": "export",
 }
 _MODULE: Final = {name: module for module, names in _HOME.items() for name in names.split()}
 

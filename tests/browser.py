@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from scenelang.viewer.script import script
+from scenelang.web.arrays import script
 
 ARGUMENTS = (
     "--headless",

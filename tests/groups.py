@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from scenelang.program.groups import BEGINS, ENDS, OPERATOR, SMOOTH
-from scenelang.reference.field import combine
+from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH
+from scenelang.drawing.exact.field import combine
 
 State = tuple[Any, Any] | None
 """Distances and colours of a fold; None where nothing has been met."""

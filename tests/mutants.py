@@ -44,40 +44,42 @@ HEAVY = (
 )
 
 DRAWING = (
-    "tests/renderers/test_field.py", "tests/renderers/test_framed.py", "tests/lifting/test_exact.py",
-    "tests/renderers/test_cell.py", "tests/animation/test_run.py", "tests/conformance",
+    "tests/drawing/test_field.py", "tests/drawing/test_framed.py", "tests/compiler/test_exact.py",
+    "tests/drawing/test_cell.py", "tests/output/test_run.py", "tests/conformance",
 )  # fmt: skip
 COMPILING = (
-    "tests/graph", "tests/program/test_program_compile.py", "tests/passes/test_flatten.py",
-    "tests/passes/test_check_trained.py", "tests/passes/test_drop_hidden.py",
-    "tests/passes/test_without.py", "tests/passes/test_prove.py", "tests/passes/test_pass_picture.py",
-    "tests/animation/test_clip.py", "tests/conformance",
+    "tests/compiler", "tests/compiler/test_program_compile.py", "tests/compiler/test_flatten.py",
+    "tests/compiler/test_check_trained.py", "tests/compiler/test_drop_hidden.py",
+    "tests/compiler/test_without.py", "tests/compiler/test_prove.py", "tests/compiler/test_pass_picture.py",
+    "tests/output/test_clip.py", "tests/conformance",
 )  # fmt: skip
 SOLIDS = (
-    "tests/backend/test_closed.py", "tests/renderers/test_solids.py", "tests/renderers/trees/test_solid.py",
-    "tests/backend/test_solids.py",
+    "tests/drawing/test_closed.py", "tests/drawing/test_renderers_solids.py",
+    "tests/drawing/trees/test_solid.py", "tests/drawing/test_solids.py",
 )  # fmt: skip
 TREES = (
-    "tests/renderers/test_groups.py", "tests/passes/test_flatten.py", "tests/proof/test_fold.py",
-    "tests/renderers/trees/test_solid.py",
+    "tests/drawing/test_groups.py", "tests/compiler/test_flatten.py", "tests/drawing/test_fold.py",
+    "tests/drawing/trees/test_solid.py",
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
-    "scenelang/renderers/solid/*.py": SOLIDS,
-    "scenelang/reference/solid/*.py": ("tests/backend/test_closed.py", "tests/reference/test_solid.py"),
-    "scenelang/renderers/draw.py": DRAWING,
-    "scenelang/renderers/frame*.py": DRAWING,
-    "scenelang/renderers/coverage.py": DRAWING,
-    "scenelang/renderers/field.py": (*TREES, *DRAWING),
-    "scenelang/renderers/network.py": DRAWING,
-    "scenelang/program/groups.py": TREES,
-    "scenelang/renderers/meetings.py": TREES,
-    "scenelang/lifting/learned.py": (
-        "tests/lifting/test_learned.py",
-        "tests/program/test_program_compile.py",
+    "scenelang/drawing/solid/*.py": SOLIDS,
+    "scenelang/drawing/exact/solid.py": ("tests/drawing/test_closed.py", "tests/drawing/test_solid.py"),
+    "scenelang/drawing/neural/draw.py": DRAWING,
+    "scenelang/drawing/neural/frames.py": DRAWING,
+    "scenelang/drawing/neural/torch_networks.py": DRAWING,
+    "scenelang/drawing/neural/coverage.py": DRAWING,
+    "scenelang/drawing/neural/field.py": (*TREES, *DRAWING),
+    "scenelang/drawing/neural/network.py": DRAWING,
+    "scenelang/compiler/groups.py": TREES,
+    "scenelang/drawing/neural/meetings.py": TREES,
+    "scenelang/compiler/lifting.py": (
+        "tests/compiler/test_exact.py",
+        "tests/compiler/test_learned.py",
+        "tests/compiler/test_program_compile.py",
     ),
-    "scenelang/lifting/[el]*.py": ("tests/lifting/test_exact.py", *DRAWING),
-    "scenelang/passes/[c-p]*.py": COMPILING,
-    "scenelang/graph/[a-cglopst]*.py": COMPILING,
+    "scenelang/compiler/[cgprs][ahetw]*s.py": COMPILING,
+    "scenelang/compiler/lower.py": COMPILING,
+    "scenelang/compiler/chain.py": COMPILING,
 }
 """Files, and the tests that are to notice a change in them, the quickest first."""
 SWAPS = {

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.backend import neural
-from scenelang.backend.options import Device, keep_memory
-from scenelang.models import framed
-from scenelang.renderers.draw import draw
+from scenelang.drawing import torch_backend
+from scenelang.drawing.how import Device, keep_memory
+from scenelang.drawing.neural import files
+from scenelang.drawing.neural.draw import draw
 
 SMALL = "canvas(64, 64);"
 FOUR = """chain {
@@ -79,7 +79,7 @@ def test_pictures_repeat(device: Device) -> None:
 
 
 def test_tiles_do_not_show() -> None:
-    compiled, network = program(FOUR), neural.open_model("shapes2d").network
+    compiled, network = program(FOUR), torch_backend.open_model("shapes2d").network
     arguments = (network, compiled)
     whole = draw(*arguments, tile=1 << 20).image
     for tile in (1, 700, 1 << 12):
@@ -108,9 +108,9 @@ def test_progress_ends_at_1(device: Device) -> None:
 
 def test_models_are_loaded_once() -> None:
     nsg.render(program(SMALL), device="cpu")
-    model = neural.open_model("shapes2d")
+    model = torch_backend.open_model("shapes2d")
     nsg.render(program(SMALL + FOUR), device="cpu")
-    assert neural.open_model("shapes2d") is model
+    assert torch_backend.open_model("shapes2d") is model
 
 
 def test_numbers_that_are_none() -> None:
@@ -136,9 +136,9 @@ def test_other_weights(device: Device) -> None:
 @BOTH
 def test_missing_weights(device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiled = program(SMALL)
-    neural._load.cache_clear()
-    framed._load.cache_clear()
-    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name, digest: tmp_path / "none")
+    torch_backend._load.cache_clear()
+    files._load.cache_clear()
+    monkeypatch.setattr("scenelang.compiler.weights.weights_path", lambda name, digest: tmp_path / "none")
     with pytest.raises(nsg.RenderError, match="cannot read the weights"):
         nsg.render(compiled, device=device)
 

@@ -19,9 +19,9 @@ import PIL.Image as Pillow
 import pytest
 
 import scenelang as nsg
-from scenelang.backend.options import Device
-from scenelang.models.weights import replaced, weights_path
-from scenelang.viewer.view import view_of
+from scenelang.compiler.weights import replaced, weights_path
+from scenelang.drawing.how import Device
+from scenelang.web.export import view_of
 
 BEFORE = Path(__file__).parent / "before"
 API: dict[str, str | None] = json.loads((BEFORE / "api.json").read_text("utf-8"))

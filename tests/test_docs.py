@@ -15,13 +15,12 @@ from pathlib import Path
 import pytest
 
 import scenelang
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Source
-from scenelang.models.manifest import load_manifest
-from scenelang.passes import check_scene
-from scenelang.program.compile import find_model
-from scenelang.words import SOLID_TRANSFORMS, TOKENS, TRANSFORMS
+from scenelang.compiler.compile import find_model
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.passes import check_scene
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source
+from scenelang.language.words import SOLID_TRANSFORMS, TOKENS, TRANSFORMS
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "tests").rglob("*.md")])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.formatting.format import format_text
+from scenelang.language.formatting import format_text
 from tests.pictures import premultiplied, psnr_db
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

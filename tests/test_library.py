@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang import notebook
+from scenelang.assets import notebook
 
 SMALL = (24, 16)
 MOVING = "animate(1, 6); canvas(48, 48); square { scale(0.5); rotate(15deg * frame); }"

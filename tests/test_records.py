@@ -9,9 +9,9 @@ from typing import ClassVar, get_type_hints
 
 import pytest
 
-from scenelang.diagnostics.span import Span
-from scenelang.records import Record
-from scenelang.syntax import nodes
+from scenelang.assets.records import Record
+from scenelang.language import tree
+from scenelang.language.diagnostics import Span
 
 
 class Point(Record):
@@ -79,4 +79,4 @@ def test_one_that_may_change_is_equal_to_itself_alone() -> None:
 
 
 def test_hints_can_be_resolved_in_a_module_of_its_own() -> None:
-    assert get_type_hints(nodes.Name, vars(nodes)) == {"text": str, "span": Span}
+    assert get_type_hints(tree.Name, vars(tree)) == {"text": str, "span": Span}

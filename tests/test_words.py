@@ -8,12 +8,11 @@ from pathlib import Path
 import pytest
 
 from lab.docs.make_words import made
-from scenelang import words
-from scenelang.elements.textures import load_textures
-from scenelang.evaluate.values import functions, transforms
-from scenelang.highlighting.lexer import OPERATORS
-from scenelang.models.manifest import available, load_manifest
-from scenelang.syntax.tables import tables
+from scenelang.assets.textures import load_textures
+from scenelang.compiler.manifest import available, load_manifest
+from scenelang.editors.highlighting import OPERATORS
+from scenelang.language import modifiers, values, words
+from scenelang.language.tables import tables
 
 ROOT = Path(__file__).parents[1]
 
@@ -28,9 +27,9 @@ def test_keywords_and_units_are_those_of_the_grammar() -> None:
 
 
 def test_everything_called_has_a_meaning() -> None:
-    assert functions.FUNCTIONS.keys() == words.FUNCTIONS.keys()
-    assert functions.CONSTANTS.keys() == words.CONSTANTS.keys()
-    assert transforms._BUILDS.keys() == words.TRANSFORMS.keys() | words.OPERATIONS.keys()
+    assert values.FUNCTIONS.keys() == words.FUNCTIONS.keys()
+    assert values.CONSTANTS.keys() == words.CONSTANTS.keys()
+    assert modifiers._BUILDS.keys() == words.TRANSFORMS.keys() | words.OPERATIONS.keys()
     for model in map(load_manifest, available()):
         assert words.LEAVES[model.dimension].keys() >= {*model.geometries}
         assert [*words.SHADINGS[model.dimension]] == [*model.materials]

@@ -21,15 +21,14 @@ from typing import Any, Final
 from fuzz import text
 from fuzz.oracles import check_compiling, check_diagnostics, same
 from fuzz.target import Target, hold, sampled
-from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render_machine import render_json
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate import evaluation as evaluating
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import program_bytes
-from scenelang.scene.schema import Scene
+from scenelang.assets.records import deep_stack
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import program_bytes
+from scenelang.language import evaluation as evaluating
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.machine import render_json
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
 
 SMALL: Final = {
     "MAX_STEPS": 50_000,
@@ -54,7 +53,7 @@ def small_limits() -> Iterator[None]:
     """The evaluator's limits made `SMALL`, in every module that took them."""
     changed: list[tuple[Any, str, Any]] = []
     for name, module in list(sys.modules.items()):
-        if name.startswith("scenelang.evaluate"):
+        if name.startswith("scenelang.language"):
             for limit, value in SMALL.items():
                 if hasattr(module, limit):
                     changed.append((module, limit, getattr(module, limit)))

@@ -9,12 +9,11 @@ from typing import Any
 from fuzz import text
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
-from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile, Span
-from scenelang.formatting import format_text
-from scenelang.syntax import parse
+from scenelang.assets.records import deep_stack
+from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
+from scenelang.language.formatting import format_text
+from scenelang.language.parser import parse
+from scenelang.language.reports import SceneError
 
 _LEXEMES = re.compile(r'"(?:\\.|[^"\\\n])*"|(//[^\n]*|/\*[\s\S]*?\*/)')
 

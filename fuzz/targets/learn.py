@@ -11,10 +11,10 @@ from PIL import Image
 
 from fuzz import trees
 from fuzz.target import Target, hold
-from scenelang.elements.zoo import read_zoo
-from scenelang.fitting.making import make
-from scenelang.fitting.mesh import FitError
-from scenelang.fitting.parts import MOST_OF
+from scenelang.assets.zoo import read_zoo
+from scenelang.drawing.exact.mesh import FitError
+from scenelang.drawing.exact.originals import MOST_OF
+from scenelang.inverse.learn import make
 
 KINDS = tuple(MOST_OF)
 

@@ -10,12 +10,11 @@ from lark.exceptions import LarkError
 from fuzz import text
 from fuzz.oracles import check_diagnostics, check_tree, same
 from fuzz.target import Target, hold, sampled
-from scenelang.deep import deep_stack
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.span import SourceFile
-from scenelang.syntax import parse
-from scenelang.syntax.lexer import MAX_MISTAKES
-from scenelang.syntax.tables import grammar_path
+from scenelang.assets.records import deep_stack
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.lexer import MAX_MISTAKES
+from scenelang.language.parser import parse
+from scenelang.language.tables import grammar_path
 
 MOST_FOR_LARK = 400
 """Characters of a text that Lark is asked about, too: it is slow."""

@@ -10,13 +10,12 @@ import numpy as np
 
 from fuzz import tensors, text
 from fuzz.target import Target, hold
-from scenelang.backend.options import RenderError
-from scenelang.backend.render import render
-from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import loads
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program, ProgramError, program_bytes
-from scenelang.program.reading import parse_program
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import Program, ProgramError, parse_program, program_bytes
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.render import render
+from scenelang.language.evaluation import loads
+from scenelang.language.reports import SceneError
 
 SIDE_PX = 12
 MOST_DRAWN = 40

@@ -9,13 +9,13 @@ from typing import Any
 from fuzz import text, trees
 from fuzz.oracles import check_compiling, check_diagnostics
 from fuzz.target import Failure, Target, hold
-from scenelang.deep import deep_stack
-from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import loads
-from scenelang.models.manifest import available, load_manifest
-from scenelang.scene.json import to_readable_json
-from scenelang.scene.schema import Scene
-from scenelang.words import OPERATIONS, TRANSFORMS
+from scenelang.assets.records import deep_stack
+from scenelang.compiler.manifest import available, load_manifest
+from scenelang.language.evaluation import loads
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
+from scenelang.language.scene_json import to_readable_json
+from scenelang.language.words import OPERATIONS, TRANSFORMS
 
 
 def check(data: bytes) -> None:

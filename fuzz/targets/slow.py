@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 from fuzz import pumps, text
 from fuzz.target import Target, hold
-from scenelang.evaluate.report import reporter
+from scenelang.language import reporter
 from tests.work import lines_run
 
 LETTERS: Final = 600

@@ -18,20 +18,19 @@ from safetensors.torch import save
 from fuzz import tensors, trees
 from fuzz.oracles import check_diagnostics
 from fuzz.target import Target, hold
-from scenelang.backend.neural import draw_program
-from scenelang.backend.options import RenderError
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Source, loads
-from scenelang.models import weights
-from scenelang.models.load import Model, load_network
-from scenelang.models.manifest import ROOT, Manifest, load_manifest
-from scenelang.models.weights import ModelError, codes_of, open_weights, read_facts
-from scenelang.passes import check_scene
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import ProgramError
-from scenelang.renderers.framed import Framed
+from scenelang.compiler import weights
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import ROOT, Manifest, load_manifest
+from scenelang.compiler.passes import check_scene
+from scenelang.compiler.program import ProgramError
+from scenelang.compiler.weights import ModelError, codes_of, open_weights, read_facts
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.neural.load import Model, load_network
+from scenelang.drawing.neural.torch_networks import Framed
+from scenelang.drawing.torch_backend import draw_program
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source, loads
+from scenelang.language.reports import SceneError
 
 MODEL = "shapes2d"
 SCENE = """canvas(8, 6);
@@ -126,8 +125,8 @@ def _manifest() -> bytes:
 @cache
 def _small() -> bytes:
     """A network of the smallest sizes, so that most of a file is header."""
-    from scenelang.renderers.framed import Framed
-    from scenelang.renderers.network import FramedConfig
+    from scenelang.drawing.neural.network import FramedConfig
+    from scenelang.drawing.neural.torch_networks import Framed
 
     config = FramedConfig(decoder_width=2)
     with torch.random.fork_rng(devices=[]):

@@ -7,11 +7,11 @@ from functools import cache
 
 from fuzz import tensors
 from fuzz.target import Target, hold
-from scenelang.backend.thumbnail import thumbnail
-from scenelang.elements.groups import Part
-from scenelang.elements.zoo import read_zoo, zoo_bytes
-from scenelang.tensors import TensorError
-from tests.elements.shapes import ball, element, noise, square, torus
+from scenelang.assets.element import Part
+from scenelang.assets.tensors import TensorError
+from scenelang.assets.zoo import read_zoo, zoo_bytes
+from scenelang.drawing.small import thumbnail
+from tests.assets.shapes import ball, element, noise, square, torus
 
 SIDE_PX = 12
 MOST_DRAWN = 30_000

@@ -20,7 +20,7 @@ KINDS = ("flat", "composites", "nested")
 
 def scene_of(kind: str, count: int):
     """A scene of ``count`` objects: in a row, in pairs of pentagon - star on a grid, or 100 groups deep."""
-    from scenelang.scene import schema
+    from scenelang.language import scene as schema
 
     rng = random.Random(1)
     side = max(1, int((count / 2) ** 0.5 + 1))
@@ -57,11 +57,11 @@ def scene_of(kind: str, count: int):
 
 def measure(kind: str, count: int) -> dict[str, float | int | str]:
     """Seconds of the passes and of the whole compilation, best of three, and the growth of memory."""
-    from scenelang.diagnostics.diagnostic import Diagnostics
-    from scenelang.models.manifest import load_manifest
-    from scenelang.passes import check_scene
-    from scenelang.program.compile import compile_scene
-    from scenelang.program.program import program_bytes
+    from scenelang.compiler.compile import compile_scene
+    from scenelang.compiler.manifest import load_manifest
+    from scenelang.compiler.passes import check_scene
+    from scenelang.compiler.program import program_bytes
+    from scenelang.language.diagnostics import Diagnostics
 
     manifest = load_manifest("shapes2d")
     scene = scene_of(kind, count)

@@ -18,10 +18,10 @@ import numpy as np
 import torch
 
 from lab.bench.floor import SCENES, model_of, programs
-from scenelang.models.framed import load_arrays
-from scenelang.models.load import load_model
-from scenelang.renderers.device import draw as device
-from scenelang.renderers.draw import draw_objects
+from scenelang.drawing.neural import device
+from scenelang.drawing.neural.draw import draw_objects
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.load import load_model
 
 HERE = torch.cuda.is_available()
 LAUNCH = device.launch

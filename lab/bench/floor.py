@@ -34,10 +34,10 @@ from lab import ROOT
 from lab.about import about, write_json
 from lab.sets.plane import SETS, random_scene
 from lab.sets.solids import SOLID_SETS, random_solid
-from scenelang.backend.options import keep_memory
-from scenelang.models.framed import load_arrays
-from scenelang.program.program import Program
-from scenelang.renderers.draw import draw_objects
+from scenelang.compiler.program import Program
+from scenelang.drawing.how import keep_memory
+from scenelang.drawing.neural.draw import draw_objects
+from scenelang.drawing.neural.files import load_arrays
 
 ROUNDS = 5  # of which the least counts: others interrupt
 Rival = Callable[[int], "Frame"]
@@ -127,14 +127,14 @@ def network(library: str, model: str) -> Any:
     """What draws, on one core."""
     keep_memory()
     if library == "exact":
-        from scenelang.backend.closed import closed_forms
+        from scenelang.drawing.closed import closed_forms
 
         return closed_forms(model)
     if library == "numpy":
         return load_arrays(model).network
     import torch
 
-    from scenelang.models.load import load_model
+    from scenelang.drawing.neural.load import load_model
 
     torch.set_num_threads(1)
     return load_model(model).network

@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterator
 from itertools import islice
 
-from tests.lsp.client import Client
+from tests.editors.client import Client
 
 TYPED = "star { scale(0.25); rotate(30deg); translate(0.1, 0.2); material flat { color(#d33); } }\n"
 DEBOUNCE_MS = 50

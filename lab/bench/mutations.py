@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from tests.syntax.mutations import (
+from tests.language.mutations import (
     KINDS,
     Outcome,
     Tally,

@@ -25,17 +25,14 @@ import numpy as np
 from lab.about import about, write_json
 from lab.sets.plane import SETS
 from lab.sets.scenes import interval, sets_of
-from scenelang.backend.options import keep_memory
-from scenelang.backend.small import draw_small
-from scenelang.graph.nodes import Graph
-from scenelang.models.manifest import load_manifest
-from scenelang.outputs import PROVED
-from scenelang.program.compile import compile_scene
-from scenelang.proof.fold import Enclosure
-from scenelang.proof.picture import known_errors, prove_image
-from scenelang.proof.regions import Band
-from scenelang.proof.stream import Stream
-from scenelang.reference.image import reference_image
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.how import keep_memory
+from scenelang.drawing.image import PROVED
+from scenelang.drawing.proof import Band, Enclosure, Stream, known_errors, prove_image
+from scenelang.drawing.small import draw_small
 
 ROUNDS = 3
 

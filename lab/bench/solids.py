@@ -31,23 +31,22 @@ import numpy as np
 from lab.about import about, write_json
 from lab.frontier.measure import machine
 from lab.sets.scenes import interval, scenes_of
-from scenelang.backend.closed import closed_forms
-from scenelang.backend.neural import open_model
-from scenelang.backend.options import Samples, keep_memory
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
-from scenelang.graph.nodes import Fold, Graph
-from scenelang.image import encoded
-from scenelang.measure.metrics import UNCAPPED_DB, flip, over_white, psnr
-from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import load_manifest
-from scenelang.models.solid import solid_arrays
-from scenelang.models.weights import Codes, codes_of
-from scenelang.program.compile import compile_scene
-from scenelang.reference.image import reference_image
-from scenelang.renderers.draw import draw_objects
-from scenelang.scene.schema import Scene
-from tests.reference import mitsuba_scenes, povray
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.graph import Fold, Graph
+from scenelang.compiler.lower import lower
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.weights import Codes, codes_of
+from scenelang.drawing.closed import closed_forms
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.how import Samples, keep_memory
+from scenelang.drawing.image import encoded
+from scenelang.drawing.metrics import UNCAPPED_DB, flip, over_white, psnr
+from scenelang.drawing.neural.draw import draw_objects
+from scenelang.drawing.neural.files import load_arrays, solid_arrays
+from scenelang.drawing.torch_backend import open_model
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.scene import Scene
+from tests.drawing import mitsuba_scenes, povray
 
 MODEL, SIDE, SEED = "solids3d", 256, 2021
 SETS = {"diffuse": 4, "solids3d": 10}  # and how many of their scenes

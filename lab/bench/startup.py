@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from scenelang.formatting import format_text
+from scenelang.language.formatting import format_text
 
 CHECK_LIMIT_S = 0.25
 CHECK_LIMIT = 1.4  # of what it cannot do without: click, and one pydantic model

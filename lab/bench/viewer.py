@@ -21,8 +21,8 @@ import scenelang as nsg
 from lab import ROOT
 from lab.about import about, write_json
 from lab.bench.floor import stars
-from scenelang.viewer.script import script
-from scenelang.viewer.view import view_of
+from scenelang.web.arrays import script
+from scenelang.web.export import view_of
 from tests.browser import ARGUMENTS, NAMES
 
 EXAMPLES = ROOT / "examples"

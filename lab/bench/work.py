@@ -1,4 +1,4 @@
-"""How near what `scenelang.backend.small` foretells of a frame comes, and the numbers that come nearest.
+"""How near what `scenelang.drawing.small` foretells of a frame comes, and the numbers that come nearest.
 
     python -m lab bench work [--share S]
 
@@ -19,11 +19,10 @@ import scenelang as nsg
 from lab import ROOT
 from lab.bench.floor import of_set, stars
 from lab.frontier.fit import fit_cost
-from scenelang.backend.load import load_of
-from scenelang.backend.options import Samples
-from scenelang.backend.small import _NS, _SHARES, draw_small, work_ms
-from scenelang.measure.choose import UNITS
-from scenelang.program.program import Program
+from scenelang.compiler.program import Program
+from scenelang.drawing.how import Samples
+from scenelang.drawing.small import _NS, _SHARES, draw_small, load_of, work_ms
+from scenelang.output.frontier import UNITS
 
 EXAMPLES = ROOT / "examples"
 CANVASES = (64, 64), (160, 120), (256, 256), (600, 400)

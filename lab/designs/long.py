@@ -41,10 +41,10 @@ from lab.designs.students import (
 from lab.designs.windows import draw, grid, maps, prefixes, windows
 from lab.training.checkpoint import check_config, load_tensors, pack_training, save_tensors, unpack_training
 from lab.training.config import config_data
-from scenelang.files import read_regular
-from scenelang.models.load import RENDERER, Model, load_network
-from scenelang.models.manifest import load_manifest
-from scenelang.models.weights import MOST_BYTES, codes_of, open_weights
+from scenelang.assets.files import read_regular
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.weights import MOST_BYTES, codes_of, open_weights
+from scenelang.drawing.neural.load import RENDERER, Model, load_network
 
 WARM_UP = 100  # steps at the start of a phase
 UNSEEN, SEEN_AT_ONCE = 128, 16  # scenes of the curve

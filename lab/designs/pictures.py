@@ -15,9 +15,9 @@ import torch
 from torch import Tensor
 
 from lab.training.scenes import sectors
-from scenelang.graph.geometries import sector_distance
-from scenelang.lifting.vector import PLANE_LAYOUT, WIDTH
-from scenelang.reference.field import fold, map_back, warp_back
+from scenelang.compiler.geometries import sector_distance
+from scenelang.compiler.lifting import PLANE_LAYOUT, WIDTH
+from scenelang.drawing.exact.field import fold, map_back, warp_back
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def pictures(scenes: Scenes, r: int) -> Tensor:
 
 
 def exact_vectors(scenes: Scenes, codes: Tensor, material_codes: Tensor) -> Tensor:
-    """Vectors (B, N, 64) as `scenelang.lifting.exact` lifts these chains, for codes that are being trained.
+    """Vectors (B, N, 64) as `scenelang.compiler.lifting` lifts chains, for codes in training.
 
     Args:
         scenes: any.

@@ -4,7 +4,7 @@ Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, A
 an element is a learned vector, a transformation a matrix from an encoder of its own, and a chain the product
 of its matrices: g = T_n … T_1 g_0, m likewise. One encoder takes all affine maps (16 numbers of a 4 x 4
 matrix), one each twirl and bend, one each the colour operations; textures' affine maps have their own.
-`scenelang.lifting.learned` applies the same networks without torch.
+`scenelang.compiler.lifting` applies the same networks without torch.
 
 Letters: B scenes, N objects, P points, R pixels along a side, D = d_g + d_m, M transformations, d the size of
 the vector that a matrix acts on, W = `width`.
@@ -22,10 +22,8 @@ from torch import Tensor, nn
 
 from lab.designs.pictures import Scenes, exact_vectors, pixel_centres
 from lab.training.scenes import GEOMETRIES
-from scenelang.lifting.learned import GEOMETRY_INPUTS, MATERIAL_INPUTS
-from scenelang.lifting.vector import PLANE_LAYOUT, WIDTH
-from scenelang.renderers.reading import Reading, ReadingConfig
-from scenelang.renderers.streaming import Streaming, StreamingConfig
+from scenelang.compiler.lifting import GEOMETRY_INPUTS, MATERIAL_INPUTS, PLANE_LAYOUT, WIDTH
+from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 
 
 @dataclass(frozen=True, slots=True)

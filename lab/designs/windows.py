@@ -17,7 +17,7 @@ from torch.nn.functional import avg_pool2d, one_hot, pad
 
 from lab.designs.pictures import Scenes, trace_exactly
 from lab.designs.students import StreamingStudent
-from scenelang.words import TOKENS
+from scenelang.language.words import TOKENS
 
 NEAR = 0.4  # world units: how far from an object's middle a window's middle may lie
 

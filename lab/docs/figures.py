@@ -17,7 +17,7 @@ from typing import Any
 
 from lab import RESULTS, ROOT
 
-PACKAGE = ROOT / "scenelang"
+PACKAGE = ROOT / "scenelang/compiler"
 OPEN, CLOSE = "\x02", "\x03"  # around what a claim's f-string shows of a record
 
 

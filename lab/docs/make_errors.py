@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from lab import DOCS
-from scenelang.diagnostics.pages import AREAS, CODES, read_page
+from scenelang.language.pages import AREAS, CODES, read_page
 
 TARGET = DOCS / "errors.md"
-_PAGES = "../scenelang/diagnostics/pages"
+_PAGES = "../scenelang/language/pages"
 
 _HEAD = """\
 # Errors and warnings

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from lab import DOCS, RESULTS, ROOT
 from lab.frontier.ways import FIELD, TITLES
-from scenelang.measure.frontier import Errors, Frontier, Ratio, frontier_path
+from scenelang.output.frontier import Errors, Frontier, Ratio, frontier_path
 
 BASES = {"shapes2d": "", "solids3d": "-solids"}  # models that sets are named after, and endings of names
 

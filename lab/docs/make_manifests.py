@@ -18,8 +18,8 @@ from typing import Any
 from lab import RESULTS
 from lab.sets.scenes import sets_of
 from lab.stability import UNBOUNDED, measured_ranges
-from scenelang.measure.metrics import MOST_DB
-from scenelang.models.manifest import ROOT, Manifest, available, load_manifest
+from scenelang.compiler.manifest import ROOT, Manifest, available, load_manifest
+from scenelang.drawing.metrics import MOST_DB
 
 BASE = "shapes2d"
 

@@ -25,9 +25,9 @@ import numpy as np
 import trimesh
 
 from lab import ROOT
-from scenelang.fitting.learn import Wish, learn
+from scenelang.inverse.learn import Wish, learn_files
 
-OUT = ROOT / "scenelang/std/meshes.safetensors"
+OUT = ROOT / "scenelang/language/std/meshes.safetensors"
 ERROR = 0.00004  # which takes 193 distances a side
 SQUARES = 40  # along a side of a patch
 LID = slice(20, 28)  # patches
@@ -94,7 +94,7 @@ def main(folder: Path) -> None:
     (folder / "monkey.obj").write_text(obj(mesh.vertices, mesh.faces))
     OUT.unlink(missing_ok=True)
     for name, (license, source) in SAID.items():
-        learn([folder / name], OUT, Wish(max_error=ERROR, license=license, source=source), say=print)
+        learn_files([folder / name], OUT, Wish(max_error=ERROR, license=license, source=source), say=print)
 
 
 if __name__ == "__main__":

@@ -40,11 +40,11 @@ from lab.docs.blocks import pictured
 from lab.evaluate import Case, sheet
 from lab.frontier.chart import frontier_chart
 from lab.shadows import measure_shadows
-from scenelang.diagnostics.span import SourceFile
-from scenelang.inverse.target import Blur, blurred
-from scenelang.measure.frontier import Frontier, frontier_path
-from scenelang.models.load import load_model
-from scenelang.models.manifest import load_manifest
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.neural.load import load_model
+from scenelang.inverse.search import Blur, blurred
+from scenelang.language.diagnostics import SourceFile
+from scenelang.output.frontier import Frontier, frontier_path
 
 EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"

@@ -1,6 +1,6 @@
 """Draw the sixteen textures that ship, and write them as elements.
 
-python -m lab docs textures               writes scenelang/elements/textures.safetensors
+python -m lab docs textures               writes scenelang/assets/textures.safetensors
 python -m lab docs textures --sheet OUT   draws all of them, one beside another
 
 Bytes are the same again with the same numpy and Pillow; texels are with others too.
@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as Pillow
 
-from scenelang.elements.picture import painted
-from scenelang.elements.textures import FILE
-from scenelang.elements.zoo import zoo_bytes
-from scenelang.files import write_whole
+from scenelang.assets.files import write_whole
+from scenelang.assets.picture import painted
+from scenelang.assets.textures import FILE
+from scenelang.assets.zoo import zoo_bytes
 
 ABOUT: dict[str, str | float] = {"license": "MIT", "source": "docs/make_textures.py of scenelang"}
 SIDE = 256  # texels

@@ -2,7 +2,7 @@
 
 - `grammar/scenelang.tmLanguage.json`, the grammar for VS Code and others;
 - the words of `editors/vim/syntax/nsg.vim`;
-- `scenelang/play/web/words.js`, for the editor of `scenelang play`;
+- `scenelang/web/editor/words.js`, for the editor of `scenelang play`;
 - the tables of `docs/language.md` between comments that name them.
 """
 
@@ -13,9 +13,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lab import ROOT
-from scenelang import words
-from scenelang.highlighting import lexer, textmate
-from scenelang.syntax.tables import tables
+from scenelang.editors import highlighting
+from scenelang.language import words
+from scenelang.language.tables import tables
 
 _OR = r"\|"
 TABLES = {
@@ -72,9 +72,11 @@ def _called(known: Iterable[str]) -> str:
 
 def script() -> str:
     """The words and terminals as a module of JavaScript."""
-    known = [{"scope": scope, "words": [*texts], "after": after} for texts, after, _, scope in lexer.WORDS]
+    known = [
+        {"scope": scope, "words": [*texts], "after": after} for texts, after, _, scope in highlighting.WORDS
+    ]
     terminals = {name: tables().patterns[name] for name in ("NAME", "NUMBER", "COLOR", "STRING")}
-    signs = sorted(lexer.OPERATORS, key=len, reverse=True)
+    signs = sorted(highlighting.OPERATORS, key=len, reverse=True)
     lines = "".join(f"  {json.dumps(entry)},\n" for entry in known)
     return (
         "// The words and terminals of the language, written by lab/docs/make_words.py.\n"
@@ -101,8 +103,8 @@ def made() -> dict[Path, str]:
     coloured = _between(
         syntax.read_text("utf-8"), '" Words, written by lab/docs/make_words.py.', '" End of words', vim()
     )
-    web = ROOT / "scenelang/play/web/words.js"
-    return {grammar: textmate.encode(), syntax: coloured, web: script(), page: text}
+    web = ROOT / "scenelang/web/editor/words.js"
+    return {grammar: highlighting.encode(), syntax: coloured, web: script(), page: text}
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """Tables of what passes and skipping save, from records.
 
 `plans.json` is what `python -m lab plans examples/*.nsg` wrote, and `passes.json` what
-`python -m tests.passes.prove` did.
+`python -m tests.compiler.prove` did.
 """
 
 from __future__ import annotations

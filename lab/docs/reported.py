@@ -62,7 +62,7 @@ UNSAID = {
     "stability": "python -m lab stability shapes2d --scenes {scenes}",
     "stability-textures2d": "python -m lab stability textures2d --only texels --scenes {scenes}",
     "plans": "python -m lab plans examples/*.nsg",
-    "passes": "python -m tests.passes.prove --scenes {scenes}",
+    "passes": "python -m tests.compiler.prove --scenes {scenes}",
 }
 """Commands of records that were made before records said theirs."""
 

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.backend.load import Load
-from scenelang.measure.choose import UNITS
-from scenelang.measure.frontier import Cost
+from scenelang.drawing.small import Load
+from scenelang.output.frontier import UNITS, Cost
 
 ROUNDS = 20  # of weights
 

@@ -25,17 +25,27 @@ from lab.evaluate import exact_of
 from lab.frontier.fit import fit_cost
 from lab.frontier.ways import PAPER, Draw, Way, paired, ways_of
 from lab.sets.scenes import interval, scenes_of, usual_set
-from scenelang.backend.load import Load, load_of
-from scenelang.backend.neural import open_model
-from scenelang.backend.options import keep_memory
-from scenelang.image import Image, enlarged, from_samples
-from scenelang.measure.choose import error_scale, yardstick
-from scenelang.measure.frontier import Cost, Errors, Frontier, Point, Quality, Ratio, Times, front
-from scenelang.measure.metrics import flip, over_white, psnr
-from scenelang.measure.plan import reference_of
-from scenelang.models.manifest import Manifest, load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.scene.schema import Scene
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.drawing.how import keep_memory
+from scenelang.drawing.image import Image, enlarged, from_samples
+from scenelang.drawing.metrics import flip, over_white, psnr
+from scenelang.drawing.small import Load, load_of
+from scenelang.drawing.torch_backend import open_model
+from scenelang.language.scene import Scene
+from scenelang.output.frontier import (
+    Cost,
+    Errors,
+    Frontier,
+    Point,
+    Quality,
+    Ratio,
+    Times,
+    error_scale,
+    front,
+    yardstick,
+)
+from scenelang.output.plan import reference_of
 
 SHOWN = 4  # scenes whose pictures are kept
 CONVERGED = 8  # scenes compared with 64 samples a pixel

@@ -10,21 +10,21 @@ from typing import Any, Literal
 import numpy as np
 import torch
 
-from scenelang.backend.closed import closed_forms
-from scenelang.backend.neural import draw_program, open_model
-from scenelang.backend.options import Samples
-from scenelang.backend.small import choose_drawer, draw_small
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
-from scenelang.image import Image, from_samples
-from scenelang.models.framed import load_arrays
-from scenelang.models.manifest import Manifest, available, load_manifest
-from scenelang.models.weights import read_facts
-from scenelang.program.compile import compile_scene
-from scenelang.reference.image import reference_image
-from scenelang.renderers.draw import draw_objects
-from scenelang.renderers.streaming import Streaming, StreamingConfig
-from scenelang.scene.schema import Scene
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.lower import lower
+from scenelang.compiler.manifest import Manifest, available, load_manifest
+from scenelang.compiler.weights import read_facts
+from scenelang.drawing.closed import closed_forms
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.how import Samples
+from scenelang.drawing.image import Image, from_samples
+from scenelang.drawing.neural.draw import draw_objects
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.paper import Streaming, StreamingConfig
+from scenelang.drawing.small import choose_drawer, draw_small
+from scenelang.drawing.torch_backend import draw_program, open_model
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.scene import Scene
 
 FULL = 256  # pixels along a side at which the paper's renderer is timed
 TITLES: dict[Samples, str] = {
@@ -43,7 +43,7 @@ Prepare = Callable[[Scene], Draw]
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A way to draw; the fields it shares with `scenelang.measure.frontier.Point` are said there."""
+    """A way to draw; the fields it shares with `scenelang.output.frontier.Point` are said there."""
 
     name: str
     prepare: Prepare = field(repr=False)  # compiles scenes for it

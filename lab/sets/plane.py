@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from scenelang.scene.schema import (
+from scenelang.language.scene import (
     Bend,
     Boolean,
     Chain,
@@ -38,7 +38,7 @@ from scenelang.scene.schema import (
     Translate,
     Twirl,
 )
-from scenelang.words import COMBINE, TEXTURES, Combine
+from scenelang.language.words import COMBINE, TEXTURES, Combine
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 Rng = np.random.Generator

@@ -12,8 +12,7 @@ import math
 from dataclasses import dataclass
 
 from lab.sets.plane import Rng, any_tree
-from scenelang.scene.elements import Brought, load_elements
-from scenelang.scene.schema import (
+from scenelang.language.scene import (
     Bend,
     Camera,
     Chain,
@@ -33,7 +32,8 @@ from scenelang.scene.schema import (
     Twirl,
     Twist,
 )
-from scenelang.words import COMBINE
+from scenelang.language.scene_data import Brought, load_elements
+from scenelang.language.words import COMBINE
 
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"

@@ -10,9 +10,9 @@ import torch
 from safetensors.torch import save
 from torch import Tensor, nn
 
-from scenelang.files import read_regular, write_whole
-from scenelang.models.weights import ModelError
-from scenelang.tensors import TensorError, read_tensors
+from scenelang.assets.files import read_regular, write_whole
+from scenelang.assets.tensors import TensorError, read_tensors
+from scenelang.compiler.weights import ModelError
 
 _MOST_BYTES = 1 << 30
 

@@ -10,9 +10,9 @@ from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass as checked
 
 from lab.training.scenes import SceneConfig
-from scenelang.files import read_regular
-from scenelang.renderers.network import FramedConfig
-from scenelang.renderers.solid.network import SolidConfig
+from scenelang.assets.files import read_regular
+from scenelang.drawing.neural.network import FramedConfig
+from scenelang.drawing.solid.network import SolidConfig
 
 CONFIGS = Path(__file__).parent / "configs"
 _MOST_BYTES = 1 << 20

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from scenelang import words
-from scenelang.graph.geometries import GEOMETRIES
-from scenelang.renderers.arrays_torch import TORCH
-from scenelang.renderers.solid.network import RADIUS, folded
+from scenelang.compiler.geometries import GEOMETRIES
+from scenelang.drawing.arrays_torch import TORCH
+from scenelang.drawing.solid.network import RADIUS, folded
+from scenelang.language import words
 
 LEAVES = (*words.LEAVES[3],)
 

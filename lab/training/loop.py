@@ -16,9 +16,9 @@ from lab.training.checkpoint import check_config, load_tensors, pack_training, s
 from lab.training.config import TrainConfig
 from lab.training.losses import image_loss, leaf_loss
 from lab.training.scenes import GEOMETRIES, leaf_batch, random_batch
-from scenelang.files import read_regular, write_whole
-from scenelang.models.load import load_model
-from scenelang.renderers.framed import Framed
+from scenelang.assets.files import read_regular, write_whole
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.torch_networks import Framed
 
 WARM_UP = 200
 _MOST_LOG = 1 << 26  # bytes

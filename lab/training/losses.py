@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
 from lab.training.scenes import Batch, LeafBatch
-from scenelang.renderers.framed import Framed
+from scenelang.drawing.neural.torch_networks import Framed
 
 SHARP = 0.02  # distances are asked for relative to themselves plus this
 FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a distance makes no difference

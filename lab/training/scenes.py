@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from scenelang.graph.geometries import SECTORS, sector_distance
-from scenelang.reference.field import fold, map_back, warp_back
+from scenelang.compiler.geometries import SECTORS, sector_distance
+from scenelang.drawing.exact.field import fold, map_back, warp_back
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 FAR = 1e3  # translation of the objects that pad a stream: off every point

@@ -25,12 +25,12 @@ from lab.training.checkpoint import check_config, load_tensors, save_tensors
 from lab.training.config import SolidsConfig
 from lab.training.leaves import LEAVES, Points, half_rays, leaf_points
 from lab.training.loop import Report, schedule
-from scenelang.files import write_whole
-from scenelang.models.load import load_model
-from scenelang.reference.field import combine
-from scenelang.renderers.solid.network import BLEND, Wanted
-from scenelang.renderers.solid.parameters import Solids
-from scenelang.words import TOKENS
+from scenelang.assets.files import write_whole
+from scenelang.drawing.exact.field import combine
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.solid.network import BLEND, Wanted
+from scenelang.language.words import TOKENS
 
 MATERIALS = {"diffuse": (1.0, 1.0, 1.0, 0.0), "volumetric": (1.0, 1.0, 1.0, 1.0)}  # albedo and medium
 BEGINNINGS = 6  # of the cell

@@ -7,13 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from pathlib import Path
 
+from scenelang.assets.records import Record
 from scenelang.cli.inputs import STDIN, Request, merged, read_input, read_text, unused_defines
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
-from scenelang.diagnostics.fixes import Settled, settle
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.session import Defines
-from scenelang.program.check import Frames, check_evaluated
-from scenelang.records import Record
+from scenelang.compiler.check import Frames, check_evaluated
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, Settled, SourceFile, settle
+from scenelang.language.session import Defines
 
 
 class Selection(Record):

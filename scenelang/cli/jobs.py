@@ -1,27 +1,32 @@
-"""From an input of the command line to something a backend draws."""
+"""From an input of the command line to pictures in files."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from scenelang.backend.options import DEFAULT, How
-from scenelang.cli.inputs import Input, Request, merged, read_input, unused_defines
+from scenelang.cli.inputs import Input, Request, merged, read_input, stem_of, unused_defines
 from scenelang.cli.main import describe
-from scenelang.cli.progress import Clock
-from scenelang.cli.say import say_diagnostics, say_trouble
-from scenelang.diagnostics.error import SceneError
-from scenelang.models.choose import why_chosen
-from scenelang.program.compile import compile_scene
+from scenelang.cli.say import Clock, say_diagnostics, say_trouble
+from scenelang.compiler.choose import why_chosen
+from scenelang.compiler.compile import compile_scene
+from scenelang.drawing.how import DEFAULT, How
+from scenelang.language.diagnostics import plural
+from scenelang.language.reports import SceneError
+from scenelang.output.frames import is_animation
 
 if TYPE_CHECKING:
-    from scenelang.program.program import Program
+    from scenelang.compiler.program import Program
+    from scenelang.drawing.how import Device
+    from scenelang.drawing.image import Image, Output
+    from scenelang.output.frontier import Choice, Frontier, Limits, Point
+
 
 PROGRAM = ".safetensors"
 
@@ -112,8 +117,7 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> In
 
 
 def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
-    from scenelang.program.program import ProgramError
-    from scenelang.program.reading import load_program
+    from scenelang.compiler.program import ProgramError, load_program
 
     found, size, model = Input(name, how), request.source.size, request.source.model
     try:
@@ -139,8 +143,8 @@ def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
 
 def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
-    from scenelang.program.groups import OPERATOR
-    from scenelang.words import COMBINE
+    from scenelang.compiler.groups import OPERATOR
+    from scenelang.language.words import COMBINE
 
     shapes = Counter(program.objects)
     words = Counter((program.tokens & OPERATOR).tolist())
@@ -156,3 +160,232 @@ def _counts(counts: dict[str, int]) -> str:
     """`` (2 star, 1 square)``, or nothing."""
     listed = ", ".join(f"{number} {name}" for name, number in counts.items())
     return f" ({listed})" if listed else ""
+
+
+PAGE: Final = ".html"
+
+
+def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
+    """The file that each scene is written to: ``out`` itself for one scene, else one in the folder ``out``.
+
+    The folder is made if need be; for one scene it is one that is there, or ends in a slash.
+
+    Args:
+        suffix: of files in a folder: of a picture or of a page.
+
+    Raises:
+        click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
+        OSError: the folder cannot be made.
+    """
+    path = Path(out)
+    what, fits = ("a page", page_format) if suffix == PAGE else ("a picture", _picture_format)
+    if len(names) == 1 and not path.is_dir() and not out.endswith(("/", "\\")):
+        try:
+            fits(path)
+        except ValueError as error:
+            advice = f"{what} has a suffix such as {suffix}, a folder ends in a slash"
+            raise click.UsageError(f"cannot write `{out}`: {error if path.suffix else advice}.") from None
+        if not path.parent.is_dir():
+            raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
+        return [path]
+    if path.exists() and not path.is_dir():
+        raise click.UsageError(f"`{out}` is a file; {len(names)} scenes need a folder.")
+    if not path.exists() and not out.endswith(("/", "\\")):
+        with suppress(ValueError):  # no format has the suffix
+            what = "an animation" if is_animation(out) else what
+            if what != "an animation":
+                fits(path)
+            raise click.UsageError(f"`{out}` names {what}; {len(names)} scenes need a folder.")
+    files = [composed(path / f"{stem_of(name)}{suffix}") for name in names]
+    owner: dict[str, str] = {}
+    for name, file in zip(names, files, strict=True):
+        first = owner.setdefault(file.name.casefold(), name)
+        if first is not name:
+            raise click.UsageError(f"`{first}` and `{name}` would both be written to `{file}`.")
+    path.mkdir(parents=True, exist_ok=True)
+    return files
+
+
+def page_format(path: Path) -> None:
+    """Raise `ValueError` where a file is not called like a page."""
+    if path.suffix.lower() not in (PAGE, ".htm"):
+        raise ValueError(f"a page's file ends in {PAGE}")
+
+
+def _picture_format(path: Path) -> None:
+    from scenelang.drawing.image import image_format
+
+    image_format(path)
+
+
+def check_outputs(paths: Sequence[Path], wanted: Sequence[Output]) -> None:
+    """Raise `click.UsageError` where outputs of pictures have no place, or a link is in it."""
+    from scenelang.drawing.image import output_file
+
+    try:
+        for path in paths:
+            for file in (output_file(path, name) for name in wanted):
+                _ = file == path or composed(file)
+    except ValueError as error:
+        raise click.UsageError(f"{error}.") from None
+
+
+def composed(file: Path) -> Path:
+    """A file whose name no user wrote; raises `click.UsageError` for a link, which may lead anywhere."""
+    if file.is_symlink():
+        raise click.UsageError(f"`{file}` is a link; it is followed only where -o names it.")
+    return file
+
+
+def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
+    """Draw a job as it says, and note what it took; ``progress`` is called with the share done, in [0, 1]."""
+    from scenelang.drawing.how import threads_for
+    from scenelang.drawing.render import draw, draw_exact
+
+    how, program = job.how, job.program
+    if how.backend == "reference":
+        assert job.scene is not None
+        with clock("draw"):
+            image = draw_exact(job.scene, spans=job.spans, progress=progress)
+        job.notes.append("drew the exact picture, four samples a pixel")
+        return image
+    from scenelang.drawing.small import choose_drawer
+
+    assert program is not None
+    library, why = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+    if library == "numpy":
+        cores = how.threads or threads_for(program.canvas) if program.stage else 1
+        device, place = "numpy", "one core" if cores == 1 else f"{cores} cores"
+    else:
+        with clock("load torch"):
+            from scenelang.drawing.torch_backend import choose_device, open_model
+        device = place = choose_device(how.device)
+        with clock("load model"):
+            open_model(program.model, device, program.weights)
+    with clock("draw"):
+        drawing = draw(program, how, place=device, progress=progress)
+    if drawing.work is not None and drawing.work.lost:
+        lost = f"{drawing.work.lost:,} rays took too many steps"
+        click.echo(f"Warning: {job.name}: the picture is incomplete: {lost}", err=True)
+    width, height = program.canvas
+    once = width * height - drawing.refined
+    job.notes += [
+        f"drawn by {library} on {place}: {why}",
+        f"drew {plural(once, 'pixel')} by one sample and {drawing.refined:,} by four",
+        f"{plural(drawing.pairs, 'meeting')} of a sample and an object",
+    ]
+    return drawing.image
+
+
+def blank(job: Input, image: Image) -> str | None:
+    """The reason why a picture has nothing to see, where no warning has said so."""
+    if any(d.code == "W0402" for d in job.diagnostics):
+        return None
+    if job.program is not None and not len(job.program.tokens):
+        return "no objects to draw: a module draws where it is called, as in part();"
+    if not all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image):
+        return None
+    if (image[0, 0] > 1 - 0.5 / 255).all():
+        return "one colour throughout; flat objects are white without a colour, and so is the background"
+    return "one colour throughout: objects in the background's colour, cut away, or smaller than a pixel"
+
+
+# ---------------------------------------------------------------- by the frontier
+
+
+def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Clock) -> list[Input]:
+    """Have the frontier choose how to draw; return the jobs that it draws as asked and report the others.
+
+    Args:
+        model: the only one to choose, where it is given.
+
+    Raises:
+        click.UsageError: an option says what the frontier decides.
+    """
+    from scenelang.output.frontier import NothingFits, yardstick
+
+    for job in jobs:
+        if job.how._replace(threads=None, device="auto") != DEFAULT or job.how.device == "cuda":
+            asked = "--max-ms" if limits.ms is not None else "--max-flip"
+            other = "--device cuda" if job.how.device == "cuda" else "--backend and --samples"
+            raise click.UsageError(f"{asked} chooses how to draw on processors; leave out {other}.")
+    with clock("choose"):
+        here_ms, able = yardstick(), []
+        for job in jobs:
+            try:
+                _choose(job, limits, model, here_ms)
+                able.append(job)
+            except NothingFits as error:
+                say_trouble(f"{job.name}: {error}")
+    return able
+
+
+def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
+    """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`."""
+    from scenelang.output.frontier import NothingFits, load_frontier, machine_scale
+
+    assert job.program is not None
+    name = job.program.model
+    try:
+        frontier = load_frontier(name)
+    except ValueError as error:
+        raise NothingFits(f"the frontier of `{name}` is damaged: {error}") from None
+    if frontier is None:
+        raise NothingFits(f"model `{name}` ships no frontier to choose from")
+    scale = machine_scale(frontier, here_ms)
+    choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
+    point = choice.offer.point
+    # as it was measured
+    device: Device = "cpu" if job.program.stage is None and point.backend == "neural" else "auto"
+    samples = point.samples if point.backend == "neural" else "adaptive"
+    job.how = How(point.backend, device, job.how.threads, samples)
+    told = f"this machine takes {scale:.2f} times as long as the one that was measured"
+    like = f"errors are promised for scenes like those of the set `{frontier.set}`"
+    like += ", which have no elements" if job.scene is not None and job.scene.elements else ""
+    refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
+    notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
+    job.notes = [*choice.notes, f"times are for one thread; {told}", like, *refused, *notes]
+
+
+def _chosen(
+    frontier: Frontier, job: Input, program: Program, limits: Limits, model: str | None, scale: float
+) -> tuple[Choice, Program]:
+    """The best choice whose model draws the scene without further warnings, and its Program."""
+    from scenelang.drawing.small import load_of
+    from scenelang.output.frontier import choose, offers, refusal
+
+    refused: dict[str, str] = {}
+    able = []
+    for point in frontier.points:
+        why = refusal(point, job.scene, program, model)
+        if why is None:
+            able.append(point)
+        elif point.offered:  # the others are for charts only
+            refused[point.name] = why
+    found = offers(able, load_of(program), program.canvas, scale)
+    while True:
+        choice = choose(found, limits, refused)
+        point = choice.offer.point
+        compiled = _compiled(job, program, point)
+        if not isinstance(compiled, str):
+            return choice, compiled
+        refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
+        found = [offer for offer in found if offer.point.model != point.model]
+
+
+def _compiled(job: Input, program: Program, point: Point) -> Program | str:
+    """The Program for a point's model; the reason where it cannot draw the scene as promised."""
+    if point.model in (None, program.model):
+        return program
+    from scenelang.compiler.compile import compile_scene
+    from scenelang.language.diagnostics import Diagnostics
+
+    assert job.scene is not None
+    found = Diagnostics()
+    try:
+        made = compile_scene(job.scene, spans=job.spans, diagnostics=found, model=point.model)
+    except SceneError:
+        return found.errors[0].message
+    told = {d.code for d in job.diagnostics}
+    # a warning that the scene's own model does not give: this one is outside what it was trained on
+    return next((d.message for d in found.items if d.code not in told), made)

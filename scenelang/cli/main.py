@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import click
 
-from scenelang.backend.options import RenderError
-from scenelang.files import NotWritten, inputs_kept
+from scenelang.assets.files import NotWritten, inputs_kept
+from scenelang.drawing.how import RenderError
 
 # Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; a dash
 # is an underscore there.
@@ -43,7 +43,7 @@ GROUPS: Final = {
     "Develop": "compile schema lsp",
 }
 """Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
-ELSEWHERE: Final = {"sweep": "scenelang.cli.sweep"}  # commands whose modules do not lie among the others
+ELSEWHERE: Final = {"sweep": "scenelang.cli.animation"}  # commands whose modules do not lie among the others
 MOVED: Final = {
     "explain-plan": "is now `scenelang dump --costs`",
     "graph": "is now `scenelang dump --format mmd`",
@@ -138,7 +138,7 @@ def _reporting() -> Iterator[None]:
     except (click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
         raise
     except Exception as error:
-        from scenelang.models.weights import ModelError
+        from scenelang.compiler.weights import ModelError
 
         if isinstance(error, ModelError):
             raise Trouble(str(error)) from None

@@ -1,4 +1,4 @@
-"""What commands print and write."""
+"""What commands print and write, and how far long work is."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ import importlib.util
 import os
 import shutil
 import sys
-from collections.abc import Iterable
-from typing import IO, Any
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from scenelang.diagnostics.diagnostic import Diagnostic
+from scenelang.language.diagnostics import Diagnostic
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
 
 _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
@@ -28,7 +35,7 @@ def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
 
 def width_of(stream: IO[Any]) -> int:
     """Cells of a line: the terminal's, or enough for most where there is none."""
-    from scenelang.diagnostics.render_text import WIDTH
+    from scenelang.language.reports import WIDTH
 
     if not stream.isatty():
         return WIDTH
@@ -37,7 +44,7 @@ def width_of(stream: IO[Any]) -> int:
 
 def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics for people, with carets, to standard error."""
-    from scenelang.diagnostics.render_text import render_text
+    from scenelang.language.reports import render_text
 
     text = render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr))
     if text:
@@ -54,7 +61,7 @@ def put_out(made: str | bytes, out: str | None) -> None:
     if out is None or out == "-":
         click.echo(made, nl=False)
         return
-    from scenelang.files import write_output
+    from scenelang.assets.files import write_output
 
     write_output(out, made.encode() if isinstance(made, str) else made)
 
@@ -85,10 +92,71 @@ def _lines(text: str) -> list[str]:
 
 def show_difference(name: str, before: str, after: str, color: str = "auto") -> None:
     """Print a unified diff: exact into files and pipes, coloured, without control characters on terminals."""
-    from scenelang.diagnostics.cells import paint, printable
+    from scenelang.language.reports import paint, printable
 
     painted = wants_color(sys.stdout, color)
     for line in difference(name, before, after).removesuffix("\n").split("\n"):
         style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
         safe = printable(line) if painted or sys.stdout.isatty() else line
         click.echo(paint(style, safe, painted), color=True)
+
+
+PATIENCE_S = 1.0
+
+
+class Clock:
+    """Seconds spent in each of a command's stages, in the order in which they first ran."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - started
+
+    def report(self) -> str:
+        """One line with all stages."""
+        parts = [f"{stage} {1000 * seconds:.0f}" for stage, seconds in self.seconds.items()]
+        return f"time (ms): {', '.join(parts)}"
+
+
+class Bar:
+    """How far something is and how long it will take, shown on a terminal once it took `PATIENCE_S`."""
+
+    def __init__(self) -> None:
+        self._wanted = sys.stderr.isatty()
+        self._started = time.perf_counter()
+        self._lock = threading.Lock()
+        self._shown: Progress | None = None
+        self._done = 0.0
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown is not None:
+            self._shown.stop()
+
+    def __call__(self, what: str, done: float, total: float) -> None:
+        """Say how much of the total is done, from any thread; less than before begins the next stage."""
+        if not self._wanted:
+            return
+        with self._lock:
+            if self._shown is None:
+                if time.perf_counter() - self._started < PATIENCE_S:
+                    return
+                from rich.console import Console
+                from rich.progress import Progress
+
+                self._shown = Progress(console=Console(stderr=True), transient=True)
+                self._shown.add_task("")
+                self._shown.start()
+            task = self._shown.task_ids[0]
+            if done < self._done:
+                self._shown.reset(task)
+            self._done = done
+            self._shown.update(task, description=what, completed=done, total=total)

@@ -1,1 +1,0 @@
-"""From pictures back to scenes: the values of params whose picture comes nearest to a target."""

@@ -146,13 +146,13 @@ def test_strict(folder: Folder) -> None:
 def test_without_ffmpeg(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
-    from scenelang.animation import video
+    from scenelang.output import encoders
 
-    video.find_ffmpeg.cache_clear()
+    encoders.find_ffmpeg.cache_clear()
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     result = folder.run("render", folder.write("a.nsg", MOVING), "-o", "a.mp4")
-    video.find_ffmpeg.cache_clear()
+    encoders.find_ffmpeg.cache_clear()
     assert result.exit_code == 2
-    assert result.stderr == f"Error: {video.MISSING}\n"
+    assert result.stderr == f"Error: {encoders.MISSING}\n"
     assert os.listdir() == ["a.nsg"]

@@ -158,7 +158,7 @@ def test_several_frames_of_an_animation(folder: Folder, monkeypatch: pytest.Monk
     division = f"{name}:3:36: error[E0304] division by zero (frame 7)"
     assert found("--all-frames") == [f"{angle}1)", division]
     assert folder.run("check", name, "--all-frames", "--frame", "3").exit_code == 2
-    monkeypatch.setattr("scenelang.evaluate.evaluation.MAX_OBJECTS", 4)
+    monkeypatch.setattr("scenelang.language.evaluation.MAX_OBJECTS", 4)
     result = folder.run("check", name, "--all-frames")
     assert "35 frames left out: " in result.stderr
 

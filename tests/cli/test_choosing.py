@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.backend.load import load_of
-from scenelang.measure import frontier as frontier_file
-from scenelang.measure.frontier import Cost, Errors, Frontier
-from scenelang.models.manifest import available
-from scenelang.program import compile as compile_module
+from scenelang.compiler import compile as compile_module
+from scenelang.compiler.manifest import available
+from scenelang.drawing.small import load_of
+from scenelang.output import frontier as frontier_file
+from scenelang.output.frontier import Cost, Errors, Frontier
 from tests.cli.conftest import Folder
 from tests.measure.test_choose import frontier, point
 
@@ -38,7 +38,7 @@ def shipped(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Folder:
     path = folder.path / "shipped.json"
     path.write_text(ladder().to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.measure.choose.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
     return folder
 
 
@@ -211,7 +211,7 @@ def test_solids_are_chosen_for(
     path = folder.path / "solids.json"
     path.write_text(replace(frontier(*found), set="mixed").to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.measure.choose.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
     result = folder.run("render", folder.write("ball.nsg", ball), "-o", "a.png", "-v", *limit)
     assert result.exit_code == 0, result.output
     assert f"chosen by the frontier: solids3d, {samples}: " in result.stderr

@@ -14,9 +14,9 @@ from pathlib import Path
 import click
 import pytest
 
+from scenelang.cli.inputs import Sectioned
 from scenelang.cli.main import cli
-from scenelang.cli.options import Sectioned
-from scenelang.models.manifest import available
+from scenelang.compiler.manifest import available
 from tests.cli.conftest import Folder
 
 
@@ -67,7 +67,7 @@ def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> Non
 
 def test_no_option_takes_what_is_not_a_number() -> None:
     """Whose bounds `nan` would pass, as it is neither below nor above them."""
-    from scenelang.cli.options import Real
+    from scenelang.cli.inputs import Real
 
     found = 0
     context = click.Context(cli)
@@ -100,7 +100,7 @@ def test_models(folder: Folder) -> None:
 
 
 def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("scenelang.models.weights.weights_path", lambda name: folder.path / "none")
+    monkeypatch.setattr("scenelang.compiler.weights.weights_path", lambda name: folder.path / "none")
     assert "missing or damaged" in folder.run("models", "shapes2d").stdout
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.interchange.dumps import changes
-from scenelang.passes import PASSES
+from scenelang.compiler.passes import PASSES
+from scenelang.editors.dumps import changes
 from tests.cli.conftest import Folder
 
 TEXT = """param k = 0.5;
@@ -186,7 +186,7 @@ def test_quotes_in_names_stay_inside_labels(folder: Folder) -> None:
     for kind in ("mmd", "dot"):
         said = folder.run("dump", name, "--format", kind)
         assert said.exit_code == 1  # no such model
-    from scenelang.interchange.drawing import Box, Drawing, to_dot, to_mermaid
+    from scenelang.editors.dumps import Box, Drawing, to_dot, to_mermaid
 
     drawn = Drawing([Box(('a"b\\c]<d>;{e}|#35;',))])
     assert '["a#34;b#92;c]#60;d#62;#59;#123;e#125;#124;#35;35#59;"]' in to_mermaid(drawn)

@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from scenelang.diagnostics.cells import paint
-from scenelang.diagnostics.pages import CODES, read_page
+from scenelang.language.pages import CODES, read_page
+from scenelang.language.reports import paint
 from tests.cli.conftest import Folder
 
 

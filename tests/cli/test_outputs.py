@@ -86,7 +86,7 @@ def test_what_is_refused(folder: Folder, out: str, text: str, options: tuple[str
 
 
 def test_exr_without_its_library_is_refused_before_anything_is_drawn(folder: Folder, monkeypatch) -> None:
-    monkeypatch.setattr("scenelang.outputs.find_spec", lambda name: None)
+    monkeypatch.setattr("scenelang.drawing.image.find_spec", lambda name: None)
     ran = folder.run("render", folder.write("a.nsg", SOLIDS), "-o", "p.exr", *DEPTH)
     assert ran.exit_code == 2
     assert "pip install 'scenelang[exr]'" in ran.stderr

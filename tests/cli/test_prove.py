@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.outputs import PROVED
+from scenelang.drawing.image import PROVED
 from tests.cli.conftest import Folder
 from tests.cli.test_outputs import said
 

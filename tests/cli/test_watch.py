@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenelang.watching.picture import settle, stamps
+from scenelang.output.watch import settle, stamps
 from tests.cli.conftest import Folder
 
 LONG_S = 120  # on a busy machine
@@ -202,7 +202,7 @@ def test_usage(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
 def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str]) -> None:
     """Where nothing better is known, coloured characters; never more than the screen holds."""
     pytest.importorskip("textual_image")
-    from scenelang.watching.screen import Screen
+    from scenelang.output.watch import Screen
 
     picture = Image.new("RGBA", (4000, 3000), (200, 10, 20, 255))
     never, auto = Screen("never", False), Screen("auto", False)
@@ -222,7 +222,7 @@ def test_terminals_that_misbehave(
 ) -> None:
     """Some report a size of 0 columns: the watcher says so once and goes on."""
     pytest.importorskip("textual_image")
-    from scenelang.watching import screen as module
+    from scenelang.output import watch as module
 
     monkeypatch.setattr(module, "_cell", lambda: 1 // 0)
     screen = module.Screen("always", False)

@@ -12,20 +12,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.evaluate.evaluation import Source
-from scenelang.graph.lower import lower
-from scenelang.graph.nodes import Graph
-from scenelang.graph.stage import stage_data
-from scenelang.lifting.vector import LAYOUTS
-from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import Program
-from scenelang.reference.field import evaluate
-from scenelang.reference.image import reference_image
-from scenelang.reference.samples import sample_points
-from scenelang.reference.solid.image import solid_image
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.lifting import LAYOUTS
+from scenelang.compiler.lower import lower
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.program import Program
+from scenelang.compiler.spaces import stage_data
+from scenelang.drawing.exact.field import evaluate, sample_points
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.exact.solid import solid_image
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.evaluation import Source
+from scenelang.language.reports import SceneError
 
 FOLDER = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.nsg"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.models.weights import load_codes
+from scenelang.compiler.weights import load_codes
 from tests.conformance.cases import FOLDER, NAMES, Outcome, run, stored
 from tests.pictures import premultiplied, psnr_db
 

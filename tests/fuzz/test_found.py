@@ -10,24 +10,21 @@ import numpy as np
 import pytest
 
 from fuzz.oracles import check_rendering
-from scenelang.backend.options import RenderError
-from scenelang.backend.render import render
-from scenelang.diagnostics.cells import in_cells
-from scenelang.diagnostics.diagnostic import Diagnostic, Diagnostics
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.render_machine import render_sarif
-from scenelang.diagnostics.render_text import render_text
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import loads
-from scenelang.formatting import format_text
-from scenelang.models.manifest import ROOT, Manifest
-from scenelang.models.weights import ModelError, read_facts
-from scenelang.program.compile import compile_scene
-from scenelang.program.program import ProgramError
-from scenelang.scene.schema import Scene
-from scenelang.syntax import parse
-from scenelang.syntax.tables import tables
-from scenelang.words import RESERVED
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import ROOT, Manifest
+from scenelang.compiler.program import ProgramError
+from scenelang.compiler.weights import ModelError, read_facts
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.render import render
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
+from scenelang.language.evaluation import loads
+from scenelang.language.formatting import format_text
+from scenelang.language.machine import render_sarif
+from scenelang.language.parser import parse
+from scenelang.language.reports import SceneError, in_cells, render_text
+from scenelang.language.scene import Scene
+from scenelang.language.tables import tables
+from scenelang.language.words import RESERVED
 from tests.work import ends, lines_run
 
 
@@ -109,7 +106,7 @@ def test_shapes_in_weights_are_shapes(shape: object, monkeypatch: pytest.MonkeyP
     }
     text = json.dumps(outer).encode()
     data = struct.pack("<Q", len(text)) + text
-    monkeypatch.setattr("scenelang.models.weights.read_regular", lambda path, most: data)
+    monkeypatch.setattr("scenelang.compiler.weights.read_regular", lambda path, most: data)
     with pytest.raises(ModelError, match="has no shape"):
         read_facts("shapes2d")
 
@@ -159,7 +156,7 @@ def test_pictures_are_numbers_however_large_the_moves(moves: str, after: str) ->
 
 def test_a_step_of_a_call_is_no_more_work_than_one_of_a_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """Doubling functions took half a minute to ten million steps, where a loop took two seconds."""
-    monkeypatch.setattr("scenelang.evaluate.session.MAX_STEPS", 50_000)
+    monkeypatch.setattr("scenelang.language.session.MAX_STEPS", 50_000)
 
     def stopped(text: str) -> None:
         with pytest.raises(SceneError, match="E0322"):

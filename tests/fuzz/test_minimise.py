@@ -10,7 +10,7 @@ import pytest
 from fuzz.__main__ import main
 from fuzz.minimise import failure_of, minimise
 from fuzz.target import Target, hold, load_target
-from scenelang.evaluate.values.operators import divide
+from scenelang.language.values import divide
 
 
 def check(data: bytes) -> None:

@@ -13,7 +13,7 @@ from types import FrameType
 import pytest
 
 from fuzz.pumps import READERS, Pump
-from scenelang.syntax.tables import tables
+from scenelang.language.tables import tables
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no timer of processor time")
 

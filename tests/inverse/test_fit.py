@@ -13,11 +13,11 @@ from PIL import ImageDraw, ImageFilter
 
 import scenelang
 from scenelang.cli.main import cli
-from scenelang.diagnostics.span import SourceFile
-from scenelang.image import Image
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import psnr
 from scenelang.inverse import search
-from scenelang.inverse.fitted import Fit
-from scenelang.measure.metrics import psnr
+from scenelang.inverse.fit import Fit
+from scenelang.language.diagnostics import SourceFile
 
 SCENE = """\
 // where is it?

@@ -7,9 +7,9 @@ import pytest
 from scipy import ndimage
 
 import scenelang
-from scenelang.diagnostics.span import SourceFile
-from scenelang.image import decoded, encoded
-from scenelang.inverse.target import Blur, blurred
+from scenelang.drawing.image import decoded, encoded
+from scenelang.inverse.search import Blur, blurred
+from scenelang.language.diagnostics import SourceFile
 
 TEXT = """
 canvas(64, 64); background(#ffffff); param size = 0.3 in 0.2..0.8;

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Source
-from scenelang.inverse.plane import SoftPlane
-from scenelang.inverse.problem import Moment, Problem
-from scenelang.inverse.rates import Rates, numbers_of
-from scenelang.inverse.several import Together
-from scenelang.inverse.soft import softened
-from scenelang.inverse.space import Point, space_of
-from scenelang.inverse.target import Target, over
-from scenelang.program.program import Program
-from scenelang.renderers.draw import draw_objects
+from scenelang.compiler.program import Program
+from scenelang.drawing.neural.draw import draw_objects
+from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
+from scenelang.inverse.problem import Moment, Problem, Together
+from scenelang.inverse.search import Point, Target, over, space_of
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source
 
 STAR = "star { scale(s, 0.6); rotate(a); translate(x, 0.1); material flat { color(#3366aa); } }"
 SCENES = {

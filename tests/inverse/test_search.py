@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scenelang.inverse import search
-from scenelang.inverse.search import Found
-from scenelang.inverse.space import Axis, Knob, Space
+from scenelang.inverse.search import Axis, Found, Knob, Space
 
 
 def box(*wraps: bool) -> Space:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from scenelang.diagnostics.span import SourceFile
-from scenelang.image import decoded, encoded
-from scenelang.inverse.task import Task, task_of
+from scenelang.drawing.image import decoded, encoded
+from scenelang.inverse.fit import Task, task_of
+from scenelang.language.diagnostics import SourceFile
 
 TEXT = """
 canvas(40, 40); background(#ffffff); animate(seconds = 1s, fps = 4); param x = 0 in -0.5..0.5;

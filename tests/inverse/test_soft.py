@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Source
 from scenelang.inverse.problem import Moment, Problem
-from scenelang.inverse.space import space_of
-from scenelang.inverse.target import Target
+from scenelang.inverse.search import Target, space_of
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source
 
 TEXT = """
 canvas(32, 32); background(#ffffff); param x = 0 in -0.5..0.5; param s = 0.5 in 0.2..0.8;

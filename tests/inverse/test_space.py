@@ -7,15 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.diagnostics.span import SourceFile
-from scenelang.evaluate.evaluation import Source
-from scenelang.evaluate.ranges import rewritten
-from scenelang.evaluate.values.value import Vec, unpack
-from scenelang.fitting.mesh import FitError
+from scenelang.drawing.exact.mesh import FitError
 from scenelang.inverse.problem import Moment
-from scenelang.inverse.space import Space, space_of
-from scenelang.syntax import parse
+from scenelang.inverse.search import Space, space_of
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source, rewritten
+from scenelang.language.parser import parse
+from scenelang.language.values import Vec, unpack
 
 TEXT = """\
 nsg 1;  // all kinds of params

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lab.sets.scenes import scenes_of
-from scenelang.backend.neural import open_model
+from scenelang.drawing.torch_backend import open_model
 
 
 def test_solids_are_compared_with_their_own_converged_picture_and_the_definition(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from lab import ROOT
 from lab.cli import command as lab
 from lab.training.checkpoint import save_tensors
 from lab.training.config import CONFIGS, read_config
-from tests.hardening.processes import leavings, one_line
-from tests.hardening.test_writing import full
+from tests.assets.processes import leavings, one_line
+from tests.assets.test_writing import full
 from tests.lab.conftest import run
 
 

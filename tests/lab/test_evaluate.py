@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import scenelang as nsg
 from lab.cli import command
 from lab.sets.scenes import scenes_of
-from scenelang.models.load import load_model
+from scenelang.drawing.neural.load import load_model
 
 
 def test_figures_of_solids_are_those_of_the_pictures_users_get(

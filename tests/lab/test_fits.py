@@ -7,8 +7,8 @@ import pytest
 
 import scenelang
 from lab.fits import FAR_DB, random_case
-from scenelang.measure.metrics import over_white, psnr
-from scenelang.models.manifest import load_manifest
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.metrics import over_white, psnr
 
 SIDE = 64
 

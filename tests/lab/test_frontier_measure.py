@@ -12,7 +12,7 @@ import pytest
 import scenelang as nsg
 from lab.frontier import measure, verify, ways
 from lab.frontier.measure import Case, median_interval
-from scenelang.measure.frontier import Errors, Frontier, between
+from scenelang.output.frontier import Errors, Frontier, between
 from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder
 from tests.cli.test_choosing import ladder

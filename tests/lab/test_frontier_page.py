@@ -18,9 +18,9 @@ from matplotlib.text import Text
 from lab.charts import pyplot
 from lab.frontier.chart import frontier_chart, frontier_figure, short_name
 from lab.frontier.page import frontier_page, picture_uri
-from scenelang.image import Image, from_samples
-from scenelang.measure.frontier import between, frontier_path, load_frontier
-from scenelang.models.manifest import available
+from scenelang.compiler.manifest import available
+from scenelang.drawing.image import Image, from_samples
+from scenelang.output.frontier import between, frontier_path, load_frontier
 from tests.measure.test_choose import frontier, point
 
 ROOT = Path(__file__).parents[2]

@@ -33,8 +33,7 @@ from lab.sets.scenes import draw_scene
 from lab.training.checkpoint import load_tensors, save_tensors
 from lab.training.config import CONFIGS
 from lab.training.scenes import GEOMETRIES
-from scenelang.renderers.reading import ReadingConfig
-from scenelang.renderers.streaming import Streaming, StreamingConfig
+from scenelang.drawing.neural.paper import ReadingConfig, Streaming, StreamingConfig
 
 WIDTH = 0.08  # of 256 filters 20, which carry what a vector holds
 

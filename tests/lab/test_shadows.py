@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from lab.cli import command
 from lab.shadows import shadow_mask
-from scenelang.graph.stage import Camera, Light
-from scenelang.models.manifest import load_manifest
-from scenelang.scene.schema import Material, Object, Scale, Scene, Translate
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.spaces import Camera, Light
+from scenelang.language.scene import Material, Object, Scale, Scene, Translate
 
 SIDE = 48
 

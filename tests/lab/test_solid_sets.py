@@ -7,9 +7,9 @@ import pytest
 
 from lab.sets.scenes import coverage, scenes_of
 from lab.sets.solids import SOLID_SETS
-from scenelang.models.load import Model, load_model
-from scenelang.program.compile import compile_scene
-from scenelang.scene.schema import Camera, Object, Scale, Scene, Translate
+from scenelang.compiler.compile import compile_scene
+from scenelang.drawing.neural.load import Model, load_model
+from scenelang.language.scene import Camera, Object, Scale, Scene, Translate
 
 STAGE = ("camera", "light", "ground", "background")
 

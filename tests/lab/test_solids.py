@@ -12,10 +12,9 @@ import torch
 from lab.training.config import SolidsConfig, config_data, is_solids, read_solids_config
 from lab.training.leaves import half_rays
 from lab.training.solids import fit_cell, fit_decoders, fit_segments, polish_decoders, train_solids
-from scenelang.models.framed import load_arrays
-from scenelang.models.solid import solid_arrays
-from scenelang.renderers.solid.network import SolidArrays, SolidConfig
-from scenelang.renderers.solid.parameters import Solids
+from scenelang.drawing.neural.files import load_arrays, solid_arrays
+from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.solid.network import SolidArrays, SolidConfig
 
 TINY = SolidsConfig("solids3d", 3, 4, 4, 20, 4, SolidConfig(width=4, segment=4))
 

@@ -27,14 +27,14 @@ from lab.stability import (
     scene_of,
     unfolded,
 )
-from scenelang.image import Image
-from scenelang.measure.metrics import MOST_DB, psnr
-from scenelang.models.load import Model, load_model
-from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.renderers.arrays import NUMPY
-from scenelang.renderers.frames import Frames
-from scenelang.scene.schema import Chain, Object, Scale, Scene, Translate
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import MOST_DB, psnr
+from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.neural.load import Model, load_model
+from scenelang.language.scene import Chain, Object, Scale, Scene, Translate
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDED = {

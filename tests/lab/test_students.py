@@ -9,17 +9,16 @@ import torch
 from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
 from lab.designs.students import LiftingConfig, StudentConfig, make_student
 from lab.training.scenes import GEOMETRIES
-from scenelang.diagnostics.diagnostic import Diagnostics
-from scenelang.graph.lower import lower
-from scenelang.graph.steps import Affine, Warp
-from scenelang.lifting.learned import lift_geometry, lift_material, read_lifting
-from scenelang.models.load import load_model
-from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.reference.image import reference_image
-from scenelang.renderers.reading import ReadingConfig
-from scenelang.renderers.streaming import StreamingConfig
-from scenelang.scene.schema import Bend, Chain, Color, Link, Material, Matrix, Object, Scene, Twirl
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.lifting import lift_geometry, lift_material, read_lifting
+from scenelang.compiler.lower import lower
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.steps import Affine, Warp
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.paper import ReadingConfig, StreamingConfig
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.scene import Bend, Chain, Color, Link, Material, Matrix, Object, Scene, Twirl
 
 WORDS = ("union", "smooth", "subtract", "intersect")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lab.symmetric import LEAVES, Decoder, Floats, Start, hiding, placed
-from scenelang.reference.field import leaf_distance
-from scenelang.renderers.network import RADIUS
+from scenelang.drawing.exact.field import leaf_distance
+from scenelang.drawing.neural.network import RADIUS
 
 KINDS = ("ggve", "gve11")
 

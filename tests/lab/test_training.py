@@ -14,9 +14,9 @@ from lab.training.checkpoint import load_tensors, pack_training, unpack_training
 from lab.training.config import Phase, TrainConfig, read_config
 from lab.training.loop import train
 from lab.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
-from scenelang.models.load import load_model
-from scenelang.renderers.network import FramedConfig
-from tests.reference import oracle
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.network import FramedConfig
+from tests.drawing import oracle
 
 WORDS = ("union", "smooth", "subtract", "intersect")
 

@@ -12,30 +12,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
-from scenelang.backend.load import Load
-from scenelang.image import enlarged, from_samples
-from scenelang.measure.choose import (
-    NothingFits,
-    choose,
-    error_scale,
-    machine_scale,
-    offers,
-    refusal,
-)
-from scenelang.measure.frontier import (
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.image import enlarged, from_samples
+from scenelang.drawing.small import Load
+from scenelang.language.scene import Object, Scale, Scene, Twist
+from scenelang.output.frontier import (
     Cost,
     Errors,
     Frontier,
     Limits,
+    NothingFits,
     Point,
     Quality,
     Times,
     between,
+    choose,
+    error_scale,
     front,
+    machine_scale,
+    offers,
+    refusal,
 )
-from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.scene.schema import Object, Scale, Scene, Twist
 
 
 def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
@@ -254,7 +252,7 @@ def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyP
     assert refusal(point("x", 1, 0.1, offered=False, why_not="no"), scene, program) == "no"
     assert refusal(point("x", 1, 0.1, model="none"), scene, program) == "not installed"
     fixed = replace(load_manifest("shapes2d"), sizes=((64, 64),), white=True)
-    monkeypatch.setattr("scenelang.measure.choose.load_manifest", lambda _: fixed)
+    monkeypatch.setattr("scenelang.output.frontier.load_manifest", lambda _: fixed)
     assert refusal(one, scene, program) == (
         "a canvas of 256 x 256 pixels; model `shapes2d` draws only 64 x 64"
     )

@@ -7,12 +7,10 @@ import pytest
 
 import scenelang as nsg
 from lab.frontier.fit import fit_cost
-from scenelang.backend.load import Load, load_of
-from scenelang.backend.small import draw_small
-from scenelang.measure.choose import predicted_ms, yardstick
-from scenelang.measure.frontier import Cost
-from scenelang.program.compile import compile_scene
-from scenelang.scene.schema import Object, Scale, Scene, Translate
+from scenelang.compiler.compile import compile_scene
+from scenelang.drawing.small import Load, draw_small, load_of
+from scenelang.language.scene import Object, Scale, Scene, Translate
+from scenelang.output.frontier import Cost, predicted_ms, yardstick
 
 
 def test_cost_is_found_again() -> None:

@@ -10,10 +10,10 @@ import pytest
 
 from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.sets.scenes import interval, sets_of, spread
-from scenelang.measure.metrics import compare, flip, flip_map, psnr, ssim
-from scenelang.models.manifest import load_manifest
-from scenelang.program.compile import compile_scene
-from scenelang.words import OPERATIONS, TEXTURES
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.metrics import compare, flip, flip_map, psnr, ssim
+from scenelang.language.words import OPERATIONS, TEXTURES
 
 GREY = np.full((32, 48, 3), 0.5, np.float32)
 

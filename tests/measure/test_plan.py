@@ -11,15 +11,15 @@ import pytest
 from click.testing import CliRunner
 
 import scenelang as nsg
-from scenelang.backend.neural import draw_program
 from scenelang.cli.main import cli
-from scenelang.graph.nodes import Graph
-from scenelang.measure.plan import choice, drawing_cost, stages, token_counts
-from scenelang.models.load import load_model
-from scenelang.passes import PASSES
-from scenelang.program.compile import compile_scene
-from scenelang.renderers.draw import draw
-from scenelang.renderers.field import SLACK
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.passes import PASSES
+from scenelang.drawing.neural.draw import draw
+from scenelang.drawing.neural.field import SLACK
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.torch_backend import draw_program
+from scenelang.output.plan import choice, drawing_cost, stages, token_counts
 
 SCENE = """
 subtract { pentagon { scale(0.4); } triangle { scale(0.1); } }

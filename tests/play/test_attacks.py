@@ -10,10 +10,8 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from scenelang.play.folder import Folder
-from scenelang.play.journal import Journal
-from scenelang.play.live import Live
-from scenelang.play.shared import Play
+from scenelang.web.folder import Folder, Journal
+from scenelang.web.live import Live, Play
 from tests.play.client import Page, Server
 from tests.play.conftest import SQUARE
 

@@ -8,7 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-SOURCE, WEB = ROOT / "editors/playground", ROOT / "scenelang/play/web"
+SOURCE, WEB = ROOT / "editors/playground", ROOT / "scenelang/web/editor"
 
 
 def test_the_bundle_is_made_of_the_locked_packages() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenelang.play.folder import Changed, Folder, Refused, fits
+from scenelang.web.folder import Changed, Folder, Refused, fits
 
 ESCAPES = [
     *("../out.nsg", "a/../../out.nsg", "..", ".", "", "/etc/passwd", "/tmp/out.nsg", "a//b.nsg", "/", "a/"),

@@ -14,7 +14,7 @@ from starlette.responses import PlainTextResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from scenelang.play.guard import HEADERS, Guard, is_loopback, policy
+from scenelang.web.server import HEADERS, Guard, is_loopback, policy
 
 TOKEN, HERE = "t" * 43, "127.0.0.1:8766"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.play.journal import MOST_DAYS, MOST_KEPT, Journal, state_folder
+from scenelang.web.folder import MOST_DAYS, MOST_KEPT, Journal, state_folder
 
 SCENE = Path("/scenes/a.nsg")
 

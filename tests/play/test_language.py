@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from websockets.sync.client import ClientConnection
 
-from scenelang.play.folder import Folder
-from scenelang.play.language import Elsewhere, checked
+from scenelang.web.folder import Folder
+from scenelang.web.language import Elsewhere, checked
 from tests.play.client import WAIT_S, Server
 from tests.play.conftest import SQUARE
 

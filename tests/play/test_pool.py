@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from scenelang.play.answer import JobFailed
-from scenelang.play.pool import Pool
+from scenelang.web.jobs import JobFailed
+from scenelang.web.pool import Pool
 from tests.play.client import below, children
 
 SLOW = "for (i in 0..2999) { for (j in 0..2999) { let x = i * j; } } square;"

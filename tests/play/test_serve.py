@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import scenelang as nsg
 from scenelang.cli.main import cli
-from scenelang.play.serve import PORT, listen
+from scenelang.web.server import PORT, listen
 from tests.play.client import Server, below, is_there
 from tests.play.conftest import SQUARE
 from tests.play.page import served

@@ -13,7 +13,7 @@ from tests.browser import watched
 
 pytestmark = pytest.mark.browser
 ROOT = Path(__file__).parents[2]
-MODULE = (ROOT / "scenelang/play/web/statements.js").read_text("utf-8")
+MODULE = (ROOT / "scenelang/web/editor/statements.js").read_text("utf-8")
 SCRIPT = re.sub("^export ", "", MODULE, flags=re.MULTILINE)
 LINE = "camera(eye = [9, 8, 7], target = [1, 0.5, 0], fov = 20deg);"
 EXAMPLES = [(path, path.read_text("utf-8")) for path in sorted(ROOT.glob("examples/*.nsg"))]

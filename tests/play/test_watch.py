@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from scenelang.play import folder as folders
-from scenelang.play import watch as watching
-from scenelang.play.folder import Folder
-from scenelang.play.journal import Journal
-from scenelang.play.shared import Play
+from scenelang.web import folder as folders
+from scenelang.web import server as watching
+from scenelang.web.folder import Folder, Journal
+from scenelang.web.live import Play
 
 
 class Page:

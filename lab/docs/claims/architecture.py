@@ -1,8 +1,8 @@
 """Figures in docs/architecture.md."""
 
 from lab.docs.figures import Figure
-from scenelang.backend.options import THREAD_PIXELS
-from scenelang.backend.small import MOST_MS
+from scenelang.drawing.how import THREAD_PIXELS
+from scenelang.drawing.small import MOST_MS
 
 CLAIMS = [
     f"one thread for each {Figure(THREAD_PIXELS):,.0f} pixels",

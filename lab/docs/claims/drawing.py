@@ -1,8 +1,8 @@
 """Figures in docs/drawing.md."""
 
 from lab.docs.figures import Figure
-from scenelang.renderers.solid.draw import PACES
-from scenelang.renderers.solid.march import CAREFUL
+from scenelang.drawing.solid.draw import PACES
+from scenelang.drawing.solid.march import CAREFUL
 
 FOUR, QUICK, ONE = CAREFUL, PACES["quick"], PACES["one"]
 CLAIMS = [

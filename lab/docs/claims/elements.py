@@ -1,14 +1,15 @@
 """Figures in docs/elements.md."""
 
 from lab.docs.figures import Figure
-from scenelang.fitting import apart, colours, picture
+from scenelang.drawing.exact import outline
+from scenelang.inverse import colours, sandbox
 
 CLAIMS = [
-    f"at most {Figure(apart.READ_S)} s of processor time, and {Figure(apart.MEGABYTE_S)} s more for each MB "
-    f"of it up to {Figure(apart.MOST_READ_S)}, with {Figure(apart.READ / (1 << 30))} GiB of memory and "
-    f"{Figure(apart.TIMES)} times its size; it measures it in {Figure(apart.CPU_S)} s "
-    f"(or twice the budget) and {Figure(apart.MEMORY / (1 << 30))} GiB",
-    f"at most `--max-error`, {Figure(picture.NEAR_COLOUR)}, which",
+    f"at most {Figure(sandbox.READ_S)} s of processor time, and {Figure(sandbox.MEGABYTE_S)} s more for each "
+    f"MB of it up to {Figure(sandbox.MOST_READ_S)}, with {Figure(sandbox.READ / (1 << 30))} GiB of memory "
+    f"and {Figure(sandbox.TIMES)} times its size; it measures it in {Figure(sandbox.CPU_S)} s "
+    f"(or twice the budget) and {Figure(sandbox.MEMORY / (1 << 30))} GiB",
+    f"at most `--max-error`, {Figure(outline.NEAR_COLOUR)}, which",
     f"at most `--color-error`, {Figure(colours.NEAR)}, up",
     f"about {Figure(colours.MOST_BYTES / 1000)} KB.",
 ]

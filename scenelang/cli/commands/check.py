@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.assets.files import followed, write_whole
+from scenelang.cli import inputs
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
-from scenelang.diagnostics.cells import printable
-from scenelang.diagnostics.suggest import plural
-from scenelang.files import followed, write_whole
+from scenelang.language.diagnostics import plural
+from scenelang.language.reports import printable
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from scenelang.cli.checking import Scenes
     from scenelang.cli.inputs import Request
-    from scenelang.diagnostics.diagnostic import Diagnostic
-    from scenelang.diagnostics.fixes import Settled
-    from scenelang.program.check import Frames
+    from scenelang.compiler.check import Frames
+    from scenelang.language.diagnostics import Diagnostic, Settled
+
 
 Format = Literal["human", "json", "sarif", "github", "concise"]
 
@@ -32,7 +32,7 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     """Codes of warnings, or beginnings of them, from ``W0501`` and ``W02,W05``."""
     if not values:
         return ()
-    from scenelang.diagnostics.pages import CODES
+    from scenelang.language.pages import CODES
 
     found = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
     for code in found:
@@ -47,10 +47,10 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 @click.argument("files", nargs=-1, required=True, metavar="PATH…")
 @click.option("--fix", "fixes", is_flag=True, help="Apply the safe fixes; report what is left.")
 @click.option("--diff", is_flag=True, help="Show what --fix would change, and change nothing.")
-@options.strict
+@inputs.strict
 @click.option("--select", multiple=True, metavar="CODES", callback=_codes, help="Report only these warnings.")
 @click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave out these warnings.")
-@options.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
+@inputs.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
 @click.option(
     "--max-diagnostics",
     "most",
@@ -59,9 +59,9 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     help="Largest number to write; all are counted.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
-@options.color
+@inputs.color
 @click.option("--all-frames", is_flag=True, help="Look at all frames of the animation.")
-@options.request
+@inputs.request
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -74,7 +74,7 @@ def command(
     kind: Format,
     most: int | None,
     quiet: bool,
-    color: options.Color,
+    color: inputs.Color,
     all_frames: bool,
     request: Request,
 ) -> None:
@@ -123,10 +123,10 @@ def command(
 
 def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     """Take in all scenes, folders' too; False where something cannot be read."""
-    from scenelang.cli import folders
+    from scenelang.cli import inputs
 
     lost: list[OSError] = []
-    names = list(folders.named(paths, lost.append))
+    names = list(inputs.named(paths, lost.append))
     for name in names:
         try:
             scenes.read(name)
@@ -135,7 +135,7 @@ def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     for trouble in lost:
         say_trouble(describe(trouble))
     if not lost and not names:
-        say_trouble(f"no scenes (*{folders.SUFFIX}) there")
+        say_trouble(f"no scenes (*{inputs.SUFFIX}) there")
     return bool(names) and not lost
 
 
@@ -170,7 +170,7 @@ class _Output:
     kind: Format
     most: int | None
     quiet: bool
-    color: options.Color
+    color: inputs.Color
     to_stderr: bool
     scenes: Scenes
 
@@ -180,7 +180,7 @@ class _Output:
         if self.kind != "human":
             text = _for_machines(found, self.kind, self.most)
         elif found:
-            from scenelang.diagnostics.render_text import in_order, render_text
+            from scenelang.language.reports import in_order, render_text
 
             text = render_text(
                 found,
@@ -216,15 +216,15 @@ class _Output:
 def _for_machines(found: Sequence[Diagnostic], kind: Format, most: int | None) -> str:
     from importlib.metadata import version
 
-    from scenelang.diagnostics import render_machine
-    from scenelang.diagnostics.render_text import in_order
+    from scenelang.language import machine
+    from scenelang.language.reports import in_order
 
     shown = in_order(found)[:most]
     if kind == "sarif":
-        return render_machine.render_sarif(shown, version("scenelang"))
+        return machine.render_sarif(shown, version("scenelang"))
     renderers = {
-        "json": render_machine.render_json,
-        "github": render_machine.render_github,
-        "concise": render_machine.render_concise,
+        "json": machine.render_json,
+        "github": machine.render_github,
+        "concise": machine.render_concise,
     }
     return renderers[kind](shown)

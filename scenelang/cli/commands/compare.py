@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import options
-from scenelang.cli.progress import Bar
-from scenelang.cli.say import need_metrics
+from scenelang.cli import inputs
+from scenelang.cli.say import Bar, need_metrics
 
 if TYPE_CHECKING:
-    from scenelang.backend.options import How
     from scenelang.cli.inputs import Request
+    from scenelang.drawing.how import How
 
 
 @click.command("compare")
@@ -21,9 +20,9 @@ if TYPE_CHECKING:
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path), help="Picture to write; by default SCENE-compare.png."
 )
-@options.request
-@options.originals
-@options.drawing("device", "threads")
+@inputs.request
+@inputs.originals
+@inputs.drawing("device", "threads")
 @click.pass_context
 def command(ctx: click.Context, scene: str, out: Path | None, request: Request, how: How) -> None:
     """Draw SCENE with the network and exactly, and show where they differ.
@@ -32,17 +31,16 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: Request, 
     and FLIP. Transparent pictures are compared over white.
     """
     from scenelang.cli.inputs import stem_of
-    from scenelang.cli.jobs import prepare_scene
-    from scenelang.cli.outputs import composed
+    from scenelang.cli.jobs import composed, prepare_scene
 
     need_metrics()
     target = out if out is not None else composed(Path(f"{stem_of(scene)}-compare.png"))
     job = prepare_scene(scene, request)
     if job.program is None or job.scene is None or job.failed():
         ctx.exit(1)
-    from scenelang.backend.neural import choose_device
-    from scenelang.backend.render import draw, draw_exact
-    from scenelang.measure.metrics import compare, over_white, side_by_side
+    from scenelang.drawing.metrics import compare, over_white, side_by_side
+    from scenelang.drawing.render import draw, draw_exact
+    from scenelang.drawing.torch_backend import choose_device
 
     picture = over_white(draw(job.program, how, place=choose_device(how.device)).image)
     with Bar() as bar:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import options
-from scenelang.cli.progress import Clock
+from scenelang.cli import inputs
+from scenelang.cli.say import Clock
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 @click.command("compile")
 @click.argument("file", metavar="FILE")
 @click.option("-o", "--out", required=True, metavar="OUT", help="Program to write, .safetensors.")
-@options.request
-@options.strict
-@options.verbose
+@inputs.request
+@inputs.strict
+@inputs.verbose
 @click.pass_context
 def command(ctx: click.Context, file: str, out: str, request: Request, strict: bool, verbose: bool) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.say import put_out, say_diagnostics
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
+
 
 Kind = Literal["nsg", "json"]
 SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json"}
@@ -19,14 +20,14 @@ SUFFIXES: Final[dict[str, Kind]] = {".nsg": "nsg", ".json": "json"}
 
 @click.command("convert")
 @click.argument("file", metavar="FILE")
-@options.out
+@inputs.out
 @click.option(
     "--to",
     "kind",
     type=click.Choice(["nsg", "json"]),
     help="Format to write; by default the one of OUT's suffix (.nsg, .json).",
 )
-@options.request
+@inputs.request
 @click.pass_context
 def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, request: Request) -> None:
     """Write a scene as text or JSON.
@@ -44,6 +45,6 @@ def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, r
     say_diagnostics(found.diagnostics)
     if found.scene is None or found.diagnostics.errors:
         ctx.exit(1)
-    from scenelang.scene.json import to_readable_json
+    from scenelang.language.scene_json import to_readable_json
 
     put_out(to_readable_json(found.scene) if wanted == "json" else found.scene.to_nsg(), out)

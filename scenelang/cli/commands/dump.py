@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.main import Trouble
 from scenelang.cli.say import put_out
-from scenelang.diagnostics.suggest import plural
-from scenelang.passes import PASSES
-from scenelang.words import COMBINE
+from scenelang.compiler.passes import PASSES
+from scenelang.language.diagnostics import plural
+from scenelang.language.words import COMBINE
 
 if TYPE_CHECKING:
-    from scenelang.backend.options import How
     from scenelang.cli.inputs import Input, Request
+    from scenelang.drawing.how import How
+
 
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
 _DRAWN: Final = ("mmd", "dot", "svg", "png")
@@ -55,9 +56,9 @@ _PATIENCE_S: Final = 60
     show_default=True,
     help="Largest number of boxes to draw.",
 )
-@options.out
-@options.request
-@options.drawing("device", "threads")
+@inputs.out
+@inputs.request
+@inputs.drawing("device", "threads")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -119,7 +120,7 @@ def command(
 
 def _changes(job: Input, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
     """The differences that the passes made, of those that made any; all passes, or the wanted."""
-    from scenelang.interchange.dumps import changes, dump
+    from scenelang.editors.dumps import changes, dump
 
     before, old = "", "nothing"
     for name, graph in job.graphs.items():
@@ -133,14 +134,7 @@ def _changes(job: Input, wanted: tuple[str, ...]) -> Iterator[dict[str, Any]]:
 
 def _whole(job: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str, Any]]:
     """The stages that were reached, as text or as data."""
-    from scenelang.interchange.dumps import (
-        dump,
-        graph_data,
-        program_data,
-        program_table,
-        tree_data,
-        tree_text,
-    )
+    from scenelang.editors.dumps import dump, graph_data, program_data, program_table, tree_data, tree_text
 
     known: dict[str, tuple[str, Any, Callable[[Any], Any], Callable[[Any], str]]] = {
         name: ("graph", graph, graph_data, dump) for name, graph in job.graphs.items()
@@ -159,7 +153,7 @@ def _whole(job: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str,
 
 def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
     """The graph of a stage as Mermaid or DOT, of so many boxes at most."""
-    from scenelang.interchange.drawing import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
+    from scenelang.editors.dumps import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
 
     assert job.scene is not None
     assert job.program is not None
@@ -201,9 +195,9 @@ def _picture(dot: str, kind: str, text: str) -> bytes:
 
 def _plan(job: Input, request: Request, how: How) -> dict[str, Any]:
     """Draw the scene and say what that took."""
-    from scenelang.backend.neural import choose_device, open_model
-    from scenelang.backend.options import threads_for
-    from scenelang.measure.plan import plan_of
+    from scenelang.drawing.how import threads_for
+    from scenelang.drawing.torch_backend import choose_device, open_model
+    from scenelang.output.plan import plan_of
 
     assert job.scene is not None
     assert job.program is not None

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.say import wants_color
 
 if TYPE_CHECKING:
-    from scenelang.diagnostics.pages import Page
+    from scenelang.language.pages import Page
+
 
 _WIDEST = 96
 
@@ -23,14 +24,14 @@ _WIDEST = 96
 @click.command("explain")
 @click.argument("code", required=False)
 @click.option("--list", "listed", is_flag=True, help="List all codes, as without a CODE.")
-@options.choice("--format", "kind", words="human json", help="Format of pages.")
-@options.color
-def command(code: str | None, listed: bool, kind: str, color: options.Color) -> None:
+@inputs.choice("--format", "kind", words="human json", help="Format of pages.")
+@inputs.color
+def command(code: str | None, listed: bool, kind: str, color: inputs.Color) -> None:
     """Say what CODE means, such as E0401, with an example and what to write instead.
 
     A word instead of a code lists the codes whose pages have it.
     """
-    from scenelang.diagnostics.pages import CODES, read_page
+    from scenelang.language.pages import CODES, read_page
 
     paint = wants_color(sys.stdout, color)
     if code is None or listed:
@@ -53,7 +54,7 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
 
 def _about(word: str) -> list[str]:
     """The codes whose pages have a word, in British or American spelling, in their text or examples."""
-    from scenelang.diagnostics.pages import CODES, read_page
+    from scenelang.language.pages import CODES, read_page
 
     def plain(text: str) -> str:
         return text.lower().replace("colour", "color").replace("grey", "gray")
@@ -62,7 +63,7 @@ def _about(word: str) -> list[str]:
 
 
 def _print_list(codes: list[str], kind: str, paint: bool) -> None:
-    from scenelang.diagnostics.pages import AREAS, read_page
+    from scenelang.language.pages import AREAS, read_page
 
     if kind == "json":
         data = [{"code": p.code, "severity": p.severity, "title": p.title} for p in map(read_page, codes)]
@@ -100,6 +101,6 @@ def _print_page(page: Page, kind: str, paint: bool) -> None:
 
 
 def _styled(text: str, style: str, paint: bool) -> str:
-    from scenelang.diagnostics import cells
+    from scenelang.language import reports
 
-    return cells.paint(style, text, paint)
+    return reports.paint(style, text, paint)

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import options
-from scenelang.cli.progress import Clock
-from scenelang.cli.say import say_trouble
+from scenelang.cli import inputs
+from scenelang.cli.say import Clock, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Request
@@ -18,9 +17,9 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
 @click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
-@options.request
-@options.strict
-@options.verbose
+@inputs.request
+@inputs.strict
+@inputs.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -41,13 +40,11 @@ def command(
     Scenes with errors are reported and left out. Exits with 1 if there are any, 2 if a file cannot be read
     or written.
     """
+    from scenelang.assets.files import write_output
     from scenelang.cli.inputs import stem_of
-    from scenelang.cli.jobs import prepare_all
-    from scenelang.cli.outputs import PAGE, targets
-    from scenelang.files import write_output
-    from scenelang.program.program import ProgramError
-    from scenelang.viewer.export import scene_view, still
-    from scenelang.viewer.page import page
+    from scenelang.cli.jobs import PAGE, prepare_all, targets
+    from scenelang.compiler.program import ProgramError
+    from scenelang.web.export import page, scene_view, still
 
     if title is not None and len(files) > 1:
         raise click.UsageError("--title is of one page; several have the names of their files.")

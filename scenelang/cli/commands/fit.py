@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
+from scenelang.cli.jobs import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.outputs import targets
-from scenelang.cli.progress import Bar
-from scenelang.cli.say import put_out, say_diagnostics, say_trouble
+from scenelang.cli.say import Bar, put_out, say_diagnostics, say_trouble
 
 if TYPE_CHECKING:
-    from scenelang.evaluate.session import Defines
+    from scenelang.language.session import Defines
+
 
 NOT_CONVERGED = 1
 MOST_FRAMES = 10_000  # whose pictures are looked for
@@ -37,7 +37,7 @@ def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[flo
 
 def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Path | dict[int, Path]:
     """One picture, or several by frames."""
-    from scenelang.animation.targets import Target, is_pattern
+    from scenelang.output.frames import Target, is_pattern
 
     found: dict[int, Path] = {}
     for value in values:
@@ -85,10 +85,10 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     "--start",
     multiple=True,
     metavar="NAME=VALUE",
-    callback=options.assignments,
+    callback=inputs.assignments,
     help="Value to begin with, instead of the param's default.",
 )
-@options.define
+@inputs.define
 @click.option(
     "--mask",
     type=click.Path(path_type=Path),
@@ -112,14 +112,14 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 @click.option(
     "--budget",
     default=300.0,
-    type=options.Real(0, min_open=True),
+    type=inputs.Real(0, min_open=True),
     show_default=True,
     metavar="SECONDS",
     help="Time after which nothing new is begun.",
 )
-@options.frame
-@options.model
-@options.root
+@inputs.frame
+@inputs.model
+@inputs.root
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -146,11 +146,11 @@ def command(
     SCENE with other defaults, all else as it was. The report says how near the picture is and how far each
     param is known. The exit code is 1 where the search did not come to an end.
     """
-    from scenelang.animation.api import animate as render
-    from scenelang.animation.targets import is_animation
-    from scenelang.diagnostics.error import SceneError
-    from scenelang.fitting.mesh import FitError
-    from scenelang.inverse.api import fit
+    from scenelang.drawing.exact.mesh import FitError
+    from scenelang.inverse.fit import fit
+    from scenelang.language.reports import SceneError
+    from scenelang.output.animate import animate as render
+    from scenelang.output.frames import is_animation
 
     if compare is not None:
         targets(["compare"], compare)

@@ -7,14 +7,14 @@ from typing import Final
 
 import click
 
-from scenelang.cli.folders import SUFFIX, named
+from scenelang.assets.files import followed, read_regular, write_whole
+from scenelang.assets.records import deep_stack
+from scenelang.cli.inputs import SUFFIX, named
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_diagnostics, say_trouble, show_difference
-from scenelang.deep import deep_stack
-from scenelang.diagnostics.error import SceneError
-from scenelang.diagnostics.suggest import plural
-from scenelang.evaluate.limits import MAX_BYTES
-from scenelang.files import followed, read_regular, write_whole
+from scenelang.language.diagnostics import plural
+from scenelang.language.limits import MAX_BYTES
+from scenelang.language.reports import SceneError
 
 STDIN: Final = "-"
 
@@ -61,7 +61,7 @@ class _Run:
 
     def take(self, name: str) -> None:
         """Format one file."""
-        from scenelang.formatting import format_text
+        from scenelang.language.formatting import format_text
 
         try:
             text = self._read(name)
@@ -70,7 +70,7 @@ class _Run:
             result = format_text(text, name=_shown(name))
         except SceneError as error:
             if self.check:
-                from scenelang.diagnostics.render_machine import render_concise
+                from scenelang.language.machine import render_concise
 
                 more = f", and {len(error.diagnostics) - 1:,} more" if error.diagnostics[1:] else ""
                 click.echo(f"{render_concise(error.diagnostics[:1]).rstrip()}{more}", err=True)

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.assets.element import MOST_PIXELS, TEXELS
+from scenelang.cli import inputs
+from scenelang.cli.jobs import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.outputs import targets
-from scenelang.cli.progress import Bar
-from scenelang.cli.say import say_trouble
-from scenelang.elements.element import MOST_PIXELS, TEXELS
+from scenelang.cli.say import Bar, say_trouble
 
 if TYPE_CHECKING:
-    from scenelang.fitting.mesh import Sign
+    from scenelang.drawing.exact.mesh import Sign
 
 
 @click.command("learn")
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     "-o", "--out", required=True, metavar="ZOO", help="File of elements to write or to add to, .safetensors."
 )
 @click.option("--name", metavar="NAME", help="Name of the element; by default the file's.")
-@options.choice(
+@inputs.choice(
     "--as",
     "pictures",
     words="texture outline",
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Texels of a texture along its longer side, at most; larger pictures are made smaller.",
 )
-@options.choice(
+@inputs.choice(
     "--sign",
     words="auto winding closed",
     help="Test for the inside: winding numbers, of any mesh, or normals, of a closed one that "
@@ -54,13 +53,13 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--color-error",
-    type=options.Real(0, 1, min_open=True),
+    type=inputs.Real(0, 1, min_open=True),
     metavar="SHARE",
     help="Largest root mean square error of a mesh's colours; by default 0.025.",
 )
 @click.option(
     "--max-error",
-    type=options.Real(0, 1, min_open=True),
+    type=inputs.Real(0, 1, min_open=True),
     metavar="SHARE",
     help="Largest mean error of distances at the surface, in radii of the shape, by default 0.00015 "
     "for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
@@ -68,7 +67,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--budget",
-    type=options.Real(0, min_open=True),
+    type=inputs.Real(0, min_open=True),
     default=math.inf,
     metavar="SECONDS",
     help="Time after which nothing new is begun, for each file.",
@@ -78,7 +77,7 @@ if TYPE_CHECKING:
 )
 @click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")
 @click.option("--source", metavar="TEXT", help="Origin of the originals, kept in the file.")
-@options.cluster
+@inputs.cluster
 @click.option("--preview", metavar="OUT.png", help="Write a picture of all elements of the file.")
 def command(
     files: tuple[str, ...],
@@ -110,10 +109,9 @@ def command(
 
     A scene says: import "zoo.safetensors" as zoo; zoo.cow { … }
     """
-    from scenelang.elements.zoo import SUFFIX, load_zoo
-    from scenelang.fitting.learn import learn, names_of
-    from scenelang.fitting.making import Wish
-    from scenelang.fitting.mesh import FitError
+    from scenelang.assets.zoo import SUFFIX, load_zoo
+    from scenelang.drawing.exact.mesh import FitError
+    from scenelang.inverse.learn import Wish, learn_files, names_of
 
     if not out.endswith(SUFFIX):
         raise click.UsageError(f"`{out}` does not end in {SUFFIX}.")
@@ -127,12 +125,12 @@ def command(
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            learn(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
+            learn_files(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
         for line in str(error).split("\n"):
             say_trouble(line)
         raise click.exceptions.Exit(Trouble.exit_code) from None
     if preview is not None:
-        from scenelang.backend.thumbnail import sheet
+        from scenelang.drawing.small import sheet
 
         sheet(load_zoo(out).elements).save(preview)

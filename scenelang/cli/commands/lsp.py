@@ -9,7 +9,7 @@ import click
 from scenelang.cli.main import Trouble
 
 if TYPE_CHECKING:
-    from scenelang.elements.element import Element
+    from scenelang.assets.element import Element
 
 
 @click.command("lsp")
@@ -30,7 +30,7 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     if stdio and tcp is not None:
         raise click.UsageError("--stdio and --tcp exclude each other.")
     try:
-        from scenelang.lsp.handlers import make_server
+        from scenelang.editors.handlers import make_server
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
             raise
@@ -57,6 +57,6 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
 
 def _thumbnail(element: Element) -> bytes:
     """A small PNG; numpy and the rest are imported when the first is asked for."""
-    from scenelang.backend.thumbnail import thumbnail
+    from scenelang.drawing.small import thumbnail
 
     return thumbnail(element, 96).encode()

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 
 if TYPE_CHECKING:
-    from scenelang.models.manifest import Manifest
+    from scenelang.compiler.manifest import Manifest
 
 
 @click.command("models")
 @click.argument("name", required=False)
-@options.choice("--format", "kind", words="human json", help="Format of what is printed.")
+@inputs.choice("--format", "kind", words="human json", help="Format of what is printed.")
 def command(name: str | None, kind: Literal["human", "json"]) -> None:
     """List the models, or tell all about the model NAME.
 
     That is its manifest (what it can draw, which ranges it was trained or measured in, what was
     measured), its weights, and how they were trained.
     """
-    from scenelang.models.manifest import available, load_manifest
+    from scenelang.compiler.manifest import available, load_manifest
 
     known = available()
     if name is None:
@@ -44,7 +44,7 @@ def command(name: str | None, kind: Literal["human", "json"]) -> None:
 
 def _facts(manifest: Manifest) -> dict[str, Any]:
     """Manifest and weights; the weights are null where they are missing or damaged."""
-    from scenelang.models.weights import ModelError, read_facts
+    from scenelang.compiler.weights import ModelError, read_facts
 
     try:
         weights: dict[str, Any] | None = asdict(read_facts(manifest.name))

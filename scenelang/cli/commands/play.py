@@ -40,10 +40,9 @@ def command(path: Path, port: int | None, host: str, no_browser: bool, root: Pat
     with exit code 130.
     """
     try:
-        from scenelang.play.folder import Folder, fits
-        from scenelang.play.guard import is_loopback
-        from scenelang.play.serve import serve
-        from scenelang.play.shared import Play
+        from scenelang.web.folder import Folder, fits
+        from scenelang.web.live import Play
+        from scenelang.web.server import is_loopback, serve
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in _PARTS:
             raise

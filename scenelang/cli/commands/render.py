@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.main import Trouble
-from scenelang.cli.progress import Bar, Clock
+from scenelang.cli.say import Bar, Clock
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from scenelang.backend.options import How
     from scenelang.cli.inputs import Input, Request
-    from scenelang.image import Image
-    from scenelang.outputs import Output, Outputs
+    from scenelang.drawing.how import How
+    from scenelang.drawing.image import Image, Output, Outputs
 
 
 _SECTIONS: Final = {
@@ -29,7 +28,7 @@ _SECTIONS: Final = {
 }
 
 
-@click.command("render", cls=options.Sectioned, sections=_SECTIONS)
+@click.command("render", cls=inputs.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option(
     "-o",
@@ -38,16 +37,16 @@ _SECTIONS: Final = {
     metavar="OUT",
     help="Picture, animation, numbered pictures or folder to write.",
 )
-@options.request
-@options.frames
-@options.fps
-@options.jobs
-@options.cluster
-@options.choice(
+@inputs.request
+@inputs.frames
+@inputs.fps
+@inputs.jobs
+@inputs.cluster
+@inputs.choice(
     "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
 )
 @click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
-@options.drawing()
+@inputs.drawing()
 @click.option(
     "--output",
     "outputs",
@@ -60,19 +59,19 @@ _SECTIONS: Final = {
 @click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
 @click.option(
     "--max-ms",
-    type=options.Real(0, min_open=True),
+    type=inputs.Real(0, min_open=True),
     metavar="N",
     help="Choose the most exact way to draw that takes at most N milliseconds on one thread.",
 )
 @click.option(
     "--max-flip",
-    type=options.Real(0, 1),
+    type=inputs.Real(0, 1),
     metavar="E",
     help="Choose the fastest way to draw whose promised FLIP error is at most E.",
 )
-@options.originals
-@options.strict
-@options.verbose
+@inputs.originals
+@inputs.strict
+@inputs.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -119,11 +118,9 @@ def command(
     says which, why, and what was next.
     """
     from scenelang.cli.animation import Film, animate, moves
-    from scenelang.cli.drawing import choose_all
     from scenelang.cli.inputs import read_input, unused_defines
-    from scenelang.cli.jobs import PROGRAM, prepare_all
-    from scenelang.cli.outputs import check_outputs, targets
-    from scenelang.measure.frontier import Limits
+    from scenelang.cli.jobs import PROGRAM, check_outputs, choose_all, prepare_all, targets
+    from scenelang.output.frontier import Limits
 
     outputs = tuple(dict.fromkeys(outputs))
     more = _More(outputs, prove or redraw or "proof" in outputs, redraw)
@@ -190,10 +187,9 @@ class _More(NamedTuple):
 
 def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[[float], None]) -> list[str]:
     """Draw a job to a file; lines about it."""
-    from scenelang.backend.outputs import outputs_of
-    from scenelang.backend.prove import prove_drawn
-    from scenelang.cli.drawing import blank, draw_job
-    from scenelang.outputs import Outputs
+    from scenelang.cli.jobs import blank, draw_job
+    from scenelang.drawing.image import Outputs
+    from scenelang.drawing.render import outputs_of, prove_drawn
 
     found, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
     if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
@@ -216,7 +212,7 @@ def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[
 
 def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
     """Write a picture and its outputs; a line about each of these."""
-    from scenelang.image import save_outputs
+    from scenelang.drawing.image import save_outputs
 
     try:
         files = save_outputs(image, outputs, path)

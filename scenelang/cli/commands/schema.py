@@ -6,23 +6,23 @@ import json
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.say import put_out
 
 
 @click.command("schema")
-@options.choice(
+@inputs.choice(
     "--kind",
     words="scene diagnostics manifest",
     help="Schema of scenes as JSON, of what `check --format json` prints, or of a model's manifest.",
 )
-@options.out
+@inputs.out
 def command(kind: str, out: str | None) -> None:
     """Print the JSON Schema (draft 2020-12) of scenes as JSON.
 
     Editors complete and check by it; validators refuse by it what scenelang refuses, as far as a schema
     can say.
     """
-    from scenelang.interchange.schemas import SCHEMAS
+    from scenelang.editors.dumps import SCHEMAS
 
     put_out(json.dumps(SCHEMAS[kind](), indent=2, ensure_ascii=False) + "\n", out)

@@ -10,32 +10,31 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from scenelang.cli import options
+from scenelang.cli import inputs
 from scenelang.cli.main import describe
 from scenelang.cli.say import wants_color
-from scenelang.diagnostics.suggest import plural
+from scenelang.language.diagnostics import plural
 
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.backend.options import How
     from scenelang.cli.inputs import Request
-    from scenelang.watching.picture import Easel, Outcome
-    from scenelang.watching.screen import Screen
+    from scenelang.drawing.how import How
+    from scenelang.output.watch import Easel, Outcome, Screen
 
 
 @click.command("watch")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("-o", "--out", metavar="OUT", help="Picture or animation to write; by default STEM.png.")
-@options.request
-@options.frames
-@options.fps
-@options.choice(
+@inputs.request
+@inputs.frames
+@inputs.fps
+@inputs.choice(
     "--show",
     words="auto never always",
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
-@options.drawing()
+@inputs.drawing()
 def command(
     file: Path,
     out: str | None,
@@ -54,9 +53,8 @@ def command(
     import sys
 
     from scenelang.cli.animation import Film
-    from scenelang.cli.outputs import composed, targets
-    from scenelang.watching.picture import Easel, Outdated, settle, stamps, wait
-    from scenelang.watching.screen import Screen
+    from scenelang.cli.jobs import composed, targets
+    from scenelang.output.watch import Easel, Outdated, Screen, settle, stamps, wait
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
     film, target = Film(frames, fps), None
@@ -81,7 +79,7 @@ def command(
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    from scenelang.backend.options import RenderError
+    from scenelang.drawing.how import RenderError
 
     clock = time.strftime("%H:%M:%S")
     try:

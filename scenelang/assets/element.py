@@ -1,0 +1,259 @@
+"""Elements: shapes and materials that users bring, and ready groups of them. Needs no numpy."""
+
+from __future__ import annotations
+
+import bz2
+import hashlib
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+from scenelang.assets.tensors import TensorError
+
+MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
+MOST_PIXELS: Final = 2048  # along a side of a picture
+TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
+
+
+class Form(NamedTuple):
+    """What an element can be.
+
+    Args:
+        sizes: its numbers, as headers call them.
+        codings: of its bytes; the first is meant where a header says none.
+        kinds: what manifests call its like, by dimension.
+    """
+
+    sizes: tuple[str, ...]
+    codings: tuple[str, ...]
+    kinds: dict[int, str]
+
+
+FORMS: Final = {
+    # a geometry: grids of distances over [-1, 1]^d (`scenelang.assets.pyramid`)
+    "pyramid": Form(
+        ("dimension", "cells", "levels"),
+        ("deflate", "bzip2"),
+        {2: "element of the plane", 3: "element of space"},
+    ),
+    # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
+    "picture": Form(("height", "width"), ("webp", "av1"), {2: "texture"}),
+    # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.colours`)
+    "colours": Form(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A geometry in the unit ball of its own space, or a material, that a user brought.
+
+    Args:
+        name: what scenes call it, behind the name of the import.
+        form: one of `FORMS`.
+        sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
+            coarsest grid along an axis, and grids, each of twice as many cells as the one before; a picture
+            height and width in texels; colours nodes along an axis, and steps from dark to light.
+        coding: of its bytes, one of the form's.
+        data: the bytes.
+        about: what its maker says of it: license, source, errors; text and numbers by their names.
+        digest: SHA-256, hex, of all that decides its shape or its colours.
+    """
+
+    name: str
+    form: str
+    sizes: tuple[int, ...]
+    coding: str
+    data: bytes = field(repr=False)
+    about: dict[str, str | float] = field(default_factory=dict, hash=False, compare=False)
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        words = (self.form, *self.sizes, *((self.coding,) if self.names_coding else ()))
+        said = "".join(f"{word} " for word in words).encode()
+        object.__setattr__(self, "digest", hashlib.sha256(said + self.data).hexdigest())
+
+    @property
+    def material(self) -> bool:
+        """Whether it is a material, and no geometry."""
+        return self.form != "pyramid"
+
+    @property
+    def names_coding(self) -> bool:
+        """Whether it is written how its bytes are coded; grids of distances were once all deflated."""
+        return self.material or self.coding != FORMS[self.form].codings[0]
+
+    @property
+    def dimension(self) -> int:
+        """Of the space that it fills."""
+        return self.sizes[0] if self.form == "pyramid" else 2 if self.form == "picture" else 3
+
+    @property
+    def kind(self) -> str:
+        """What manifests call its like."""
+        return FORMS[self.form].kinds[self.dimension]
+
+    def told(self) -> str:
+        """What there is to say of it, a line each."""
+        sides = self.sizes[::-1] if self.form == "picture" else (self.sides[-1],) * self.dimension
+        what = "colours" if self.material else "distances"
+        lines = [f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"]
+        return "\n".join([*lines, *(f"{key}: {value}" for key, value in self.about.items())])
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """Nodes along an axis of each grid."""
+        if self.form == "pyramid":
+            _, cells, levels = self.sizes
+            return tuple(cells * 2**level + 1 for level in range(levels))
+        if self.form == "picture":
+            return self.sizes
+        found = [self.sizes[0]]
+        while found[0] % 2 and found[0] >= 9:  # halved as far as that leaves 4 cells
+            found.insert(0, found[0] // 2 + 1)
+        return tuple(found)
+
+    @property
+    def held(self) -> int:
+        """Bytes that it takes unpacked, one a distance or a channel."""
+        if self.form == "picture":
+            return 3 * self.sizes[0] * self.sizes[1]
+        nodes: int = sum(side**self.dimension for side in self.sides)
+        return 3 * nodes if self.material else nodes
+
+    def inflated(self) -> bytes:
+        """The bytes of all nodes, of a form that has such.
+
+        Raises:
+            TensorError: they are damaged, fewer or more.
+        """
+        inflate = bz2.BZ2Decompressor() if self.coding == "bzip2" else zlib.decompressobj()
+        try:
+            found = inflate.decompress(self.data, self.held + 1)
+        except (zlib.error, OSError, EOFError) as error:
+            raise TensorError(f"element `{self.name}` is damaged: {error}") from None
+        if len(found) != self.held or not inflate.eof or inflate.unused_data:
+            raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")
+        return found
+
+
+def credit_of(elements: Iterable[Element]) -> str:
+    """What elements say of their licenses and sources, a line each; those that say neither are left out."""
+    said = [
+        (element.name, [str(element.about[key]) for key in ("license", "source") if key in element.about])
+        for element in elements
+    ]
+    return "\n".join(dict.fromkeys(f"{name}: {', '.join(what)}" for name, what in said if what))
+
+
+def in_range(form: str, sizes: tuple[int, ...]) -> bool:
+    """Whether sizes are ones that a form takes."""
+    if form == "picture":
+        return all(1 <= side <= MOST_PIXELS for side in sizes)
+    if form == "colours":
+        return 2 <= sizes[0] <= MOST_SIDE[3] and 4 <= sizes[1] <= 255
+    dimension, cells, levels = sizes
+    fits = dimension in MOST_SIDE and 2 <= cells <= 8 and 1 <= levels <= 9
+    return fits and cells * 2 ** (levels - 1) < MOST_SIDE[dimension]
+
+
+MOST_PARTS: Final = 256
+_MOST: Final = 1e4  # how far away or how large a part may be, and how small by its inverse
+_Numbers = tuple[float, ...]
+Painted = tuple[()] | tuple[float, float, float]  # a colour of sRGB, 0 to 1, or none
+
+
+class Part(NamedTuple):
+    """A geometry, where it lies in the unit ball or disc of the whole, and what it looks like.
+
+    Args:
+        geometry: its name in the file.
+        place: of its middle.
+        size: of its unit ball or disc.
+        turn: rows of what it is multiplied by before, a rotation or a reflection; empty for none.
+        color: sRGB, 0 to 1; empty for none.
+        material: the name of one in the file; empty for none.
+    """
+
+    geometry: str
+    place: _Numbers
+    size: float
+    turn: tuple[_Numbers, ...] = ()
+    color: Painted = ()
+    material: str = ""
+
+
+Group = tuple[Part, ...]  # in the order of painting
+
+
+def read_group(
+    name: str, entry: Any, geometries: Mapping[str, Element], materials: Mapping[str, Element]
+) -> Group:
+    """A group as a header has it.
+
+    Raises:
+        TensorError: it is damaged, too large, or has what the file does not hold.
+    """
+    if not (name.isascii() and name.isidentifier()):
+        raise TensorError(f"a group has the name {name[:40]!r}")
+    if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:
+        raise TensorError(f"group `{name}` is not a list of 1 to {MOST_PARTS} parts")
+    group: list[Part] = []
+    for fields in entry:
+        if not isinstance(fields, dict) or not {"geometry", "place", "size"} <= fields.keys() <= _FIELDS:
+            raise TensorError(f"a part of group `{name}` has missing or unknown fields")
+        part = Part(**{key: _frozen(value) for key, value in fields.items()})
+        shape = geometries.get(part.geometry) if isinstance(part.geometry, str) else None
+        if (
+            shape is None
+            or shape.dimension != geometries[group[0].geometry if group else shape.name].dimension
+        ):
+            raise TensorError(f"group `{name}` has a part that is not a geometry of its dimension")
+        worn = materials.get(part.material) if isinstance(part.material, str) else None
+        if part.material and (worn is None or worn.dimension > shape.dimension):
+            raise TensorError(f"group `{name}` has a material that the file does not hold")
+        if not _lies(part, shape.dimension):
+            raise TensorError(f"group `{name}` has numbers out of range")
+        group.append(part)
+    return tuple(group)
+
+
+_FIELDS: Final = frozenset(Part._fields)
+
+
+def told(group: Group) -> str:
+    """What there is to say of a group."""
+    counts = Counter(part.geometry for part in group)
+    shown = ", ".join(name if count == 1 else f"{count} {name}" for name, count in counts.items())
+    return f"group of {shown}"
+
+
+def _frozen(value: Any) -> Any:
+    if not isinstance(value, list):
+        return value
+    return tuple([tuple(item) if isinstance(item, list) else item for item in value])
+
+
+def _lies(part: Part, d: int) -> bool:
+    """Whether the numbers of a part are such, so many, and within bounds."""
+    rows = (part.place, (part.size,), *(part.turn if isinstance(part.turn, tuple) else (0,)), part.color)
+    if not all(isinstance(row, tuple) and all(type(x) in (int, float) for x in row) for row in rows):
+        return False
+    turned = not part.turn or ([len(row) for row in part.turn] == [d] * d and abs(_volume(part.turn)) > 1e-6)
+    placed = len(part.place) == d and all(abs(x) <= _MOST for x in (*part.place, *sum(part.turn, ())))
+    coloured = len(part.color) in (0, 3) and all(0 <= x <= 1 for x in part.color)
+    return turned and placed and coloured and 1 / _MOST <= part.size <= _MOST
+
+
+def _volume(rows: tuple[_Numbers, ...]) -> float:
+    """The determinant."""
+    if not rows:
+        return 1.0
+    minors = [tuple(row[:k] + row[k + 1 :] for row in rows[1:]) for k in range(len(rows))]
+    return float(sum((-1) ** k * rows[0][k] * _volume(minor) for k, minor in enumerate(minors)))
+
+
+def entry_of(group: Group) -> list[dict[str, Any]]:
+    """A group as a header has it."""
+    return [{key: value for key, value in part._asdict().items() if value not in ((), "")} for part in group]

@@ -1,0 +1,51 @@
+"""Scenes and Programs as notebooks show them.
+
+They stand before what draws them in the order of the package, and know nothing of it: the public `render` and
+the viewer are fetched by their names when a notebook asks.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import Any, Final, Literal
+
+MOST_PIXELS: Final = 1 << 21  # beyond, drawing takes longer than a look is worth
+SWITCH: Final = "SCENELANG_NOTEBOOK"
+
+Shows = Literal["viewer", "picture"]
+
+
+def set_notebook(shows: Shows) -> None:
+    """Choose how Scenes and Programs show in notebooks from now on.
+
+    Args:
+        shows: the interactive ``"viewer"``, as at first, or a ``"picture"``. The environment variable
+            ``SCENELANG_NOTEBOOK`` says the same.
+
+    Raises:
+        ValueError: neither.
+    """
+    if shows not in ("viewer", "picture"):
+        raise ValueError(f"notebooks show a `viewer` or a `picture`, not `{shows}`")
+    os.environ[SWITCH] = shows
+
+
+def bundle(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
+    """What stands for a value, by media type: a viewer, a picture, words; never an exception.
+
+    Frontends take the richest that they show and trust.
+    """
+    width, height = canvas
+    text = f"{said}, {width} × {height} pixels"
+    if width * height > MOST_PIXELS:
+        return {"text/plain": f"{text}: too large to be drawn in passing"}
+    try:
+        image = importlib.import_module("scenelang").render(value)
+        found = {"image/png": image._repr_png_(), "text/plain": text}
+        if os.environ.get(SWITCH, "viewer") != "picture":
+            html = importlib.import_module("scenelang.web.export").frame(value, image)
+            found |= {"text/html": html} if html else {}
+    except Exception as error:  # whatever it is: a cell that ends in a value has not failed
+        return {"text/plain": f"{text}\n\n{error}"}
+    return found

@@ -1,0 +1,178 @@
+"""Files of elements, which scenes import, checked without numpy as a stranger's.
+
+Such a zoo is a file of tensors (`scenelang.assets.tensors`), one of bytes for each element. The header's
+``elements`` say of each geometry what it is made of, whose tensor has its name, and in files of format 2
+``materials`` likewise, with tensors named ``material.NAME``: a geometry and a material may share a name.
+`scenelang.assets.element` has what an element can be. There ``groups`` may be too
+(`scenelang.assets.element`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.assets.element import FORMS, Element, Group, in_range, read_group
+from scenelang.assets.element import entry_of as group_entry
+from scenelang.assets.files import read_regular
+from scenelang.assets.picture import pixels
+from scenelang.assets.tensors import Tensor, TensorError, read_tensors
+
+SUFFIX: Final = ".safetensors"
+MOST_BYTES: Final = 32 << 20
+MOST_ELEMENTS: Final = 1000
+MOST_HELD: Final = 128 << 20  # bytes that all elements of a file take unpacked
+_MOST_TEXT: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Zoo:
+    """What a file of elements holds, by name; a geometry and a material may share theirs."""
+
+    geometries: dict[str, Element]
+    digest: str  # SHA-256 of the file, hex
+    materials: dict[str, Element] = field(default_factory=dict)
+    groups: dict[str, Group] = field(default_factory=dict)
+    folder: Path | None = field(default=None, compare=False)  # where it lies
+
+    @staticmethod
+    def of(elements: Iterable[Element], digest: str = "0" * 64) -> Zoo:
+        """The zoo of elements, without groups."""
+        listed = list(elements)
+        geometries = {element.name: element for element in listed if not element.material}
+        return Zoo(geometries, digest, {element.name: element for element in listed if element.material})
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """All of it, geometries first."""
+        return *self.geometries.values(), *self.materials.values()
+
+
+def load_zoo(path: str | Path) -> Zoo:
+    """Read a file of elements.
+
+    Raises:
+        OSError: it cannot be read.
+        TensorError: it is damaged, foreign or hostile.
+    """
+    found = os.stat(path)
+    return _load(os.fspath(path), found.st_mtime_ns, found.st_size, found.st_ino)
+
+
+@lru_cache(maxsize=16)
+def _load(path: str, *version: int) -> Zoo:
+    """The elements of a version of a file, which editors and animations ask for again and again."""
+    return replace(read_zoo(read_regular(path, MOST_BYTES)), folder=Path(path).parent)
+
+
+_TABLES: Final = {"elements": "", "materials": "material."}
+"""Tables of a header, and what stands in front of the names of their tensors."""
+
+
+def read_zoo(data: bytes) -> Zoo:
+    """The elements in the bytes of a file; every one is unpacked once, so that none is damaged.
+
+    Raises:
+        TensorError: the bytes are not those of such a file.
+    """
+    file = read_tensors(data, MOST_BYTES, (1, 2))
+    known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
+    tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
+    if file.header.keys() != known or not all(isinstance(table, dict) for table in tables.values()):
+        raise TensorError("not a file of elements")
+    listed_groups = tables.pop("groups", None) or {}
+    entries = [(key, name, entry) for key, table in tables.items() for name, entry in (table or {}).items()]
+    tensors = [_TABLES[key] + name for key, name, _ in entries]
+    if len(set(tensors)) < len(tensors) or {*tensors} != file.tensors.keys():
+        raise TensorError("its header names other elements than it holds")
+    if not 0 < len(entries) <= MOST_ELEMENTS:
+        raise TensorError(f"{len(entries):,} elements, where 1 to {MOST_ELEMENTS:,} are allowed")
+    listed = [(e[1], e[2], file.tensors[tensor]) for e, tensor in zip(entries, tensors, strict=True)]
+    found = read_elements(listed, file.body)
+    if any(e.material != (key == "materials") for (key, *_), e in zip(entries, found, strict=True)):
+        raise TensorError("a material among its geometries, or a geometry among its materials")
+    zoo = Zoo.of(found, hashlib.sha256(data).hexdigest())
+    if len(listed_groups) > MOST_ELEMENTS:
+        raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
+    held = zoo.geometries, zoo.materials
+    return replace(zoo, groups={name: read_group(name, e, *held) for name, e in listed_groups.items()})
+
+
+def read_elements(listed: Iterable[tuple[str, Any, Tensor]], body: memoryview) -> tuple[Element, ...]:
+    """The elements that names, entries of a header and tensors of a file tell of; each is unpacked once.
+
+    Raises:
+        TensorError: they are damaged, do not agree, or are more than can be held.
+    """
+    found, held = [], 0
+    for name, entry, tensor in listed:
+        element = _element(name, entry, tensor, body)
+        held += element.held
+        if held > MOST_HELD:
+            raise TensorError(f"elements of more than {MOST_HELD:,} bytes unpacked")
+        _ = pixels(element) if element.form == "picture" else element.inflated()
+        found.append(element)
+    return tuple(found)
+
+
+def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element:
+    if tensor.type != "U8" or len(tensor.shape) != 1:
+        raise TensorError(f"element `{name[:40]}` is not a row of bytes")
+    if not (name.isascii() and name.isidentifier()):
+        raise TensorError(f"an element has the name {name[:40]!r}")
+    form = FORMS.get(str(entry.get("form"))) if isinstance(entry, dict) else None
+    if form is None:
+        raise TensorError(f"element `{name}` has a form that this version does not know")
+    if entry.keys() - {"coding"} != {"form", "about", *form.sizes}:
+        raise TensorError(f"element `{name}` has missing or unknown fields")
+    coding = entry.get("coding", form.codings[0])
+    if coding not in form.codings:
+        raise TensorError(f"element `{name}` has a coding that this version does not know")
+    sizes = tuple(entry[key] for key in form.sizes)
+    if not all(type(size) is int for size in sizes) or not in_range(entry["form"], sizes):
+        raise TensorError(f"element `{name}` has sizes out of range")
+    about = entry["about"]
+    if not isinstance(about, dict) or not all(k.isidentifier() and is_said(v) for k, v in about.items()):
+        raise TensorError(f"what element `{name}` says of itself is not text and numbers")
+    return Element(name, entry["form"], sizes, coding, bytes(body[tensor.first : tensor.last]), about)
+
+
+def is_said(value: Any) -> bool:
+    """Whether an element may say this of itself: text of a bounded length, or a finite number."""
+    if isinstance(value, str):
+        return len(value) <= _MOST_TEXT and value.replace("\n", " ").isprintable()
+    return type(value) in (int, float) and abs(value) < 1e300
+
+
+def entry_of(element: Element) -> dict[str, Any]:
+    """What a header says of an element."""
+    sizes = dict(zip(FORMS[element.form].sizes, element.sizes, strict=True))
+    coding = {"coding": element.coding} if element.names_coding else {}
+    return {"form": element.form, **sizes, **coding, "about": element.about}
+
+
+def zoo_bytes(elements: Iterable[Element], groups: Mapping[str, Group] | None = None) -> bytes:
+    """The file of elements and groups; equal ones give equal bytes."""
+    import numpy as np
+    from safetensors.numpy import save
+
+    zoo = Zoo.of(sorted(elements, key=lambda element: element.name))
+    tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if zoo.materials or groups else {})
+    header: dict[str, Any] = {"format": len(tables)}
+    header |= {key: {e.name: entry_of(e) for e in table.values()} for key, table in tables.items()}
+    if len(tables) > 1:
+        header["groups"] = {name: group_entry(group) for name, group in (groups or {}).items()}
+    text = json.dumps(header, sort_keys=True, separators=(",", ":"))
+    tensors = {
+        _TABLES[key] + element.name: np.frombuffer(element.data, np.uint8)
+        for key, table in tables.items()
+        for element in table.values()
+    }
+    data: bytes = save(tensors, metadata={"scenelang": text})
+    return data

@@ -1,1 +1,0 @@
-"""What draws: a trained network, or the exact definition."""

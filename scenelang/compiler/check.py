@@ -1,0 +1,202 @@
+"""Everything that can be said of a scene before it is lifted, of some frames or all; imports no numpy.
+
+`check`, `check_text` and `fix_text` are for callers in Python.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from typing import Any, Literal
+
+from scenelang.compiler.compile import find_model
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.lower import Memory, Spans
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.passes import check_scene
+from scenelang.language import tree as nodes
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, settle
+from scenelang.language.evaluation import Evaluation, Source, in_file_order, name_frame
+from scenelang.language.reports import SceneError
+from scenelang.language.resolve import find_unused
+from scenelang.language.scene import Scene, same_nodes
+
+Frames = Literal["one", "some", "all"]
+"""Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
+
+After = Callable[[str, Graph], None]
+
+
+def check_compiles(
+    scene: Scene,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    *,
+    after: After | None = None,
+    memory: Memory | None = None,
+) -> Manifest | None:
+    """Run the compiler's checks; the manifest of the model that draws the scene, None where there is none.
+
+    Args:
+        spans: where its nodes were written, None if it did not come from text.
+        after, memory: as for `check_scene`.
+    """
+    manifest = find_model(scene, diagnostics, spans=spans)
+    if manifest is not None:
+        check_scene(scene, spans, diagnostics, manifest, after, memory=memory)
+    return manifest
+
+
+def check_frames(
+    evaluation: Evaluation,
+    diagnostics: Diagnostics,
+    *,
+    first: Scene | None = None,
+    every: bool = False,
+    after: After | None = None,
+) -> tuple[int, int]:
+    """Look at further frames of an animation whose first frame has been run.
+
+    They share the limits of one frame: where these are met, the rest is left out. Gives how many frames have
+    been looked at, and how many were to be.
+
+    Args:
+        evaluation: has run frame 0.
+        diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
+        first: the scene of frame 0, None if it has errors.
+        after: as for `check_compiles`.
+        every: look at all frames, instead of the second, the middle and the last one.
+    """
+    count, looked, last, memory = evaluation.frames, 1, first, Memory()
+    chosen = range(1, count) if every else sorted({1, count // 2, count - 1} - {0, count})
+    for frame in chosen:
+        if evaluation.spent:
+            break
+        looked += 1
+        scene, spans = evaluation.run(frame)
+        if scene is None or (last is not None and same_nodes(scene, last)):
+            continue
+        last, found = scene, Diagnostics()
+        check_compiles(scene, spans, found, after=after, memory=memory)
+        known = {d.code for d in diagnostics}
+        name_frame(found, 0, frame)
+        for d in found:
+            if d.severity == "error" or d.code not in known:
+                diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+    evaluation.warn_of_zeros()
+    return looked, len(chosen) + 1
+
+
+def check_evaluated(
+    tree: nodes.File | None,
+    evaluation: Evaluation | None,
+    scene: Scene | None,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    *,
+    frames: Frames = "some",
+) -> int:
+    """What there is to say of a scene beyond its evaluation.
+
+    Args:
+        tree: its text's; None for JSON.
+        evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
+        scene: what came of it, None if it has errors.
+        diagnostics: those of the evaluation; receives the others.
+
+    Returns:
+        How many frames were to be looked at and were not, as they exceed the limits of one scene.
+    """
+    left = 0
+    if scene is not None:
+        check_compiles(scene, spans, diagnostics)
+    if evaluation is not None and frames != "one":
+        looked, wanted = check_frames(evaluation, diagnostics, first=scene, every=frames == "all")
+        left = wanted - looked
+    if tree is not None and not diagnostics.errors:
+        find_unused(tree, diagnostics)  # a name that is misspelt where it is used is not a second mistake
+    return left
+
+
+def check(
+    path: str | os.PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    all_frames: bool = False,
+) -> Diagnostics:
+    """Everything there is to say of a scene file, as ``scenelang check`` says it.
+
+    Args:
+        path: the file.
+        params: values for params, as for `scenelang.load`.
+        model: check for this model instead of the one that the file names.
+        root: folder that imports cannot leave; by default the file's.
+        all_frames: look at all frames of an animation, not only at the first, second, middle and last one.
+
+    Returns:
+        Errors and warnings by their place; empty where there are none.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+    return _look(Source(path, params=params, model=model, root=root), all_frames)
+
+
+def check_text(
+    text: str,
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    all_frames: bool = False,
+    name: str = "<text>",
+) -> Diagnostics:
+    """Everything there is to say of scene text; as `check`. Imports are found only in ``root``.
+
+    Args:
+        text: the scene.
+        name: what diagnostics call it.
+    """
+    source = Source(text=SourceFile(name, text), params=params, model=model, root=root)
+    return _look(source, all_frames)
+
+
+def fix_text(
+    text: str,
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    name: str = "<text>",
+) -> tuple[str, Diagnostics]:
+    """Scene text after all safe fixes, and what is left, as ``scenelang check --fix`` has them.
+
+    Args:
+        text, params, model, root, name: as for `check_text`.
+    """
+
+    def look(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
+        text = SourceFile(name, texts[name])
+        found = _look(Source(text=text, params=params, model=model, root=root), False)
+        return [(name if d.span is not None and d.span.source.name == name else None, d) for d in found]
+
+    settled = settle({name: text}, look)
+    left = Diagnostics()
+    left.items.extend(d for _, d in settled.left)
+    return settled.texts[name], left
+
+
+def _look(source: Source, all_frames: bool) -> Diagnostics:
+    found = Diagnostics()
+    with suppress(SceneError):  # it is not text
+        source = source.parsed(found)
+        evaluation = source.evaluation(found, replays=True)
+        scene, spans = evaluation.run(0)
+        frames: Frames = "all" if all_frames else "some"
+        scene = None if found.errors else scene
+        check_evaluated(source.tree, evaluation, scene, spans, found, frames=frames)
+    found.items[:] = in_file_order(found.items)
+    return found

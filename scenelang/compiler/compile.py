@@ -1,0 +1,96 @@
+"""Scene to Program in one call. Imports numpy, never torch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
+
+from scenelang.compiler.choose import scene_dimension
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.lower import Memory, Spans
+from scenelang.compiler.manifest import USUAL, Manifest, available, load_manifest
+from scenelang.compiler.passes import check_scene
+from scenelang.language.diagnostics import Diagnostics, Span, did_you_mean
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
+
+if TYPE_CHECKING:
+    from scenelang.compiler.program import Program
+    from scenelang.compiler.weights import Codes
+
+
+def compile_scene(
+    scene: Scene | str | os.PathLike[str],
+    *,
+    spans: Spans | None = None,
+    diagnostics: Diagnostics | None = None,
+    model: str | None = None,
+    codes: Codes | None = None,
+    after: Callable[[str, Graph], None] | None = None,
+    without: Collection[str] = (),
+    memory: Memory | None = None,
+) -> Program:
+    """Compile a scene for a model.
+
+    Args:
+        scene: a concrete scene, or the path of one, which is read as by `scenelang.load`.
+        spans: where its nodes were written, for diagnostics and the source map; those of a file are known.
+        diagnostics: collects errors and warnings.
+        model: draw with this model instead of the one the scene names.
+        codes: lift with these instead of the model's shipped ones, for weights under trial.
+        after: called with ``"lower"`` and the name of each pass and the graph it left.
+        without: names of passes to leave out, of those that only save work (`scenelang.passes.OPTIONAL`).
+        memory: what the frame before left, of an animation whose frames share nodes; the same Program comes
+            out with or without it.
+
+    Returns:
+        The Program; the same scene always gives the same one, byte for byte.
+
+    Raises:
+        SceneError: the scene cannot be compiled; it carries all diagnostics.
+        FileNotFoundError: the model has no weights.
+        OSError: the file cannot be opened.
+        TypeError: neither a Scene nor a path.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    if not isinstance(scene, Scene):
+        from scenelang.language.evaluation import opened
+
+        scene, spans = opened(scene, found)
+    manifest = find_model(scene, found, model=model, spans=spans)
+    if manifest is not None:
+        graph = check_scene(scene, spans, found, manifest, after, without, memory)
+    if manifest is None or found.errors:
+        raise SceneError(found)
+    # Lifting is what needs numpy; scenes that are only checked or have errors never come this far.
+    from scenelang.compiler.emit import emit
+    from scenelang.compiler.weights import load_codes
+
+    return emit(graph, manifest, codes or load_codes(manifest.name))
+
+
+def find_model(
+    scene: Scene, diagnostics: Diagnostics, *, model: str | None = None, spans: Spans | None = None
+) -> Manifest | None:
+    """The manifest a scene is compiled for: the one asked for, that it names, or its dimension's usual one.
+
+    Where there is none of that name, ``diagnostics`` receives E0514.
+    """
+    name = model or scene.model or USUAL[scene_dimension(scene)]
+    try:
+        return load_manifest(name)
+    except KeyError:
+        place = spans.span(scene) if spans is not None and model is None else None
+        help, fix = f"the models are {', '.join(f'`{known}`' for known in available())}", None
+        if place is not None and (start := place.text.find(f'"{name}"')) >= 0:
+            start += place.start + 1
+            place = Span(place.source, start, start + len(name))
+            near, fix = did_you_mean(name, available(), place)
+            help = near or help
+        diagnostics.add("E0514", f"unknown model `{name}`", place, help=help, fix=fix)
+        return None
+
+
+compile = compile_scene
+"""`scenelang.compile`."""

@@ -1,0 +1,170 @@
+"""Stream to Program: chains are lifted, operators become tokens, boxes become bounds."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.chain import split_levels
+from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row, leaf_box
+from scenelang.compiler.groups import BEGINS, ENDS
+from scenelang.compiler.lifting import LAYOUTS, WIDTH, lift_colours, lift_geometry, lift_many, lift_material
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.program import Paint, Place, Program, ProgramError
+from scenelang.compiler.spaces import SPACES, Space
+from scenelang.compiler.weights import Codes
+from scenelang.language.diagnostics import Span
+from scenelang.language.words import TOKENS
+
+Bound = tuple[float, float, float, float]
+
+
+def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
+    """The Program of a stream that all passes have left without errors.
+
+    Raises:
+        ProgramError: the model's lifting is not one of this version.
+    """
+    if manifest.lifting != "exact" and codes.lifting is None:
+        raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
+    rows = graph.rows()
+    leaves = [row.leaf for row in rows]
+    listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
+    forms = {name: at for at, name in enumerate(listed)}
+    palette, worn = _palette(leaves)
+    materials = dict.fromkeys(paint.element for paint in palette)
+    return Program(
+        vectors=_blended(_vectors(leaves, manifest, codes), rows, manifest),
+        tokens=tokens_of(rows),
+        bounds=_bounds(graph),
+        canvas=graph.canvas,
+        background=graph.background,
+        stage=graph.stage,
+        model=manifest.name,
+        weights=codes.digest,
+        objects=tuple([leaf.geometry for leaf in leaves]),
+        places=places_of([leaf.span for leaf in leaves]),
+        numbers=tuple([leaf.number or at for at, leaf in enumerate(leaves, 1)]),
+        elements=(*[graph.elements[name] for name in listed], *materials),
+        forms=np.array([forms.get(leaf.geometry, -1) for leaf in leaves], dtype=np.int32),
+        palette=palette,
+        worn=worn,
+    )
+
+
+def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
+    """Tokens (N,) of the rows of a stream."""
+    return np.array([TOKENS[r.op] | BEGINS * r.begins | r.ends << ENDS for r in rows], dtype=np.int8)
+
+
+def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:
+    """The paints that rows wear, each once in the order of its first row, and which of them each wears."""
+    found: dict[Paint, int] = {}
+    known: dict[int, int] = {}
+    for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
+        known[id(look)] = -1
+        if look.element is not None:
+            steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
+            known[id(look)] = found.setdefault(Paint(look.element, tuple(steps)), len(found))
+    return tuple(found), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
+
+
+def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+    """Vectors (N, 64). Leaves that stay from frame to frame note theirs; a row depends on nothing else."""
+    note = "vector", codes.digest
+    known = {id(leaf): leaf.notes[note] for leaf in leaves if leaf.notes and note in leaf.notes}
+    fresh = [leaf for leaf in leaves if id(leaf) not in known]
+    made = _lifted(fresh, manifest, codes)
+    for leaf, vector in zip(fresh, made, strict=True):
+        if leaf.notes is not None:
+            leaf.notes[note] = vector.copy()
+    if not known:
+        return made
+    known |= {id(leaf): vector for leaf, vector in zip(fresh, made, strict=True)}
+    return np.stack([known[id(leaf)] for leaf in leaves])
+
+
+def _blended(
+    vectors: npt.NDArray[np.float32], rows: list[Row], manifest: Manifest
+) -> npt.NDArray[np.float32]:
+    """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
+    for at, row in enumerate(rows):
+        if row.k and row.op != "union":
+            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
+    return vectors
+
+
+def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
+    if not leaves:
+        return np.zeros((0, WIDTH), np.float32)
+    chains, colours = [leaf.steps for leaf in leaves], [leaf.look.rgb for leaf in leaves]
+    if codes.lifting is not None:
+        geometries = [manifest.geometries.index(leaf.geometry) for leaf in leaves]
+        materials = [manifest.materials.index(leaf.look.material) for leaf in leaves]
+        geometry = lift_geometry(codes.lifting, chains, geometries)
+        material = lift_material(codes.lifting, colours, materials)
+        vectors = np.concatenate([geometry, material], 1)
+    else:
+        layout, space = LAYOUTS[manifest.dimension], SPACES[manifest.dimension]
+        levels = [split_levels(chain, manifest.limits, space) for chain in chains]
+        nothing = (0.0,) * 4  # an element is told by its row
+        shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
+        painted = [codes.material[leaf.look.material] for leaf in leaves]
+        vectors = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
+        vectors += lift_many(levels, shapes, layout)  # other places
+    if (width := vectors.shape[1]) != WIDTH:
+        raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
+    # one zero only, so that equal scenes give equal bytes
+    return vectors.astype(np.float32) + np.float32(0.0)
+
+
+def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
+    """Boxes (N, 4) of the plane, or balls of space; outside a row makes no difference."""
+    found: list[Bound | None] = []
+
+    def bound(fold: Fold, later: Later, joins: bool) -> None:
+        for index in range(len(fold.links) - 1, -1, -1):
+            link = fold.links[index]
+            own = later.of(link.op, link.width)
+            if isinstance(link.node, Fold):
+                bound(link.node, own, link.op == "intersect")
+            else:
+                everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
+                found.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+            later = later.before(link.op, link.width)
+
+    bound(graph.root, Later(), False)
+    whole = graph.window()[:4]
+    if graph.stage is not None:
+        reach = max((hypot(*b[:3]) + b[3] for b in found if b is not None), default=0.0)
+        whole = 0.0, 0.0, 0.0, reach * (1.0 + 2.0**-20)
+    exact = np.array([b or whole for b in found[::-1]], dtype=np.float64).reshape(len(found), 4)
+    most = np.finfo(np.float32).max
+    rounded = np.clip(exact, -most, most).astype(np.float32)
+    if graph.stage is not None:
+        # A centre that is rounded moves by less than 2^-24 of itself.
+        rounded[:, 3] = np.clip(exact[:, 3] + 2.0**-22 * (1.0 + abs(exact).sum(1)), 0.0, most)
+        return rounded
+    # Rounding to float32 may not shrink a box.
+    low = np.where(rounded[:, :2] > exact[:, :2], np.nextafter(rounded[:, :2], -most), rounded[:, :2])
+    high = np.where(rounded[:, 2:] < exact[:, 2:], np.nextafter(rounded[:, 2:], most), rounded[:, 2:])
+    return np.concatenate([low, high], axis=1).astype(np.float32)
+
+
+def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
+    if space.dimension == 2:
+        return leaf_box(leaf, level, space)[:4]
+    return leaf.noted(("bound", level), lambda leaf: space.bound(leaf.geometry, leaf.steps, level))
+
+
+def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:
+    """Where spans lie in their files."""
+    known: dict[tuple[str, int, int] | None, Place | None] = {None: None}
+    keys = [None if span is None else (span.source.name, span.start, span.end) for span in spans]
+    for key, span in zip(keys, spans, strict=True):
+        if span is not None and key not in known:
+            start, end = span.locate()
+            known[key] = Place(span.source.name, *start, *end)
+    return tuple([known[key] for key in keys])

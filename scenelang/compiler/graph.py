@@ -1,0 +1,542 @@
+"""The Graph: leaves and folds with their moves and looks, conservative bounds, and invariants.
+
+A constant material is white everywhere, so moving it changes nothing and every operation acts on one colour,
+in the space it was written in: such a look folds to a colour. The operations of a texture act on each of its
+colours, clamped after each; they are kept in order, as no matrix clamps or turns a hue.
+
+A leaf is one object. A fold is a boolean node, a group or a chain: its links are joined from the left,
+``(first op second) op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a
+new graph. Walks are without recursion, so that depth costs memory and never the interpreter's stack.
+
+A *level* asks for more than the leaf itself: the box around all points whose world distance is below it,
+which is what a later `smooth` can feel. World distance is the leaf's own distance times the smallest
+stretch of its affine maps, so a level reaches ``level / stretch`` beyond the leaf in the leaf's own space:
+far, for a thin object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from colorsys import hsv_to_rgb, rgb_to_hsv
+from dataclasses import field
+from enum import Enum
+from math import inf, tau
+from operator import attrgetter
+from typing import Any, NamedTuple, TypeVar, cast
+
+from scenelang.assets.element import Element
+from scenelang.assets.records import Record
+from scenelang.compiler.spaces import Box, Space, Stage
+from scenelang.compiler.steps import Affine, Rows, Step, composed
+from scenelang.language.diagnostics import Span
+from scenelang.language.scene import Color, Grayscale, Hue, MaterialOp
+from scenelang.language.words import BLEND, Combine
+
+Triple = tuple[float, float, float]
+WHITE: Triple = (1.0, 1.0, 1.0)
+LUMA: Triple = (0.2126, 0.7152, 0.0722)
+MOST_STEPS = 1_000  # operations on the colours of a texture, in their normal form
+
+ColourStep = tuple[str, *tuple[float, ...]]
+"""``("color", r, g, b)``, ``("grayscale", amount)`` or ``("hue", turns)``."""
+
+
+class Look(Record):
+    """A material as an object wears it.
+
+    Args:
+        material: how it is lit: flat, diffuse or volumetric.
+        colours: operations on its colour, the first written first.
+        rgb: what the operations start from, in [0, 1], as written (sRGB in 2D): white, or what they came to
+            where the look has been folded.
+        element: of a texture, whose colours the operations start from instead.
+        texture: moves of the texture over the leaf's x and y, the first written first.
+    """
+
+    material: str
+    colours: tuple[ColourStep, ...] = ()
+    rgb: Triple = WHITE
+    element: Element | None = None
+    texture: tuple[Affine, ...] = ()
+
+    def colour(self) -> Triple:
+        """The colour of a constant material; of a texture, what white would become."""
+        return coloured(self.colours, self.rgb)
+
+    def folded(self) -> Look:
+        """The same look in its normal form: of a constant material one colour."""
+        if self.element is None:
+            return Look(self.material, rgb=self.colour()) if self.texture or self.colours else self
+        colours, moved = normal(self.colours), composed(self.texture)
+        texture = (Affine(moved),) if self.texture else ()
+        if (colours, texture) == (self.colours, self.texture):
+            return self
+        return Look(self.material, colours, self.rgb, self.element, texture)
+
+    @property
+    def moved(self) -> Rows:
+        """The map that its texture is moved by."""
+        return composed(self.texture)
+
+
+def colour_steps(ops: Iterable[MaterialOp]) -> tuple[ColourStep, ...]:
+    """The operations on a colour among those of a material."""
+    found: list[ColourStep] = []
+    for op in ops:
+        if isinstance(op, Color):
+            found.append(("color", *op.rgb))
+        elif isinstance(op, Grayscale):
+            found.append(("grayscale", op.amount))
+        elif isinstance(op, Hue):
+            found.append(("hue", op.angle / tau))
+    return tuple(found)
+
+
+def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
+    """The same operations, fewer: neighbours of a kind join where nothing is clamped between them.
+
+    What multiplies by shares, or mixes with the luma by a share, stays in [0, 1]; a hue has a period of 1.
+    """
+    found: list[ColourStep] = []
+    for step in steps:
+        joined: ColourStep | None = step
+        if found and found[-1][0] == step[0] and (step[0] == "hue" or _shares(found[-1])):
+            joined = _joined(found.pop(), step)
+        elif step[0] == "hue":
+            joined = _joined(("hue", 0.0), step)
+        if joined is not None and joined not in _IDLE:
+            found.append(joined)
+    return tuple(found)
+
+
+_IDLE: frozenset[ColourStep] = frozenset((("color", 1.0, 1.0, 1.0), ("grayscale", 0.0), ("hue", 0.0)))
+
+
+def _shares(step: ColourStep) -> bool:
+    return all(0.0 <= number <= 1.0 for number in step[1:])
+
+
+def _joined(one: ColourStep, other: ColourStep) -> ColourStep:
+    kind, *a = one
+    _, *b = other
+    if kind == "hue":
+        return kind, (a[0] + b[0]) % 1.0
+    if kind == "grayscale":
+        return kind, a[0] + b[0] - a[0] * b[0]
+    return kind, *[p * q for p, q in zip(a, b, strict=True)]
+
+
+def coloured(steps: Iterable[ColourStep], rgb: Triple = WHITE) -> Triple:
+    """What a colour (r, g, b) in [0, 1] becomes, each operation clamped."""
+    for kind, *numbers in steps:
+        r, g, b = rgb
+        if kind == "color":
+            rgb = _clamped(r * numbers[0], g * numbers[1], b * numbers[2])
+        elif kind == "grayscale":
+            y = r * LUMA[0] + g * LUMA[1] + b * LUMA[2]
+            rgb = _clamped(*(v + numbers[0] * (y - v) for v in rgb))
+        else:
+            h, s, v = rgb_to_hsv(r, g, b)
+            rgb = _clamped(*hsv_to_rgb((h + numbers[0]) % 1.0, s, v))
+    return rgb
+
+
+def _clamped(r: float, g: float, b: float) -> Triple:
+    return min(max(r, 0.0), 1.0), min(max(g, 0.0), 1.0), min(max(b, 0.0), 1.0)
+
+
+MOST_OPEN = 15  # groups of a stream within each other: a token has four bits for how many end
+BELOW = 1e-3  # world units below the ground that count as seen: more than a renderer's step behind a surface
+T = TypeVar("T")
+
+
+class Move(Record):
+    """A step and where it was written; a step that merges several keeps the place of the first."""
+
+    step: Step
+    span: Span | None = None
+
+
+class Leaf(Record):
+    """One object: a leaf geometry of a model, its look and its moves.
+
+    Args:
+        moves: steps into the parent's space, nearest the leaf first.
+        number: of the object in the scene as written, from 1; not part of the value.
+        notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
+            is; None for a leaf that is used once. It is not part of the value.
+    """
+
+    geometry: str
+    look: Look
+    moves: tuple[Move, ...] = ()
+    span: Span | None = None
+    number: int = 0
+    notes: dict[Any, Any] | None = None
+
+    _key = attrgetter("geometry", "look", "moves", "span")
+
+    def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
+        """The same object with another look or other moves."""
+        return Leaf(self.geometry, look, moves, self.span, self.number, None if self.notes is None else {})
+
+    def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
+        """What ``make`` gives for this leaf, noted under ``key`` where the leaf takes notes."""
+        if self.notes is None:
+            return make(self)
+        if key not in self.notes:
+            self.notes[key] = make(self)
+        return cast("T", self.notes[key])
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps of its moves."""
+        return tuple([move.step for move in self.moves])
+
+
+class Link(Record):
+    """A child of a fold with the operator that joins it to what came before; the first is a union.
+
+    ``k`` is the width of its blend as it was written, in world units, 0 where none was.
+    """
+
+    op: Combine
+    node: Node
+    k: float = 0.0
+
+    @property
+    def width(self) -> float:
+        """The width of the blend: of a `smooth` `BLEND` unless written; 0 for a sharp edge."""
+        return self.k or (BLEND if self.op == "smooth" else 0.0)
+
+
+class Fold(Record):
+    """Children folded from the left. Without links it is the empty set: distance +infinity.
+
+    Args:
+        kind: the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
+        moves: steps that apply to all children, nearest the leaf first.
+    """
+
+    kind: str
+    links: tuple[Link, ...]
+    moves: tuple[Move, ...] = ()
+    span: Span | None = None
+
+
+Node = Leaf | Fold
+
+
+class Row(NamedTuple):
+    """A leaf of a stream.
+
+    Args:
+        op: joins it to what stands before it in its group; of the first leaf of a group it joins that.
+        k: the width of that as written, 0 where none was.
+        begins: whether it is the first leaf of a group.
+        ends: how many groups end behind it.
+        cuts: whether something takes it away, or a group around it.
+    """
+
+    op: Combine
+    leaf: Leaf
+    k: float
+    begins: bool
+    ends: int
+    cuts: bool
+
+
+class Graph(Record):
+    """A whole scene as a graph for one model.
+
+    Args:
+        root: the top level, a fold of kind ``scene``; after `flatten` folds within it are groups of a stream.
+        background: colour in [0, 1] as written, or None for transparency.
+        stage: of a scene of solids, None in the plane.
+        elements: geometries that users brought, by name.
+    """
+
+    root: Fold
+    canvas: tuple[int, int]
+    background: tuple[float, float, float] | None
+    space: Space
+    stage: Stage | None = None
+    elements: dict[str, Element] = field(default_factory=dict)
+
+    def rooted(self, root: Fold) -> Graph:
+        """The same scene with another root."""
+        return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
+
+    def rows(self) -> list[Row]:
+        """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""
+        found: list[Row] = []
+        open_folds = [(iter(self.root.links), False)]
+        first: Link | None = None  # of a group, before its first leaf
+        while open_folds:
+            links, cut = open_folds[-1]
+            link = next(links, None)
+            if link is None:
+                open_folds.pop()
+                if open_folds:
+                    found[-1] = found[-1]._replace(ends=found[-1].ends + 1)
+                continue
+            cuts = cut or link.op == "subtract"
+            if isinstance(link.node, Fold):
+                first = link
+                open_folds.append((iter(link.node.links), cuts))
+                continue
+            op, k = (link.op, link.k) if first is None else (first.op, first.k)
+            found.append(Row(op, link.node, k, first is not None, 0, cuts))
+            first = None
+        return found
+
+    def window(self) -> Box:
+        """The part of the world that decides the picture.
+
+        In the plane it is what the canvas shows. In space nothing below the ground is seen from above it,
+        nor stands before a light above it; all else may at least throw a shadow on what is seen.
+        """
+        if (stage := self.stage) is not None:
+            floor = -inf if stage.ground is None else stage.ground.y
+            seen = stage.camera.eye[1] > floor and stage.light.position[1] > floor
+            return (-inf, floor - BELOW if seen else -inf, inf, inf, -inf, inf)
+        width, height = self.canvas
+        side = min(width, height)
+        return -width / side, -height / side, width / side, height / side, 0.0, 0.0
+
+
+def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[T]], T]) -> T:
+    """The value of ``root``: a leaf is worth ``leaf(it)``, a fold ``fold(it, its children's values)``."""
+    if isinstance(root, Leaf):
+        return leaf(root)
+    open_folds: list[tuple[Fold, list[T]]] = [(root, [])]
+    while True:
+        node, done = open_folds[-1]
+        if len(done) < len(node.links):
+            child = node.links[len(done)].node
+            if isinstance(child, Leaf):
+                done.append(leaf(child))
+            else:
+                open_folds.append((child, []))
+            continue
+        value = fold(node, done)
+        open_folds.pop()
+        if not open_folds:
+            return value
+        open_folds[-1][1].append(value)
+
+
+def nodes(root: Node) -> Iterator[Node]:
+    """Every node, parents before children, in file order."""
+    stack: list[Node] = [root]
+    while stack:
+        node = stack.pop()
+        yield node
+        if isinstance(node, Fold):
+            stack.extend([link.node for link in reversed(node.links)])
+
+
+def leaves(root: Node) -> Iterator[Leaf]:
+    """Every leaf, in file order."""
+    return (node for node in nodes(root) if isinstance(node, Leaf))
+
+
+def links_within(fold: Fold) -> Iterator[Link]:
+    """Every link of a fold and of those within it."""
+    return (link for node in nodes(fold) if isinstance(node, Fold) for link in node.links)
+
+
+def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:
+    """The graph with ``change`` applied to every leaf.
+
+    Args:
+        change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
+        name: of the change, under which leaves that stay from frame to frame note what became of them.
+    """
+
+    def leaf(node: Leaf) -> Node:
+        return change(node) if node.notes is None else node.noted(name, change)
+
+    def fold(node: Fold, children: list[Node]) -> Fold:
+        links = [Link(link.op, child, link.k) for link, child in zip(node.links, children, strict=True)]
+        return Fold(node.kind, tuple(links), node.moves, node.span)
+
+    return graph.rooted(fold(graph.root, [bottom_up(link.node, leaf, fold) for link in graph.root.links]))
+
+
+def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:
+    """A box that contains all points of the world whose distance to ``leaf`` is below ``level``.
+
+    Args:
+        leaf: with all its moves into the world.
+        level: world distance, at least 0; 0 for the leaf itself.
+    """
+    return leaf.noted(level, lambda leaf: space.box(leaf.geometry, leaf.steps, level))
+
+
+class Later(Record):
+    """The blends that see a row from behind it, and so how near its leaf has to come for the row to matter.
+
+    Two folds whose distances at a point are equal, or both at a level or above, are after a `smooth` equal,
+    or both at that level less its width or above; a union, a cut and an intersection keep the level. What is
+    cut out changes distances inside the picture, which blends see.
+
+    Args:
+        total: the sum of their widths, as a multiple of `BLEND`.
+        widest: the widest of them, world units; 0 for none.
+        count: how many they are.
+        inside: whether one of them sees distances inside what it blends.
+        everywhere: whether a row matters wherever its leaf is.
+    """
+
+    total: float = 0.0
+    widest: float = 0.0
+    count: int = 0
+    inside: bool = False
+    everywhere: bool = False
+
+    def of(self, op: Combine, width: float) -> Later:
+        """Blends that see the operand of an operator, itself included.
+
+        Of an intersection that is what sees all that stands before it, and with a width how deep inside its
+        operand points are. A subtraction with a width changes what lies within that of its operand.
+        """
+        everywhere = self.everywhere or (op == "subtract" and self.inside)
+        if not width or op == "intersect":
+            return Later(self.total, self.widest, self.count, self.inside or width > 0, everywhere)
+        return self._wider(width, self.inside or op == "smooth", everywhere)
+
+    def before(self, op: Combine, width: float) -> Later:
+        """Blends that see all that an operator joins its operand to, itself included."""
+        if not width:
+            return self
+        if op == "smooth":
+            return self._wider(width, True, self.everywhere)
+        return Later(self.total, self.widest, self.count, True, self.everywhere)
+
+    def _wider(self, width: float, inside: bool, everywhere: bool) -> Later:
+        total, widest = self.total + width / BLEND, max(self.widest, width)
+        return Later(total, widest, self.count + 1, inside, everywhere)
+
+    @property
+    def level(self) -> float | None:
+        """The level for `leaf_box` within which a row matters, None where it may anywhere."""
+        return None if self.everywhere else BLEND * self.total
+
+
+def overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes share a point."""
+    flat = a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
+    return flat and a[4] <= b[5] and b[4] <= a[5]
+
+
+def meet(a: Box, b: Box) -> Box | None:
+    """The box that two boxes share, None where they are apart."""
+    if not overlap(a, b):
+        return None
+    near, far = max(a[4], b[4]), min(a[5], b[5])
+    return max(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), min(a[3], b[3]), near, far
+
+
+class Invariant(Enum):
+    """A property that a pass establishes and every later one keeps."""
+
+    NO_IDENTITIES = "no move leaves every point where it is"
+    COMPOSITE = "every fold below the root has at least two links"
+    LOOKS = "the look of a constant material is one colour"
+    MERGED = "no two affine maps are neighbours"
+    AT_LEAVES = "no fold has moves"
+    STREAM = "folds within folds are groups: none is a first link, and few lie within each other"
+
+
+Checked = tuple[Space, bool, bool, bool]
+"""What must hold of each leaf: its maps are the space's; NO_IDENTITIES, MERGED and LOOKS or not."""
+
+Sound = dict[Checked, dict[int, Leaf]]  # leaves by identity, by what was checked of them
+
+
+class InternalError(RuntimeError):
+    """A bug of the compiler, not of the scene."""
+
+
+def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: Sound | None = None) -> Graph:
+    """Check a graph after ``stage``, the name of a pass or ``lower``, and give it back.
+
+    Args:
+        holds: what this stage and those before it established.
+        sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.
+
+    Raises:
+        InternalError: an invariant is broken.
+    """
+    fault = _fault(graph, frozenset(holds), {} if sound is None else sound)
+    if fault is not None:
+        raise InternalError(f"internal error after pass `{stage}`: it does not hold that {fault}")
+    return graph
+
+
+def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | None:
+    if graph.root.kind != "scene" or graph.root.moves:
+        return "the root is a scene without moves"
+    of_leaves = (i in holds for i in (Invariant.NO_IDENTITIES, Invariant.MERGED, Invariant.LOOKS))
+    checked: Checked = (graph.space, *of_leaves)  # type: ignore[assignment]
+    if checked not in sound:
+        sound.clear()
+    leaves = sound.setdefault(checked, {})
+    folds = [(graph.root, 0)]
+    while folds:
+        fold, depth = folds.pop()
+        fault = _fold_fault(fold, depth, holds) or _moves_fault(fold.moves, checked)
+        if fault is not None:
+            return fault
+        for link in fold.links:
+            node = link.node
+            if isinstance(node, Fold):
+                folds.append((node, depth + 1))
+            elif leaves.get(id(node)) is not node:
+                leaves[id(node)] = node
+                fault = node.noted(checked, lambda leaf: _leaf_fault(leaf, checked))
+                if fault is not None:
+                    return fault
+    return None
+
+
+def _fold_fault(fold: Fold, depth: int, holds: frozenset[Invariant]) -> str | None:
+    if fold.links and fold.links[0].op != "union":
+        return "the first link of a fold is a union"
+    if fold.moves and Invariant.AT_LEAVES in holds:
+        return Invariant.AT_LEAVES.value
+    if Invariant.STREAM in holds and (
+        depth > MOST_OPEN or (fold.links and isinstance(fold.links[0].node, Fold))
+    ):
+        return Invariant.STREAM.value
+    if depth and Invariant.COMPOSITE in holds and len(fold.links) < 2:
+        return Invariant.COMPOSITE.value
+    return None
+
+
+def _leaf_fault(leaf: Leaf, checked: Checked) -> str | None:
+    r, g, b = leaf.look.rgb
+    if not (0.0 <= r <= 1.0 and 0.0 <= g <= 1.0 and 0.0 <= b <= 1.0):
+        return "colours lie in [0, 1]"
+    if checked[3] and leaf.look.folded() is not leaf.look:
+        return Invariant.LOOKS.value
+    return _moves_fault(leaf.moves, checked)
+
+
+def _moves_fault(moves: tuple[Move, ...], checked: Checked) -> str | None:
+    space, tidy, merged, _ = checked
+    after_map = False
+    for move in moves:
+        step = move.step
+        if tidy and step.idle:
+            return Invariant.NO_IDENTITIES.value
+        if isinstance(step, Affine):
+            if not space.holds(step.rows):
+                return "a map stays within the space of its model"
+            if merged and after_map:
+                return Invariant.MERGED.value
+            after_map = True
+        else:
+            after_map = False
+    return None

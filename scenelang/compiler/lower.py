@@ -1,0 +1,361 @@
+"""Scene to Graph: transforms become steps, materials become colours, names are checked against a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from scenelang.assets.element import Element
+from scenelang.assets.textures import load_textures
+from scenelang.compiler import steps as affine
+from scenelang.compiler.graph import (
+    MOST_STEPS,
+    WHITE,
+    Fold,
+    Graph,
+    Leaf,
+    Link,
+    Look,
+    Move,
+    colour_steps,
+    normal,
+)
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, stage_of
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Twist, Warp
+from scenelang.language import scene as schema
+from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
+from scenelang.language.scene_data import Brought
+from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
+
+
+def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
+    """The step that a transform stands for, or why there is none.
+
+    In the plane nothing may leave it, and scales along z drop out.
+    """
+    if isinstance(transform, schema.Flip):
+        return Affine(affine.scaling(-1.0, 1.0))
+    if isinstance(transform, schema.Twirl):
+        return Warp(transform.k, (0.0, 0.0))
+    if isinstance(transform, schema.Bend):
+        return Warp(0.0, (transform.k, 0.0))
+    if isinstance(transform, (schema.Twist, schema.Displace)):
+        if space.dimension == 2:
+            fact = f"`{transform.kind}` leaves the plane"
+            return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
+        if isinstance(transform, schema.Twist):
+            return Twist(transform.k)
+        return Displace(transform.amount, transform.frequency)
+    fitted = space.fitted(transform, _rows(transform))
+    if isinstance(fitted, Refusal):
+        return fitted
+    if space.usable(fitted):
+        return Affine(fitted)
+    (smallest, largest), singular = space.stretches(fitted), f"`{transform.kind}` is singular"
+    if smallest <= SINGULAR * largest:
+        fact = f"{singular}: it flattens everything to {space.thinner}"
+        return Refusal("E0312", fact, "use factors other than 0")
+    fact = f"{singular} in float32: it stretches by {smallest:.3g} to {largest:.3g}"
+    return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
+
+
+def _rows(transform: schema.Transform) -> Rows:
+    if isinstance(transform, schema.Translate):
+        return affine.translation(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Scale):
+        return affine.scaling(transform.x, transform.y, transform.z)
+    if isinstance(transform, schema.Rotate):
+        return affine.rotation(transform.angle, transform.axis)
+    if isinstance(transform, schema.Shear):
+        return affine.shearing(transform.axes, transform.k)
+    assert isinstance(transform, schema.Matrix)
+    first, second, third, _ = transform.rows
+    return (*first, *second, *third)
+
+
+MAX_OBJECTS = 100_000
+MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
+
+
+class Spans(Protocol):
+    """What knows where a Scene's nodes were written; the evaluator's SpanMap does."""
+
+    def span(self, node: object) -> Span | None:
+        """The place of ``node``, None where it is unknown."""
+
+
+Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
+"""Objects, by identity, with the material around them and what they were lowered to."""
+
+
+class Memory:
+    """The leaves of the last frame of an animation: objects that stay keep theirs, with their notes."""
+
+    def __init__(self) -> None:
+        self.leaves: Leaves = {}
+        self.model = ""  # that they were lowered for
+
+
+def lower(
+    scene: schema.Scene,
+    manifest: Manifest,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    memory: Memory | None = None,
+) -> Graph:
+    """The graph of a scene for one model.
+
+    Where a name or a transform is not one the model has, a diagnostic says so and the node is kept
+    without it, so that everything else is checked too.
+
+    Args:
+        spans: where nodes were written; None for a scene that did not come from text.
+        diagnostics: receives E03xx and E05xx.
+        memory: of the frame before; holds this one afterwards.
+    """
+    _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
+    for word in STAGE if manifest.dimension == 2 else ():
+        if (stated := getattr(scene, word)) != "default":
+            place = None if spans is None else spans.span(stated) or spans.span(scene)
+            fact = f"model `{manifest.name}` is flat and has no {word}"
+            diagnostics.add("E0511", fact, place, help="leave it out; flat scenes have none")
+    space = SPACES[manifest.dimension]
+    old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
+    brought = Brought.of(scene.elements)
+    lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
+    root = lowering.run(scene)
+    if memory is not None and lowering.kept is not None:
+        memory.leaves, memory.model = lowering.kept, manifest.name
+    stage = stage_of(scene) if space.dimension == 3 else None
+    background = WHITE if scene.background == "default" else scene.background
+    return Graph(root, scene.canvas, background, space, stage, brought.geometries)
+
+
+def _check_canvas(
+    scene: schema.Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics
+) -> None:
+    width, height = scene.canvas
+    most, model = manifest.limits.get("canvas", 8192), f"model `{manifest.name}`"
+    if max(width, height) > most:
+        fact = f"a canvas of {width} x {height} pixels; {model} draws at most {most} x {most}"
+        diagnostics.add("E0507", fact, place, help="render smaller with `canvas(w, h)` or `--size`")
+    elif manifest.sizes and scene.canvas not in manifest.sizes:
+        sizes = " or ".join(f"{w} x {h}" for w, h in manifest.sizes)
+        fact = f"a canvas of {width} x {height} pixels; {model} draws only {sizes}"
+        help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
+        diagnostics.add("E0509", fact, place, help=help)
+    if manifest.white and scene.background not in (WHITE, "default"):
+        help = "leave `background` out, or draw with another model"
+        diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
+
+
+Composite = schema.Scene | schema.Group | schema.Boolean | schema.Chain
+
+
+@dataclass(slots=True)
+class _Open:
+    """A composite whose children are being lowered, and the operator that joins it to what came before."""
+
+    op: Combine
+    k: float
+    node: Composite
+    material: schema.Material | None
+    todo: Iterator[tuple[Combine, float, schema.SceneNode]]
+    links: list[Link] = field(default_factory=list)
+
+
+def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNode]]:
+    if isinstance(node, schema.Chain):
+        return ((link.op, _width(link), link.node) for link in node.children)
+    op: Combine = "union"
+    k = 0.0
+    if isinstance(node, schema.Boolean):
+        op, k = node.op, _width(node)
+    return ((op, k, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
+
+
+def _width(node: schema.Boolean | schema.Link) -> float:
+    """The width of a blend where it is not the usual one, else 0."""
+    return 0.0 if node.k is None or (node.op == "smooth" and node.k == BLEND) else node.k
+
+
+@dataclass(slots=True)
+class _Lowering:
+    manifest: Manifest
+    space: Space
+    spans: Spans | None
+    diagnostics: Diagnostics
+    old: Leaves
+    kept: Leaves | None
+    brought: Brought
+    objects: int = 0
+    origin: object = None  # what says that the scene is flat or solid: its model, else its first object
+    looks: dict[int, Look] = field(default_factory=dict)
+    said: set[tuple[str, str]] = field(default_factory=set)
+    steps: dict[int, Step | Refusal] = field(default_factory=dict)
+
+    def run(self, scene: schema.Scene) -> Fold:
+        stack = [_Open("union", 0.0, scene, None, _children(scene))]
+        self.origin = scene if scene.model else None
+        while True:
+            here = stack[-1]
+            item = next(here.todo, None)
+            if item is None:
+                stack.pop()
+                if isinstance(here.node, schema.Scene):
+                    return Fold("scene", tuple(here.links))
+                kind = here.node.op if isinstance(here.node, schema.Boolean) else here.node.kind
+                fold = Fold(kind, tuple(here.links), self.moves(here.node), self.place(here.node))
+                stack[-1].links.append(Link(here.op, fold, here.k))
+                continue
+            op, k, node = item
+            if not here.links:
+                op, k = "union", 0.0
+            elif k and op == "smooth" and not self.manifest.any_blend:
+                fact = f"model `{self.manifest.name}` blends over {BLEND} and no other width"
+                joined = here.node if isinstance(here.node, schema.Boolean) else node
+                self.say("E0512", fact, joined, "leave k out, or draw with another model")
+            material = node.material or here.material
+            if isinstance(node, schema.Object):
+                here.links.append(Link(op, self.leaf(node, material), k))
+                self.objects += 1
+                if self.objects > MAX_OBJECTS:
+                    self.say("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", node)
+                    return Fold("scene", ())
+            elif len(stack) > MAX_DEPTH:
+                fact = f"nodes nested deeper than {MAX_DEPTH:,}"
+                self.say("E0405", fact, node, "a group of a single child can be dropped")
+                return Fold("scene", ())
+            else:
+                stack.append(_Open(op, k, node, material, _children(node)))
+
+    def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
+        self.origin = self.origin or node
+        seen = self.old.get(id(node))
+        number = self.objects + 1
+        if seen and seen[0] is node and seen[1] is material and seen[2].number == number:
+            leaf = seen[2]
+        else:
+            if "." in node.geometry:
+                self.element(node.geometry, self.brought.geometries, node, "E0501")
+            elif node.geometry not in self.manifest.geometries:
+                self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
+                if dimension_of(node.geometry) not in (None, self.space.dimension):
+                    material = None  # which is of the other kind of scene, too
+            look = Look(self.manifest.materials[0]) if material is None else self.look(material)
+            notes: dict[Any, Any] | None = None if self.kept is None else {}
+            leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)
+        if self.kept is not None:
+            self.kept[id(node)] = node, material, leaf
+        return leaf
+
+    def element(self, name: str, known: Mapping[str, Element], node: object, code: str) -> Element | None:
+        """What a file of elements has; says where the model does not draw it, or nothing is known of it."""
+        element, model = known.get(name), f"model `{self.manifest.name}`"
+        if element is not None and element.kind not in self.manifest.elements:
+            kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
+            self.say(code, f"{model} does not draw `{name}`, {kind}", node)
+        elif element is None and name.partition(".")[0] in self.brought.unread:
+            self.say("E0214", f"the file of `{name}` has not been read", node, "load the scene with a root")
+        elif element is None:
+            what = "material" if known is self.brought.materials else "geometry"
+            fact = f"no file of elements has a {what} `{name}`"
+            self.say(code, fact, node, "list its file in `elements`")
+        return element
+
+    def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
+        found = []
+        for at, transform in enumerate(node.transforms):
+            if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
+                fact = "`displace` does not stand first in the block of an object"
+                self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
+                continue
+            step = self.steps.get(id(transform))  # the Scene holds it, so that its id stays its own
+            if step is None:
+                step = self.steps[id(transform)] = step_of(transform, self.space)
+                if idle := self.space.idle(transform):
+                    help = "a 2D model has no z: leave the third factor out"
+                    self.say("W0508", f"{idle} has no effect in the plane", transform, help)
+            if isinstance(step, Refusal):
+                self.say(step.code, step.message, transform, step.help)
+            else:
+                found.append(Move(step, self.place(transform)))
+        return tuple(found)
+
+    def look(self, material: schema.Material) -> Look:
+        known = self.looks.get(id(material))
+        if known is not None:
+            return known
+        name, manifest, element = material.name, self.manifest, None
+        shading = material.shading or manifest.materials[0]
+        if "." in name:
+            element = self.element(name, self.brought.materials, material, "E0502")
+        elif name in TEXTURES:
+            element = self.element(name, load_textures(), material, "E0502")
+        else:
+            shading = name
+            if material.shading is not None:
+                self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
+        if shading not in manifest.materials:
+            offered = (*manifest.materials, *TEXTURES) if shading is name else manifest.materials
+            self.refuse("E0502", "material", shading, offered, material)
+        moves = tuple(self.texture_moves(material, element))
+        colours = colour_steps(map(self.space.inked, material.ops))
+        if len(normal(colours)) > MOST_STEPS and element is not None:
+            self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
+        look = self.looks[id(material)] = Look(shading, colours, element=element, texture=moves)
+        return look
+
+    def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
+        """The moves of a texture, which a constant material has as well and colours of space have not."""
+        rows = IDENTITY
+        for op in material.ops:
+            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
+                continue
+            if element is not None and element.dimension == 3:
+                fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"
+                self.say("E0504", fact, op, "its colours lie on the shape: leave the move out")
+            elif isinstance(step := step_of(op, PLANE), Refusal):
+                if step.code == "E0312" or element is not None:
+                    self.say(step.code, step.message, op, step.help)
+            elif isinstance(step, Affine):
+                rows = affine.compose(step.rows, rows)
+                yield step
+        if not PLANE.usable(rows):
+            fact = f"the moves of the texture `{material.name}` compose to a singular one"
+            self.say("E0406", fact, material, "scale less along one direction, or less often")
+
+    def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
+        """Say that the model has no geometry or material of a name, or that this is of other scenes."""
+        from difflib import get_close_matches
+
+        here, other = self.space.dimension, dimension_of(name)
+        listed = listing(f"`{k}`" for k in known)
+        if other not in (None, here):
+            fact = f"{what} `{name}` belongs to {SCENES[other]} scenes, and this one is {SCENES[here]}"
+            help = f"a scene is flat or solid; model `{self.manifest.name}` has {listed}"
+            if what == "material":
+                help = f"write material {' or '.join(self.manifest.materials)} in its place"
+            place = self.place(self.origin)
+            labels = () if place in (None, self.place(node)) else (Label(place, f"{SCENES[here]} by this"),)
+            self.say(code, fact, node, help, labels)
+            return
+        near = get_close_matches(name, known, 1)
+        advice = f"did you mean `{near[0]}`? it has {listed}" if near else f"it has {listed}"
+        self.say(code, f"model `{self.manifest.name}` has no {what} `{name}`", node, advice)
+
+    def say(
+        self, code: str, message: str, node: object, help: str | None = None, labels: tuple[Label, ...] = ()
+    ) -> None:
+        """Add a diagnostic; without a place each message is said once."""
+        span = self.place(node)
+        if span is None:
+            if (code, message) in self.said:
+                return
+            self.said.add((code, message))
+        self.diagnostics.add(code, message, span, help=help, labels=labels)
+
+    def place(self, node: object) -> Span | None:
+        return None if self.spans is None else self.spans.span(node)

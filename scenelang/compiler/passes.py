@@ -1,0 +1,543 @@
+"""Graph to Graph: `PASSES` is the order, and the passes that only report.
+
+Sharing equal subgraphs is left out on purpose: every row of a stream is lifted in one vectorised call,
+which costs less than finding the equal ones would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
+from itertools import product
+from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
+from operator import attrgetter, itemgetter
+from typing import Final, NamedTuple
+
+from scenelang.assets.records import deep_stack
+from scenelang.compiler import steps
+from scenelang.compiler.chain import LevelsError, split_levels
+from scenelang.compiler.geometries import GEOMETRIES
+from scenelang.compiler.graph import (
+    Fold,
+    Graph,
+    Invariant,
+    Leaf,
+    Link,
+    Row,
+    Sound,
+    leaf_box,
+    leaves,
+    links_within,
+    meet,
+    overlap,
+    verify,
+)
+from scenelang.compiler.lower import Memory, Spans, lower
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.rewrites import (
+    Context,
+    cover_of,
+    covered,
+    drop_empty,
+    drop_hidden,
+    drop_unseen,
+    flatten,
+    fold_looks,
+    fold_warps,
+    push_transforms,
+)
+from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
+from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed, inverted
+from scenelang.language.diagnostics import Diagnostics, Label, Span
+from scenelang.language.scene import Scene
+
+
+def check_levels(graph: Graph, context: Context) -> Graph:
+    """Report objects whose deformations or affine maps the model cannot hold; the graph is unchanged.
+
+    Before: the normal form of `fold_warps`.
+    """
+    check = partial(_check, space=graph.space, context=context)
+    for leaf in leaves(graph.root):
+        leaf.noted("check_levels", check)
+    return graph
+
+
+def _check(leaf: Leaf, space: Space, context: Context) -> None:
+    manifest = context.manifest
+    if manifest.lifting == "exact" and any(not isinstance(move.step, Affine) for move in leaf.moves):
+        try:  # other liftings take any chain
+            split_levels(leaf.steps, manifest.limits, space)
+        except LevelsError as error:
+            inner, outer = manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)
+            fact = f"the deformations of `{leaf.geometry}` do not fit model `{manifest.name}`: {error}"
+            help = (
+                f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
+                "and an affine map; a `twirl` merges with the deformation after it, also across rotations "
+                "and uniform scales about the origin"
+            )
+            context.diagnostics.add("E0506", fact, leaf.span, labels=_places(leaf), help=help)
+            return
+    # Each map is lifted by itself, so each needs an inverse, and so does what they compose to.
+    maps = [step.rows for step in leaf.steps if isinstance(step, Affine)]
+    maps += [steps.composed(leaf.steps)] if len(maps) > 1 else []
+    bad = next((rows for rows in maps if not space.usable(rows)), None)
+    if bad is not None:
+        smallest, largest = space.stretches(bad)
+        fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
+        fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
+    elif not all(_mild(move.step) for move in leaf.moves):
+        fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
+    else:
+        return
+    context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
+
+
+def _mild(step: Step) -> bool:
+    if isinstance(step, Warp):
+        return abs(step.twirl) < REACH and hypot(*step.bend) < REACH
+    if isinstance(step, Twist):
+        return abs(step.twist) < REACH
+    return isinstance(step, Affine) or max(abs(step.amount), abs(step.frequency)) < REACH
+
+
+def _places(leaf: Leaf) -> list[Label]:
+    found: list[Label] = []
+    seen: set[Span] = {leaf.span} if leaf.span else set()
+    for move in leaf.moves:
+        if move.span is not None and move.span not in seen:
+            seen.add(move.span)
+            what = "affine from here on" if isinstance(move.step, Affine) else "deforms here"
+            found.append(Label(move.span, what))
+    return found[:8]
+
+
+Measures = list[tuple[str, float]]
+
+_CODES = {
+    "objects": "W0501",
+    "twirl": "W0502",
+    "bend": "W0503",
+    "scale": "W0504",
+    "smooth": "W0505",
+    "thin": "W0506",
+    "thickness": "W0506",
+    "blend": "W0507",
+    "twist": "W0509",
+    "displace": "W0510",
+    "frequency": "W0510",
+    "texels": "W0511",
+    "width": "W0512",
+}
+_SUBJECTS = {
+    "twirl": "a `twirl` of {value} on {name}",
+    "bend": "a `bend` of {value} on {name}",
+    "twist": "a `twist` of {value} on {name}",
+    "displace": "a displacement of {value} of {name}",
+    "frequency": "a displacement of frequency {value} of {name}",
+    "scale": "a scale of {value} of {name}",
+    "thin": "{name}, {value} times as long as wide,",
+    "thickness": "{name}, {value} thick,",
+    "texels": "a texture of {value} texels to a pixel on {name}",
+}
+"""What is said of an object, in the order of the warnings."""
+_WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
+WILD = 100  # times the largest measured value of these pictures may be wrong all over
+_TOLERANCE = 1e-9
+
+
+def check_trained(graph: Graph, context: Context) -> Graph:
+    """Warn once for each quantity outside its trained or measured range, at the object furthest out.
+
+    Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
+    object is each of the two stretches of its affine maps, and how thin it is their ratio; of an opaque solid
+    it is how thick it is where it is thinnest. A texture's texels are counted where they are densest; of a
+    solid at its centre.
+
+    Before: STREAM. After: unchanged.
+    """
+    rows, trained = graph.rows(), context.manifest.trained
+    measures = partial(_measures, space=graph.space)
+    outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
+    for _, leaf, _, _, _, cuts in rows:
+        for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
+            if quantity in trained and not (quantity == "thickness" and cuts):
+                low, high = trained[quantity]
+                above = value - high if quantity != "thickness" else 0.0  # of which more does no harm
+                excess = max(low - value, above) / ((high - low) or 1.0)
+                if excess > _TOLERANCE:
+                    outside.setdefault(quantity, []).append((excess, value, leaf))
+    for quantity, subject in _SUBJECTS.items():
+        if found := outside.get(quantity):
+            _, value, leaf = max(found, key=itemgetter(0))
+            more = len({id(leaf) for *_, leaf in found}) - 1
+            said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
+            others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
+            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
+    widest = max((row for row in rows if row.op != "union"), key=attrgetter("k"), default=None)
+    if widest is not None and "width" in trained and widest.k > trained["width"][1]:
+        fact = f"a `{widest.op}` of width {widest.k:.3g} is outside the measured range {{}}"
+        _warn(context, "width", fact, widest.leaf)
+    smooth = [row.leaf for row in rows if row.op == "smooth"]
+    if "smooth" in trained and len(smooth) > trained["smooth"][1]:
+        fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
+        _warn(context, "smooth", fact, smooth[-1])
+    if smooth and "blend" in trained:
+        _check_blends(rows, measures, context)
+    if "objects" in trained and len(rows) > trained["objects"][1]:
+        fact = f"{len(rows):,} objects are outside the measured range {{}}"
+        _warn(context, "objects", fact, rows[-1].leaf)
+    return graph
+
+
+def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
+    """Warn at the `smooth` whose colours lie furthest apart for its size.
+
+    Where a blend's distances are off, by a share of the objects' scale, its colour is off by that share of
+    what the colours differ by: the product of both tells the error.
+    """
+    low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
+    worst: tuple[float, float, float, Leaf] | None = None
+    for op, leaf, *_, cuts in rows:
+        if cuts or op == "intersect":
+            continue
+        largest = max(largest, leaf.noted("measures", measures)[0][1])
+        rgb = leaf.look.colour()
+        dark = rgb if leaf.look.element is None else (0.0, 0.0, 0.0)  # a texture may have any colour
+        low, high = list(map(min, low, dark)), list(map(max, high, rgb))
+        if op == "smooth":
+            contrast = max(max(c - a, b - c) for a, b, c in zip(low, high, rgb, strict=True))
+            if worst is None or contrast * largest > worst[0]:
+                worst = contrast * largest, contrast, largest, leaf
+    if worst is not None and worst[0] > context.manifest.trained["blend"][1]:
+        product, contrast, scale, leaf = worst
+        said = f"a `smooth` of colours {contrast:.2g} apart at a scale of {scale:.3g}"
+        _warn(context, "blend", f"{said}: the product {product:.3g} is outside the measured range {{}}", leaf)
+
+
+def _measures(leaf: Leaf, space: Space) -> Measures:
+    smallest, largest = space.stretches(steps.composed(leaf.steps))
+    found = [("scale", smallest), ("scale", largest)]
+    if smallest > 0:
+        found.append(("thin", largest / smallest))
+    if leaf.look.material == "diffuse":
+        row = GEOMETRIES.get(leaf.geometry)
+        found.append(("thickness", smallest * (row.thickness if row else inf)))
+    for step in leaf.steps:
+        if isinstance(step, Warp):
+            if step.twirl:
+                found.append(("twirl", step.twirl))
+            if step.bend != (0.0, 0.0):
+                found.append(("bend", hypot(*step.bend)))
+        elif isinstance(step, Twist):
+            found.append(("twist", step.twist))
+        elif isinstance(step, Displace):
+            found += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
+    return found
+
+
+def _texels(leaf: Leaf, graph: Graph) -> Measures:
+    """Texels of a picture to a pixel."""
+    element, affines = leaf.look.element, steps.composed(leaf.steps)
+    if element is None or element.dimension == 3:
+        return []
+    a, b, c, _, d, e, f, *_ = steps.inverted(steps.compose(affines, leaf.look.moved))
+    p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
+    texels = max(element.sizes) / 2 * sqrt((p + r) / 2 + hypot((p - r) / 2, q))  # to a unit of the world
+    pixel = 2 / min(graph.canvas)
+    if graph.stage is not None:
+        camera = graph.stage.camera
+        pixel *= dist(camera.eye, affines[3::4]) * tan(camera.fov_rad / 2)
+    return [("texels", texels * pixel)]
+
+
+def _warn(context: Context, quantity: str, message: str, leaf: Leaf, value: float = 0.0) -> None:
+    low, high = context.manifest.trained[quantity]
+    figures = context.manifest.measured.get("stability", {}).get(quantity)
+    doubt = "the picture may be less exact than the model's figures"
+    fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
+    help = f"measured there: {figures}" if figures else doubt
+    if quantity in _WRONG and abs(value) > WILD * high:
+        help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
+    context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)
+
+
+Point = tuple[float, float, float]
+
+_DIM: Final = 0.1
+"""A medium around the eye that lets less of the light through, in any direction, hides the scene."""
+
+
+def check_eye(graph: Graph, context: Context) -> Graph:
+    """Report an eye inside an opaque object, and warn of one deep in a medium.
+
+    The exact fold at that one point, by its definition. Geometries that are not known by a formula are taken
+    as far away, and as leaving nothing where they cut.
+
+    Before: STREAM. After: unchanged.
+    """
+    if graph.stage is None or not context.whole:
+        return graph
+    eye = graph.stage.camera.eye
+    depth, holder = _folded(graph.root, eye, graph.space)
+    if depth < 0.0 and holder is not None and holder.look.material != "volumetric":
+        x, y, z = eye
+        fact = f"the eye at [{x:g}, {y:g}, {z:g}] is inside this `{holder.geometry}`"
+        context.diagnostics.add("E0408", fact, holder.span, help="move the camera or the object")
+    elif depth < 0.0 and holder is not None and (through := exp(EXTINCTION * depth)) < _DIM:
+        x, y, z = eye
+        fact = f"the eye at [{x:g}, {y:g}, {z:g}] is deep inside this `{holder.geometry}`, a medium"
+        help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
+        context.diagnostics.add("W0403", fact, holder.span, help=help)
+    return graph
+
+
+def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
+    """The distance of a fold at a point, and the leaf whose material holds there."""
+    depth, holder = inf, None
+    for link in fold.links:
+        node, k = link.node, link.width
+        if isinstance(node, Fold):
+            d, leaf = _folded(node, eye, space)
+        elif node.geometry in GEOMETRIES:
+            d, leaf = _distance(node.geometry, node.steps, eye), node
+            d *= space.stretches(composed(node.steps))[0]
+        else:
+            d, leaf = inf, None
+        if link.op in ("subtract", "intersect"):
+            cut = -d if link.op == "subtract" and leaf is not None else d
+            depth = -_smooth(-depth, -cut, k)[0] if k else max(depth, cut)
+        elif link.op == "smooth":
+            depth, h = _smooth(depth, d, k)
+            holder = leaf if h > 0.5 else holder
+        else:
+            holder = leaf if d < max(depth, 0.0) else holder
+            depth = min(depth, d)
+    return depth, holder
+
+
+def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
+    """The distance of a blend, and the share of what joins."""
+    if inf in (abs(depth), abs(d)):
+        return min(depth, d), float(d < depth)
+    h = min(max(0.5 + 0.5 * (depth - d) / k, 0.0), 1.0)
+    return (d if h == 1.0 else depth + h * (d - depth)) - k * h * (1.0 - h), h
+
+
+def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
+    """The leaf's own distance at a world point."""
+    for step in reversed(steps):
+        x, y, z = p
+        if isinstance(step, Affine):
+            a, b, c, u, d, e, f, v, g, h, i, w = inverted(step.rows)
+            p = a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
+        elif isinstance(step, Displace):
+            f = step.frequency
+            bump = step.amount * sin(f * x) * sin(f * y) * sin(f * z)
+            return float(GEOMETRIES[geometry].distance(p)) + bump
+        elif isinstance(step, Twist):
+            s, c = sin(step.twist * y), cos(step.twist * y)
+            p = c * x + s * z, y, c * z - s * x
+        else:
+            angle = step.twirl * hypot(x, y, z) + step.bend[0] * x + step.bend[1] * y
+            s, c = sin(angle), cos(angle)
+            p = c * x + s * y, c * y - s * x, z
+    return float(GEOMETRIES[geometry].distance(p))
+
+
+_FAR: Final = 8.0
+"""Coordinates and sizes beyond so many units were most likely meant as pixels."""
+_TESTS: Final = 20_000
+"""Boxes that are compared before nothing is said, so that no scene takes long."""
+
+
+def check_seen(graph: Graph, context: Context) -> Graph:
+    """Warn where the picture provably shows nothing but the background, or one object without a texture.
+
+    Before: STREAM. After: unchanged.
+    """
+    rows = graph.rows()
+    if not context.whole or not rows:
+        return graph
+    boxes, cut = _left(graph)
+    if boxes is None:
+        return graph
+    seen = [box for box in boxes if _in_sight(box, graph)]
+    if context.moves and (seen or not boxes or not all(_is_far(box) for box in boxes)):
+        return graph  # it may be in sight in another frame
+    last = rows[-1].leaf
+    if not boxes and cut is not None:
+        fact = "nothing is left of the scene: the last cut takes all of it"
+        _say(context, fact, cut, "let what is cut reach out of what cuts it, or what intersects meet")
+    elif not seen:
+        _say(context, *_unseen(graph, rows[0].leaf))
+    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.element is None:
+        cover = cover_of(last, graph.space)
+        if cover is not None and covered(graph.window(), [cover]):
+            fact = f"this `{last.geometry}` covers the whole canvas: the picture has one colour"
+            _say(context, fact, last.span, _units(graph, cover[0] > _FAR))
+    return graph
+
+
+def _say(context: Context, fact: str, span: Span | None, help: str) -> None:
+    context.diagnostics.add("W0402", fact, span, help=help)
+
+
+def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
+    """Boxes that hold all that the fold leaves, None where that is not known, and what left none of them."""
+    widths = [link.width for link in links_within(graph.root) if link.op == "smooth"]
+    felt, tests = sum(widths) / 4, 0  # blends add so much at most
+
+    def left(fold: Fold) -> tuple[list[Box] | None, Span | None]:
+        nonlocal tests
+        boxes, cut = list[Box](), None
+        for link in fold.links:
+            node, op = link.node, link.op
+            own = [leaf_box(node, felt, graph.space)] if isinstance(node, Leaf) else left(node)[0]
+            tests += len(boxes) * len(own or ())
+            if own is None or tests > _TESTS:
+                return None, None
+            if op in ("union", "smooth"):
+                boxes += own
+            elif op == "intersect":
+                pairs = (meet(a, b) for a, b in product(boxes, own))
+                boxes = [shared for shared in pairs if shared is not None]
+            elif not felt and isinstance(node, Leaf) and (disc := cover_of(node, graph.space)) is not None:
+                boxes = [box for box in boxes if not covered(box, [disc])]
+            cut = cut if boxes or cut is not None else node.span
+        return boxes, None if boxes else cut
+
+    return left(graph.root)
+
+
+def _in_sight(box: Box, graph: Graph) -> bool:
+    """Whether something in a box may be seen."""
+    if (stage := graph.stage) is None:
+        return overlap(box, graph.window())
+    eye, (forward, right, up) = stage.camera.eye, stage.camera.axes()
+    if stage.ground is not None and eye[1] > stage.ground.y > box[3]:
+        return False
+    side, reach = min(graph.canvas), tan(stage.camera.fov_rad / 2)
+    wide, high = (reach * pixels / side for pixels in graph.canvas)
+    planes: list[Sequence[float]] = [forward]
+    for axis, half in ((right, wide), (up, high)):
+        planes += [_plus(forward, axis, half, sign) for sign in (1.0, -1.0)]
+    corners = [*product((box[0], box[2]), (box[1], box[3]), (box[4], box[5]))]
+    return all(
+        any(not sum(n * (p - e) for n, p, e in zip(plane, at, eye, strict=True)) < 0.0 for at in corners)
+        for plane in planes
+    )
+
+
+def _plus(forward: Sequence[float], axis: Sequence[float], half: float, sign: float) -> tuple[float, ...]:
+    """The inward normal of a side of what the camera sees."""
+    return tuple(half * f + sign * a for f, a in zip(forward, axis, strict=True))
+
+
+def _is_far(box: Box) -> bool:
+    return hypot((box[0] + box[2]) / 2, (box[1] + box[3]) / 2) > _FAR
+
+
+def _unseen(graph: Graph, leaf: Leaf) -> tuple[str, Span | None, str]:
+    """Message, place and help where everything lies out of sight."""
+    if graph.stage is None:
+        far = _is_far(leaf_box(leaf, 0.0, graph.space))
+        return "everything lies off the canvas", leaf.span, _units(graph, far)
+    eye, target = (
+        ", ".join(f"{v:g}" for v in p) for p in (graph.stage.camera.eye, graph.stage.camera.target)
+    )
+    help = f"the camera at [{eye}] looks at [{target}], and the ground hides what is below it; "
+    return "no object is in sight", leaf.span, f"{help}move the objects, or turn the camera by `target`"
+
+
+def _units(graph: Graph, pixels: bool) -> str:
+    """Extent of the canvas, and how to write in pixels where those were likely meant."""
+    width, height = graph.canvas
+    side = min(width, height)
+    shown = f"the canvas shows x from {-width / side:.3g} to {width / side:.3g}, y from {-height / side:.3g} "
+    shown += f"to {height / side:.3g}"
+    if not pixels:
+        return shown
+    group = f"group {{ … translate({-width / 2:g}, {-height / 2:g}); scale({2 / side:.6g}); }}"
+    return f"{shown}, in units that are not pixels; to write in pixels put all objects into {group}"
+
+
+class Pass(NamedTuple):
+    """A step of the compiler and the invariants that hold after it, and ever after."""
+
+    run: Callable[[Graph, Context], Graph]
+    establishes: frozenset[Invariant] = frozenset()
+
+    @property
+    def name(self) -> str:
+        """The name of its function and of its tests."""
+        return self.run.__name__
+
+
+PASSES: tuple[Pass, ...] = (
+    Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
+    Pass(fold_looks, frozenset({Invariant.LOOKS})),
+    Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
+    Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
+    Pass(check_levels),
+    Pass(flatten, frozenset({Invariant.STREAM})),
+    Pass(check_eye),
+    Pass(check_seen),
+    Pass(drop_unseen),
+    Pass(drop_hidden),
+    Pass(check_trained),
+)
+
+
+OPTIONAL = frozenset({"drop_unseen", "drop_hidden"})
+"""Passes that only save work: no later stage needs what they do."""
+
+
+def check_scene(
+    scene: Scene,
+    spans: Spans | None,
+    diagnostics: Diagnostics,
+    manifest: Manifest,
+    after: Callable[[str, Graph], None] | None = None,
+    without: Collection[str] = (),
+    memory: Memory | None = None,
+) -> Graph:
+    """Everything that can be said of a scene before it is lifted: lower it and run all passes in order.
+
+    The graph is verified after each. No numpy is imported.
+
+    Args:
+        spans: where its nodes were written, None if it did not come from text.
+        after: called with ``"lower"`` and each pass's name and the graph it left.
+        without: names of `OPTIONAL` passes to leave out.
+        memory: as for `lower`.
+
+    Returns:
+        The stream; it stands for the scene only if no error was reported.
+
+    Raises:
+        ValueError: a pass that others need is to be left out.
+    """
+    if not OPTIONAL.issuperset(without):
+        raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")
+    after = after or (lambda name, graph: None)
+    before, holds, sound = len(diagnostics.errors), frozenset[Invariant](), Sound()
+    with deep_stack():
+        graph = verify(lower(scene, manifest, spans, diagnostics, memory), "lower", sound=sound)
+        whole, moves = len(diagnostics.errors) == before, scene.animation is not None
+        context = Context(manifest, diagnostics, whole, moves)
+        after("lower", graph)
+        for step in PASSES:
+            if step.name in without:
+                continue
+            given, graph = graph, step.run(graph, context)
+            if graph is not given or step.establishes:
+                holds |= step.establishes
+                verify(graph, step.name, holds, sound)
+            after(step.name, graph)
+            if diagnostics.errors:
+                if step.run is flatten:
+                    break  # every mistake is found, and what is left is not the scene
+                # Without sound chains no bound means anything: look for refusals only.
+                context = Context(manifest, diagnostics, whole=False)
+    return graph

@@ -1,0 +1,511 @@
+"""The Program: a compiled scene as renderers and embedders take it, and its files, read as a stranger's.
+
+Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
+(N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
+``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
+unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
+Programs with elements have format 2: the header lists these, ``forms`` I32 (N,) has the index of each
+row's geometry, and ``element.0`` and so on are their bytes. Where some are materials it is format 3, with a
+table of paints (`Paint`) and ``worn`` I32 (N,), the index of each row's paint or -1. With
+groups, or cuts that have a width, it is format 4, and has these where the others would.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.element import Element
+from scenelang.assets.files import read_regular, write_output
+from scenelang.assets.notebook import bundle
+from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
+from scenelang.assets.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
+from scenelang.assets.zoo import entry_of, read_elements
+from scenelang.compiler.graph import MOST_STEPS, ColourStep
+from scenelang.compiler.groups import OPERATOR, token_fault
+from scenelang.compiler.lifting import LAYOUTS, WIDTH
+from scenelang.compiler.manifest import ALIASES, available, load_manifest
+from scenelang.compiler.spaces import Stage, read_stage, stage_data
+from scenelang.language.diagnostics import plural
+from scenelang.language.words import TOKENS
+
+STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
+"""Operations on a colour and how many numbers each has; in files they are told by their place here."""
+
+
+class Paint(NamedTuple):
+    """The colours of an element, and what is done to each, in order, clamped to [0, 1] after each.
+
+    Args:
+        element: a picture, which repeats, or colours of space.
+        steps: ``("color", r, g, b)`` multiplies, ``("grayscale", a)`` mixes with the luma, ``("hue", turns)``
+            shifts H of HSV; float32 numbers.
+    """
+
+    element: Element
+    steps: tuple[ColourStep, ...] = ()
+
+
+def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:
+    """Tensors of a table of paints: ``paints`` I32 (K, 2), the index of each one's element and how many of
+    ``steps`` F32 (S, 4) are its, one after the other: a place in `STEPS` and numbers.
+    """
+    kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
+    table = [(index[paint.element], len(paint.steps)) for paint in paints]
+    steps = [
+        (kinds.index(kind), *numbers, *[0.0] * (3 - len(numbers)))
+        for paint in paints
+        for kind, *numbers in paint.steps
+    ]
+    return {
+        "paints": np.array(table, np.int32).reshape(-1, 2),
+        "steps": np.array(steps, np.float32).reshape(-1, 4),
+    }
+
+
+def read_paints(
+    table: npt.NDArray[Any], steps: npt.NDArray[Any], elements: tuple[Element, ...]
+) -> tuple[Paint, ...]:
+    """The paints that such tensors tell of.
+
+    Raises:
+        TensorError: they do not agree, or name what is not listed.
+    """
+    kinds, rows, found, first = list(STEPS), steps.tolist(), [], 0
+    if not all(kind in range(len(kinds)) for kind, *_ in rows):
+        raise TensorError("a paint with a step that this version does not know")
+    for at, count in table.tolist():
+        if not 0 <= at < len(elements) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
+            raise TensorError("a paint of an element or of steps that are not listed")
+        own = rows[first : first + count]
+        named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
+        found.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
+        first += count
+    if first != len(rows):
+        raise TensorError("steps that no paint has")
+    return tuple(found)
+
+
+def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimension: int) -> str | None:
+    """What is wrong with the paints of a Program of a dimension."""
+    known = set(elements)
+    for element, steps in paints:
+        if not element.material or element not in known:
+            return f"a paint of `{element.name}`, which is not a material that is listed"
+        if element.dimension > dimension:
+            return f"a paint of dimension {element.dimension} in the plane"
+        numbers = [number for step in steps for number in step[1:]]
+        if any(STEPS.get(step[0]) != len(step) - 1 for step in steps) or not np.isfinite(numbers).all():
+            return f"a step of a paint of `{element.name}` that is not known"
+        if len(steps) > MOST_STEPS:
+            return f"a paint of {len(steps):,} steps, at most {MOST_STEPS:,}"
+    return None
+
+
+MOST_OBJECTS = 100_000
+MOST_PIXELS = 8192
+
+
+class ProgramError(ValueError):
+    """A Program is not one: a damaged or foreign file, wrong shapes, or numbers out of range."""
+
+
+class Place(NamedTuple):
+    """Where an object was written: lines and columns from 1, in code points, the end exclusive."""
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """Objects in stream order. Arrays are copied, checked and made read-only.
+
+    Args:
+        vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
+        tokens: int8 (N,), how each joins what came before, and the groups that begin and end with it: see
+            `scenelang.compiler.groups`; the first joins nothing.
+        bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
+            the picture. An intersection, which reaches everything, has the whole canvas. Of solids it is a
+            ball, x, y, z and radius, and of intersections the one around all others.
+        canvas: width and height in pixels.
+        background: (r, g, b) as written, in [0, 1], or None for transparency.
+        model: name of the model that draws it.
+        weights: SHA-256 of that model's weights, hex.
+        objects: geometry name of each row.
+        places: where each row was written; None where that is unknown.
+        stage: camera, light, ground and sky of a scene of solids; None in the plane.
+        numbers: of each row's object in the scene as written, from 1; by default the rows'.
+        elements: what users brought.
+        forms: int32 (N,), which of these a row shows; -1 for a geometry of the model. None stands for all -1.
+        palette: their materials as rows wear them.
+        worn: int32 (N,), which of these a row wears; -1 for the colour of its vector. None stands for all -1.
+
+    Raises:
+        ProgramError: anything is not as above.
+    """
+
+    vectors: npt.NDArray[np.float32] = field(repr=False)
+    tokens: npt.NDArray[np.int8] = field(repr=False)
+    bounds: npt.NDArray[np.float32] = field(repr=False)
+    canvas: tuple[int, int]
+    background: tuple[float, float, float] | None
+    model: str
+    weights: str
+    objects: tuple[str, ...]
+    places: tuple[Place | None, ...] = field(repr=False)
+    stage: Stage | None = None
+    numbers: tuple[int, ...] = field(default=(), repr=False)
+    elements: tuple[Element, ...] = ()
+    forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+    palette: tuple[Paint, ...] = field(default=(), repr=False)
+    worn: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        count = len(self.objects)
+        if count > MOST_OBJECTS:
+            raise ProgramError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+        for name in ("forms", "worn"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(count, -1, np.int32))
+        for name, dtype, shape in (
+            ("vectors", np.float32, (count, WIDTH)),
+            ("tokens", np.int8, (count,)),
+            ("bounds", np.float32, (count, 4)),
+            ("forms", np.int32, (count,)),
+            ("worn", np.int32, (count,)),
+        ):
+            object.__setattr__(self, name, _frozen(name, getattr(self, name), dtype, shape))
+        if len(self.places) != count:
+            raise ProgramError(f"{len(self.places)} places for {count} objects")
+        object.__setattr__(self, "numbers", self.numbers or tuple(range(1, count + 1)))
+        if len(self.numbers) != count or not all(0 < n <= MOST_OBJECTS for n in self.numbers):
+            raise ProgramError(f"numbers that are not those of {count} objects")
+        _check_rows(self)
+        _check_settings(self)
+
+    def __len__(self) -> int:
+        return len(self.objects)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
+        said = f"Program of {plural(len(self), 'object')} for `{self.model}`"
+        return bundle(self, self.canvas, said)
+
+    def digest(self) -> str:
+        """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
+        colour = self.background and tuple(float(v) for v in self.background)
+        settings: tuple[object, ...] = (tuple(self.canvas), colour, self.model, self.weights, len(self))
+        if self.stage is not None:
+            settings = (*settings, repr(self.stage))
+        if self.elements:
+            settings = (*settings, *[element and element.digest for element in self.brought()])
+        if self.palette:
+            settings = (
+                *settings,
+                *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
+            )
+        total = hashlib.sha256(repr(settings).encode())
+        for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
+            total.update(array.astype(kind).tobytes())
+        return total.hexdigest()
+
+    def brought(self) -> list[Element | None]:
+        """Each row's element, None for a geometry of the model."""
+        assert self.forms is not None
+        return [self.elements[at] if at >= 0 else None for at in self.forms.tolist()]
+
+    def paints(self) -> list[Paint | None]:
+        """Each row's material that a user brought, None where its vector has the colour."""
+        assert self.worn is not None
+        return [self.palette[at] if at >= 0 else None for at in self.worn.tolist()]
+
+    @property
+    def extended(self) -> bool:
+        """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
+        if (self.tokens > OPERATOR).any():
+            return True
+        known = ALIASES.get(self.model, self.model)
+        if known in available() and load_manifest(known).lifting != "exact":
+            return False  # its numbers mean something else
+        layout = LAYOUTS[2 if self.stage is None else 3]
+        return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
+
+    def check_weights(self, digest: str) -> None:
+        """Raise ProgramError where it was compiled for other weights than those of a digest."""
+        if self.weights != digest:
+            raise ProgramError(
+                f"the program was compiled for weights {self.weights[:12]}… of model `{self.model}`, "
+                f"these are {digest[:12]}…: compile the scene again"
+            )
+
+    def save(self, path: str | Path) -> None:
+        """Write to a file, whole or not at all; the same Program gives the same bytes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        write_output(path, program_bytes(self))
+
+
+def program_bytes(program: Program) -> bytes:
+    """The file of a Program; equal Programs give equal bytes."""
+    from safetensors.numpy import save
+
+    geometries = sorted(set(program.objects))
+    files = sorted({place.file for place in program.places if place is not None})
+    of_geometry = {name: index for index, name in enumerate(geometries)}
+    of_file = {name: index for index, name in enumerate(files)}
+    places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
+    header: dict[str, Any] = {
+        "background": program.background,
+        "canvas": program.canvas,
+        "files": files,
+        "format": FORMAT,
+        "geometries": geometries,
+        "model": program.model,
+        "weights": program.weights,
+    }
+    if program.stage is not None:
+        header["stage"] = stage_data(program.stage)
+    if program.elements:
+        header |= {"format": 2, "elements": [[e.name, entry_of(e)] for e in program.elements]}
+    tensors: dict[str, npt.NDArray[Any]] = {
+        "vectors": program.vectors,
+        "tokens": program.tokens,
+        "bounds": program.bounds,
+        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
+        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
+    }
+    if program.numbers != tuple(range(1, len(program) + 1)):
+        tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
+    if program.elements and program.forms is not None:
+        tensors["forms"] = program.forms
+        tensors |= {f"element.{at}": np.frombuffer(e.data, np.uint8) for at, e in enumerate(program.elements)}
+    if program.palette and program.worn is not None:
+        header["format"] = 3
+        tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
+    if program.extended:
+        header["format"] = 4
+    text = json.dumps(header, sort_keys=True, separators=(",", ":"))
+    data: bytes = save(tensors, metadata={"scenelang": text})
+    return data
+
+
+def _frozen(name: str, array: Any, dtype: type[np.generic], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != shape:
+        kind = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise ProgramError(f"{name} are {kind}, not {np.dtype(dtype)} {shape}")
+    copy = np.array(array, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+def _check_rows(program: Program) -> None:
+    for name, array in (("vectors", program.vectors), ("bounds", program.bounds)):
+        finite = np.isfinite(array).all(axis=1)
+        if not finite.all():
+            row = int(np.argmin(finite))
+            raise ProgramError(f"{name} of object {row} (`{program.objects[row]}`) are not finite")
+    if (fault := token_fault(program.tokens)) is not None:
+        raise ProgramError(fault)
+    for index, listed, what in (
+        (program.forms, program.elements, "an element"),
+        (program.worn, program.palette, "a paint"),
+    ):
+        assert index is not None
+        if ((index < -1) | (index >= len(listed))).any():
+            raise ProgramError(f"an object of {what} that is not listed")
+    if any(element is not None and element.material for element in program.brought()):
+        raise ProgramError("an object whose geometry is a material")
+    dimension = 2 if program.stage is None else 3
+    if any(element.dimension != dimension for element in program.elements if not element.material):
+        raise ProgramError(f"an element that is not of dimension {dimension}")
+    if (fault := paint_fault(program.palette, program.elements, dimension)) is not None:
+        raise ProgramError(fault)
+    if program.stage is not None:
+        if (program.bounds[:, 3:] < 0.0).any():
+            raise ProgramError("bounds with a negative radius")
+    elif (program.bounds[:, :2] > program.bounds[:, 2:]).any():
+        raise ProgramError("bounds with a minimum above their maximum")
+
+
+def _check_settings(program: Program) -> None:
+    canvas, colour = program.canvas, program.background
+    if len(canvas) != 2 or not all(type(side) is int and 1 <= side <= MOST_PIXELS for side in canvas):
+        raise ProgramError(f"a canvas of {canvas!r}, where sides from 1 to {MOST_PIXELS} are allowed")
+    shares = colour is None or all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
+    if not shares or (colour is not None and len(colour) != 3):
+        raise ProgramError(f"a background of {colour!r}, which is not a colour")
+    if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
+        raise ProgramError(fault)
+    if not program.model:
+        raise ProgramError("no model is named")
+    if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
+        raise ProgramError("the digest of the weights is not 64 hexadecimal digits")
+
+
+_MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
+MOST_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
+MOST_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
+
+_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
+    "vectors": ("F32", (WIDTH,)),
+    "tokens": ("I8", ()),
+    "bounds": ("F32", (4,)),
+    "objects": ("I32", ()),
+    "places": ("I32", (5,)),
+}
+_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {
+    "numbers": ("I32", ()),
+    "forms": ("I32", ()),
+    "worn": ("I32", ()),
+}
+_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {"paints": ("I32", (2,)), "steps": ("F32", (4,))}
+_HEADER: dict[str, Any] = {
+    "background": list | None,
+    "canvas": list,
+    "files": list,
+    "format": int,
+    "geometries": list,
+    "model": str,
+    "weights": str,
+}
+
+
+def load_program(path: str | Path, *, weights: str | None = None) -> Program:
+    """Read a Program that was saved.
+
+    Args:
+        path: the file.
+        weights: SHA-256 of the weights it is to be drawn with, hex; by default any that ship for its model.
+
+    Raises:
+        ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
+        OSError: the file cannot be read.
+    """
+    program = parse_program(read_regular(path, MOST_BYTES))
+    program.check_weights(_shipped(program) if weights is None else weights)
+    return program
+
+
+def parse_program(data: bytes) -> Program:
+    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
+
+    Raises:
+        ProgramError: they hold none.
+    """
+    try:
+        file = read_tensors(data, MOST_BYTES, (1, 2, 3, 4))
+        elements = _read_elements(file)
+        count = _count(file)
+        tensors = file.arrays()
+        palette = read_paints(tensors["paints"], tensors["steps"], elements) if "worn" in tensors else ()
+    except TensorError as error:
+        raise ProgramError(f"not a program: {error}") from None
+    header = file.header
+    if header.keys() - {"stage", "elements"} != _HEADER.keys() or not all(
+        isinstance(header[k], _HEADER[k]) for k in _HEADER
+    ):
+        raise ProgramError("the header has missing, unknown or damaged fields")
+    geometries, files = header["geometries"], header["files"]
+    if not all(isinstance(name, str) for name in (*geometries, *files)):
+        raise ProgramError("names in the header that are not text")
+    objects, places = tensors["objects"], tensors["places"]
+    known = places[:, 0] >= 0
+    if count and not 0 <= objects.min() <= objects.max() < len(geometries):
+        raise ProgramError("`objects` name what the header does not list")
+    if (places[known, 0] >= len(files)).any() or (places[known, 1:] < 1).any():
+        raise ProgramError("places that no file has")
+    background, stage = header["background"], header.get("stage")
+    try:
+        staged = None if stage is None else read_stage(stage)
+    except ValueError as error:
+        raise ProgramError(f"a damaged stage: {error}") from None
+    return Program(
+        vectors=tensors["vectors"],
+        tokens=tensors["tokens"],
+        bounds=tensors["bounds"],
+        canvas=tuple(header["canvas"]),
+        background=None if background is None else tuple(background),
+        model=ALIASES.get(header["model"], header["model"]),
+        weights=header["weights"],
+        objects=tuple(geometries[index] for index in objects.tolist()),
+        places=tuple(Place(files[at], *rest) if at >= 0 else None for at, *rest in places.tolist()),
+        stage=staged,
+        numbers=tuple(tensors["numbers"].tolist()) if "numbers" in tensors else (),
+        elements=elements,
+        forms=tensors.get("forms"),
+        palette=palette,
+        worn=tensors.get("worn"),
+    )
+
+
+def _read_elements(file: TensorFile) -> tuple[Element, ...]:
+    """The elements of a file of format 2 or above; their tensors are taken out of it."""
+    if file.header["format"] == 1 and "elements" in file.header:
+        raise TensorError("elements in a file of format 1")
+    if file.header["format"] == 1 or (file.header["format"] == 4 and "elements" not in file.header):
+        return ()
+    listed = file.header.get("elements")
+    if not isinstance(listed, list) or not all(
+        isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed
+    ):
+        raise TensorError("its list of elements is damaged")
+    found = []
+    for at, (name, entry) in enumerate(listed):
+        if (tensor := file.tensors.pop(f"element.{at}", None)) is None:
+            raise TensorError(f"element {at} has no bytes")
+        found.append((name, entry, tensor))
+    return read_elements(found, file.body)
+
+
+def _count(file: TensorFile) -> int:
+    """Objects of a file whose tensors are those of a Program."""
+    format = file.header["format"]
+    newer = ({"forms"} if format > 1 else set()) | ({"worn", *_TABLES} if format > 2 else set())
+    if format == 4:  # these are there where scenes have elements, and where materials are among them
+        newer &= file.tensors.keys() if "elements" in file.header else set()
+        if "worn" in newer:
+            newer |= _TABLES.keys()
+    if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
+        raise TensorError(f"it holds other tensors than a program of format {format}")
+    count = (*file.tensors["vectors"].shape, 0)[0]
+    if count > MOST_OBJECTS:
+        raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
+    for name, tensor in file.tensors.items():
+        kind, rest = (_LAYOUT | _OPTIONAL | _TABLES)[name]
+        rows = count
+        if name in _TABLES:
+            most = _MOST_STEPS if name == "steps" else MOST_OBJECTS
+            rows = min((*tensor.shape, 0)[0], most)
+        if tensor.type != kind or tensor.shape != (rows, *rest):
+            raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")
+    return count
+
+
+def _shipped(program: Program) -> str:
+    """Digest of the weights that ship for a Program: replaced ones where it was compiled for them."""
+    from scenelang.compiler.manifest import ALIASES
+    from scenelang.compiler.weights import ModelError, load_codes, replaced
+
+    model, old = program.model, replaced(program.weights)
+    if ALIASES.get(model, model) not in available():
+        raise ProgramError(f"unknown model `{model}`; the models are {', '.join(available())}")
+    try:
+        return load_codes(model, old).digest
+    except ModelError as error:
+        if not old:
+            raise
+        raise ProgramError(f"the program was compiled for weights of another model than `{model}`") from error
+    except FileNotFoundError:
+        raise ProgramError(f"model `{model}` has no weights here") from None

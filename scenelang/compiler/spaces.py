@@ -1,0 +1,634 @@
+"""Spaces that models draw in: the plane and the solid world, their stage, bounds and moves.
+
+A model's manifest states its dimension; `SPACES` has the space, which is handed down from there. Nothing
+else in the compiler asks whether a scene is flat.
+
+Maps and turns. A warp turns (x, y), a twist (x, z); call that plane P, and its axis a. Let M keep P and a
+apart and be s times an orthogonal matrix Q on P, with no shift in P, and m times a coordinate, plus c, along
+a. As R(w) turns P alone, M^-1 R(w) M is R(+-w), the sign being the determinant of Q. So a point M u, which a
+turn by the angle w(M u) carries back to M^-1 R(w(M u)) M u, is one that a turn by +-w(M u) carries back from
+u: M trades places with the turn if w(M u) is an angle of the same kind.
+
+- A twist has w = k y. With c = 0 it is k m times y.
+- A bend has w = k x, which is k s times the entry of Q^T's first column: it stays a bend along x where Q
+  keeps that axis, whatever m and c are; slots of a vector hold no other.
+- A twirl has w = k |M u|, which is k s |u| where |m| = s and c = 0.
+
+Balls. A leaf lies in the unit ball and its distance grows no faster than 1, so the points below a level lie
+in a ball of radius 1 + level / stretch, and a displacement by at most its amount widens that by as much. A
+turn keeps lengths, so that it carries a ball into the one about the origin that encloses it.
+
+Soundness of the boxes: a leaf lies within the unit disc and its distance grows no faster than 1, so the
+points below a level lie within a disc of radius 1 + level / stretch. An affine map sends a disc into an
+ellipse; a warp keeps lengths and turns each point by an angle that is bounded over any sector about the
+origin.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
+from struct import pack, unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+
+from scenelang.assets.records import Record
+from scenelang.compiler import steps as affine
+from scenelang.compiler.geometries import GEOMETRIES, Corner
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist, Warp, inverted
+from scenelang.language import scene
+from scenelang.language.nodes import MOST, camera_fault, light_fault
+
+if TYPE_CHECKING:
+    from scenelang.language.scene import Scene
+
+
+Triple = tuple[float, float, float]
+
+HORIZON: Triple = (0.80, 0.86, 0.92)
+ZENITH: Triple = (0.30, 0.50, 0.85)
+
+AMBIENT = (0.12, 0.06)
+"""What a surface of normal n receives without the light: ``AMBIENT[0] + AMBIENT[1] n.y``; media the first."""
+
+EXTINCTION = 3.0  # of media, per world unit
+FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
+NEAREST = 1e-3  # the light counts as at least this far away
+LIFT = 1e-4  # how far off its surface a ray to the light starts
+
+
+def decoded(srgb: Triple) -> Triple:
+    """The linear colour of an sRGB-encoded one (IEC 61966-2-1)."""
+    r, g, b = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in srgb)
+    return r, g, b
+
+
+def encoded(linear: Triple) -> Triple:
+    """The inverse of `decoded`."""
+    r, g, b = (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear)
+    return r, g, b
+
+
+class Camera(Record):
+    """Where the picture is taken from.
+
+    Args:
+        eye, target: world points.
+        fov_rad: angle of view across the shorter side of the canvas, in (0, pi).
+    """
+
+    eye: Triple = (0.0, 1.2, 6.0)
+    target: Triple = (0.0, 0.0, 0.0)
+    fov_rad: float = 2.0 * atan(1.0 / 3.0)
+
+    def fault(self) -> str | None:
+        """Why there is no picture from here, if there is none."""
+        fault = camera_fault(self.eye, self.target, self.fov_rad)
+        return None if fault is None else fault[1]
+
+    def axes(self) -> tuple[Triple, Triple, Triple]:
+        """Unit vectors forward, right and up; seen straight along y, up is -z."""
+        f = _unit(self.target[0] - self.eye[0], self.target[1] - self.eye[1], self.target[2] - self.eye[2])
+        upright = hypot(f[0], f[2]) > 1e-9
+        right = _unit(*_cross(f, (0.0, 1.0, 0.0) if upright else (0.0, 0.0, -1.0)))
+        return f, right, _cross(right, f)
+
+
+class Light(Record):
+    """A point light: at distance r it sends ``power rgb / r²``."""
+
+    position: Triple = (2.5, 4.0, 3.0)
+    power: float = 28.0
+    rgb: Triple = (1.0, 1.0, 1.0)
+
+    def fault(self) -> str | None:
+        """Why there is no such light, if there is none."""
+        return light_fault(self.power)
+
+
+class Ground(Record):
+    """A diffuse plane at height ``y``."""
+
+    y: float = -1.0
+    rgb: Triple = (0.50, 0.48, 0.45)
+
+
+class Stage(Record):
+    """All of a 3D scene that is not an object.
+
+    Args:
+        camera, light: as they say.
+        ground: None for a scene without one.
+        horizon, zenith: colours of the sky; the ground fades into the first. A plain background is both.
+        transparent: the sky is not drawn and the picture has alpha.
+    """
+
+    camera: Camera = Camera()
+    light: Light = Light()
+    ground: Ground | None = Ground()
+    horizon: Triple = HORIZON
+    zenith: Triple = ZENITH
+    transparent: bool = False
+
+
+def stage_data(stage: Stage) -> dict[str, Any]:
+    """A stage as JSON data; camera, light and ground are objects of their fields."""
+    data: dict[str, Any] = {name: getattr(stage, name) for name in Stage.__match_args__}
+    for name in ("camera", "light", "ground"):
+        part = data[name]
+        data[name] = None if part is None else {n: getattr(part, n) for n in part.__match_args__}
+    return data
+
+
+def read_stage(data: object) -> Stage:
+    """The stage that JSON data holds; the inverse of `stage_data`.
+
+    Raises:
+        ValueError: it holds none.
+    """
+    if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
+        raise ValueError("fields missing or unknown")
+    parts: dict[str, Any] = {name: _read(name, data[name]) for name in data}
+    if parts["camera"] is None or parts["light"] is None or type(parts["transparent"]) is not bool:
+        raise ValueError("a part missing")
+    return Stage(**parts)
+
+
+_PARTS: dict[str, type[Record]] = {"camera": Camera, "light": Light, "ground": Ground}
+
+
+def _read(name: str, value: object) -> Any:
+    """A field of a stage or of one of its parts."""
+    if name in _PARTS:
+        if value is None:
+            return None
+        if not isinstance(value, dict) or value.keys() != set(_PARTS[name].__match_args__):
+            raise ValueError(f"`{name}` has fields missing or unknown")
+        return _PARTS[name](**{n: _read(n, v) for n, v in value.items()})
+    if name == "transparent":
+        return value
+    three = name not in ("fov_rad", "power", "y")
+    numbers = value if three else [value]
+    if not isinstance(numbers, list) or len(numbers) != (3 if three else 1):
+        raise ValueError(f"`{name}` does not hold what it should")
+    if not all(type(v) in (int, float) and abs(v) <= MOST for v in numbers):
+        raise ValueError(f"`{name}` is not a finite number")
+    return tuple(map(float, numbers)) if three else float(numbers[0])
+
+
+def stage_of(scene: Scene) -> Stage:
+    """The stage that a scene states, over the defaults; written colours are decoded."""
+    camera, light, ground, sky = Camera(), Light(), scene.ground, scene.background
+    if scene.camera != "default":
+        camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov)
+    if scene.light != "default":
+        light = Light(scene.light.position, scene.light.power, decoded(scene.light.color))
+    plane = None if ground is None else Ground()
+    if ground is not None and ground != "default":
+        plane = Ground(ground.y, Ground().rgb if ground.color == "default" else decoded(ground.color))
+    if sky is None or sky == "default":
+        return Stage(camera, light, plane, transparent=sky is None)
+    return Stage(camera, light, plane, decoded(sky), decoded(sky))
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(x: float, y: float, z: float) -> Triple:
+    length = hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+Box = tuple[float, float, float, float, float, float]
+"""xmin, ymin, xmax, ymax, zmin, zmax in the world; what lies in the plane has z = 0."""
+
+EVERYWHERE: Final[Box] = (-inf, -inf, inf, inf, -inf, inf)
+
+SINGULAR: Final = 1e-12
+"""Smallest to largest stretch at which a map counts as singular.
+
+The determinant of a 2 x 2 block carries a rounding error of about 1e-16 of the squared largest stretch,
+so that ratio is still known to four digits here, while nothing that thin can be seen at 8192 pixels.
+"""
+
+REACH: Final = 1e30
+"""Stretches outside ``1/REACH .. REACH`` leave the range of float32 when inverted, as do far offsets."""
+
+
+class Refusal(NamedTuple):
+    """Why a transform has no step: a code, the fact and advice."""
+
+    code: str
+    message: str
+    help: str
+
+
+class Space(ABC):
+    """The geometry of one dimension."""
+
+    dimension: ClassVar[int]
+    shown: ClassVar[tuple[tuple[int, ...], ...]]
+    """Entries of `Rows` that say all of a map of this space, row by row."""
+    thinner: ClassVar[str]
+    """What a singular map flattens everything to."""
+
+    @abstractmethod
+    def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
+        """The map as this space has it, or why the transform leaves the space."""
+
+    def idle(self, transform: scene.Transform) -> str | None:
+        """The part of a transform that was asked for and has no effect here, if there is one."""
+        return None
+
+    def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
+        """An operation of a material in the space that colours are averaged in."""
+        return op
+
+    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A colour of that space as it is written."""
+        return rgb
+
+    @abstractmethod
+    def holds(self, rows: Rows) -> bool:
+        """Whether a map is one that `fitted` gives."""
+
+    @abstractmethod
+    def stretches(self, rows: Rows) -> tuple[float, float]:
+        """The smallest and largest singular value of the linear block."""
+
+    @abstractmethod
+    def before(self, rows: Rows, turn: Turn) -> Turn | None:
+        """The turn that does before the map ``rows`` what ``turn`` does after it; None where none does."""
+
+    def after(self, rows: Rows, turn: Turn) -> Turn | None:
+        """The turn that does after the map ``rows`` what ``turn`` does before it; None where none does."""
+        return self.before(inverted(rows), turn)
+
+    @abstractmethod
+    def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
+        """A box around all points of the world whose distance to a leaf is below ``level``.
+
+        Args:
+            geometry: name of the leaf.
+            steps: all its steps into the world, nearest the leaf first.
+            level: world distance, at least 0; 0 for the leaf itself.
+        """
+
+    def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
+        """The same as Programs keep it: the flat box, in space a ball, as centre and radius."""
+        return self.box(geometry, steps, level)[:4]
+
+    @abstractmethod
+    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
+        """A disc, or ball, about a leaf's own origin that it certainly fills, where one is known.
+
+        It is given by its radius and the map from the world to there.
+        """
+
+    def usable(self, rows: Rows) -> bool:
+        """Whether the map can be inverted in float64 and its inverse kept in float32."""
+        smallest, largest = self.stretches(rows)
+        offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
+        # Written so that NaN and infinity fail.
+        return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
+
+
+_ALIKE = 1e-12
+"""Relative tolerance below which entries of a map count as equal."""
+
+_ROUNDING = 1e-9
+"""Balls and boxes grow by this much, relative, to cover the rounding of float64."""
+
+
+class Solid(Space):
+    """The solid world."""
+
+    dimension = 3
+    shown = ((0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11))
+    thinner = "a plane, a line or a point"
+
+    def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
+        return rows
+
+    def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
+        """Light adds up, so that colours are linear."""
+        return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
+
+    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+        return encoded(rgb)
+
+    def holds(self, rows: Rows) -> bool:
+        return True
+
+    def stretches(self, rows: Rows) -> tuple[float, float]:
+        a, b, c = rows[0], rows[1], rows[2]
+        d, e, f = rows[4], rows[5], rows[6]
+        g, h, i = rows[8], rows[9], rows[10]
+        # Eigenvalues of the symmetric A^T A by cyclic Jacobi rotations: three sweeps reach float64 accuracy
+        # from any start that matters here; eight leave no doubt.
+        m = [
+            [a * a + d * d + g * g, a * b + d * e + g * h, a * c + d * f + g * i],
+            [0.0, b * b + e * e + h * h, b * c + e * f + h * i],
+            [0.0, 0.0, c * c + f * f + i * i],
+        ]
+        m[1][0], m[2][0], m[2][1] = m[0][1], m[0][2], m[1][2]
+        for _ in range(8):
+            for p, q in ((0, 1), (0, 2), (1, 2)):
+                if m[p][q] == 0.0:
+                    continue
+                theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q])
+                t = (1.0 if theta >= 0.0 else -1.0) / (abs(theta) + hypot(theta, 1.0))
+                co = 1.0 / hypot(t, 1.0)
+                si = t * co
+                for r in range(3):
+                    m[r][p], m[r][q] = co * m[r][p] - si * m[r][q], si * m[r][p] + co * m[r][q]
+                for r in range(3):
+                    m[p][r], m[q][r] = co * m[p][r] - si * m[q][r], si * m[p][r] + co * m[q][r]
+        values = sorted(max(m[r][r], 0.0) for r in range(3))
+        largest, middle = sqrt(values[2]), sqrt(values[1])
+        det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+        smallest = abs(det) / (largest * middle) if largest * middle > 0.0 else 0.0
+        return min(smallest, middle), largest
+
+    def before(self, rows: Rows, turn: Turn) -> Turn | None:
+        """See the module for a proof."""
+        j, k = (2, 1) if isinstance(turn, Twist) else (1, 2)  # the plane is that of x and j
+        a, b, c, d, along = rows[0], rows[j], rows[4 * j], rows[5 * j], rows[5 * k]
+        scale = sqrt(abs(a * d - b * c))
+        near = _ALIKE * scale
+        sign = 1.0 if a * d > b * c else -1.0
+        apart = (rows[3], rows[4 * j + 3], rows[k], rows[4 * k], rows[4 * j + k], rows[4 * k + j])
+        if max(abs(a - sign * d), abs(b + sign * c), *map(abs, apart)) > near:
+            return None
+        shift = abs(rows[4 * k + 3]) > near
+        if isinstance(turn, Twist):
+            return None if shift else Twist(sign * along * turn.twist)
+        if turn.twirl and (shift or abs(abs(along) - scale) > near):
+            return None
+        bend = turn.bend[0]
+        if bend and abs(b) > near:
+            return None
+        return type(turn)(sign * scale * turn.twirl, (sign * a * bend, 0.0)) if not turn.bend[1] else None
+
+    def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
+        (x, y, z), radius, rows = self._ball(steps, level)
+        sides = []
+        for row in (rows[:4], rows[4:8], rows[8:]):
+            middle = row[0] * x + row[1] * y + row[2] * z + row[3]
+            half = radius * hypot(*row[:3])
+            half += _ROUNDING * (1.0 + abs(middle) + half)
+            if not half < inf:  # NaN compares false: what overflowed may be anywhere
+                return EVERYWHERE
+            sides += [middle - half, middle + half]
+        xmin, xmax, ymin, ymax, zmin, zmax = sides
+        return xmin, ymin, xmax, ymax, zmin, zmax
+
+    def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
+        (x, y, z), radius, rows = self._ball(steps, level)
+        x, y, z = _mapped(rows, (x, y, z))
+        radius *= self.stretches(rows)[1]
+        return x, y, z, radius + _ROUNDING * (1.0 + hypot(x, y, z) + radius)
+
+    def _ball(self, steps: Sequence[Step], level: float) -> tuple[tuple[float, float, float], float, Rows]:
+        """Centre and radius of a ball that holds all points below a level, and the map behind it."""
+        radius, pending = 1.0, IDENTITY
+        if level > 0.0:
+            stretch = self.stretches(affine.composed(steps))[0]
+            radius += level / stretch if stretch else inf
+        centre = 0.0, 0.0, 0.0
+        for step in steps:
+            if isinstance(step, Displace):
+                radius += abs(step.amount)
+            elif isinstance(step, Affine):
+                pending = affine.compose(step.rows, pending)
+            else:
+                if pending is not IDENTITY:
+                    centre, radius = _mapped(pending, centre), radius * self.stretches(pending)[1]
+                    pending = IDENTITY
+                centre, radius = (0.0, 0.0, 0.0), radius + hypot(*centre)
+        return centre, radius, pending
+
+    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
+        """Turns before the first affine map leave a ball about the origin in place."""
+        maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
+        if row is None or any(maps[:-1]) or not all(maps[-1:]):
+            return None
+        inner = row.inner - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
+        return (inner, affine.inverted(affine.composed(steps))) if inner > 0.0 else None
+
+
+def _mapped(rows: Rows, p: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = p
+    a, b, c, u, d, e, f, v, g, h, i, w = rows
+    return a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
+
+
+ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
+
+_PLANE_ROUNDING = 1e-9  # boxes grow by this much, relative, to cover the rounding of float64
+
+
+class Plane(Space):
+    """The plane z = 0; maps of it leave z alone."""
+
+    dimension = 2
+    shown = ((0, 1, 3), (4, 5, 7))
+    thinner = "a line or a point"
+
+    def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
+        kind = transform.kind
+        if isinstance(transform, scene.Rotate) and transform.angle != 0.0 and any(transform.axis[:2]):
+            axis = ", ".join(f"{v:g}" for v in transform.axis)
+            fact = f"`rotate` about [{axis}] leaves the plane"
+            return Refusal("E0505", fact, "a 2D model turns about Z: leave `axis` out")
+        if rows[11] != 0.0:
+            fact = f"`{kind}` by z = {rows[11]:g} leaves the plane"
+            return Refusal("E0505", fact, "a 2D model has no z: leave the third component out")
+        if isinstance(transform, scene.Shear) and transform.k != 0.0 and "z" in transform.axes:
+            fact = f"`shear({transform.axes})` leaves the plane"
+            return Refusal("E0505", fact, "a 2D model shears `xy` or `yx`")
+        if isinstance(transform, scene.Matrix) and (rows[2] or rows[6] or rows[8] or rows[9]):
+            help = "for a 2D model the third row and column are those of the identity"
+            return Refusal("E0505", "`matrix` mixes z with x and y", help)
+        return flattened(rows)
+
+    def idle(self, transform: scene.Transform) -> str | None:
+        if not isinstance(transform, scene.Scale) or transform.z in (1.0, transform.x):
+            return None  # `scale(s)` has the same factor along all axes
+        return f"`scale` by {transform.z:g} along z"
+
+    def holds(self, rows: Rows) -> bool:
+        return not rows[2] and not rows[6] and rows[8:] == IDENTITY[8:]
+
+    def stretches(self, rows: Rows) -> tuple[float, float]:
+        return stretches(rows[0], rows[1], rows[4], rows[5])
+
+    def usable(self, rows: Rows) -> bool:
+        """Also whether the inverse, kept in float32, still has one itself: thin and slanted it may not."""
+        if not super().usable(rows):
+            return False
+        a, b, _, _, c, d = rows[:6]
+        det = a * d - b * c
+        p, q, r, s = unpack("4f", pack("4f", d / det, b / det, c / det, a / det))
+        return bool(p * s != q * r)
+
+    def before(self, rows: Rows, turn: Turn) -> Turn | None:
+        """Similarities about the origin trade places with warps: `chain.normal` proves it."""
+        alike = _similarity(rows)
+        if alike is None or not isinstance(turn, Warp):
+            return None
+        scale, sign = alike
+        x, y = turn.bend
+        bend = (sign * (rows[0] * x + rows[4] * y), sign * (rows[1] * x + rows[5] * y))
+        return Warp(sign * scale * turn.twirl, bend)
+
+    def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
+        rows, reach = affine.composed(steps), 0.0
+        if level > 0.0:
+            stretch = self.stretches(rows)[0]
+            if stretch == 0.0:
+                return EVERYWHERE
+            reach = level / stretch
+        if any(isinstance(step, Warp) for step in steps):
+            return _grown(_warped(steps, 1.0 + reach))
+        row = GEOMETRIES.get(geometry)
+        return _grown(_straight(row.corners if row else (), rows, reach))
+
+    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
+        """Warps before the first affine map leave a disc about the origin in place."""
+        row = GEOMETRIES.get(geometry)
+        if row is None or not row.inner or not all(isinstance(step, Affine) for step in steps[-1:]):
+            return None
+        if any(isinstance(step, Affine) for step in steps[:-1]):
+            return None
+        return row.inner, affine.inverted(affine.composed(steps))
+
+
+def flattened(rows: Rows) -> Rows:
+    """The same map of the plane with z left alone."""
+    return (rows[0], rows[1], 0.0, rows[3], rows[4], rows[5], 0.0, rows[7], 0.0, 0.0, 1.0, 0.0)
+
+
+def stretches(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """The smallest and largest singular value of the matrix [[a, b], [c, d]]."""
+    largest = 0.5 * (hypot(a + d, c - b) + hypot(a - d, c + b))
+    # |det| / largest keeps its digits where the difference of the two lengths would lose them.
+    return (abs(a * d - b * c) / largest if largest else 0.0), largest
+
+
+def _similarity(rows: Rows) -> tuple[float, float] | None:
+    """``(s, sign)`` where the map of the plane is a similarity about the origin, else None.
+
+    ``s`` is its scale; ``sign`` is 1 for a rotation, -1 for a reflection.
+    """
+    a, b, c, d = rows[0], rows[1], rows[4], rows[5]
+    s = sqrt(abs(a * d - b * c))
+    near = ALIKE * s
+    if abs(rows[3]) > near or abs(rows[7]) > near:
+        return None
+    if abs(a - d) <= near and abs(b + c) <= near:
+        return s, 1.0
+    if abs(a + d) <= near and abs(b - c) <= near:
+        return s, -1.0
+    return None
+
+
+def _grown(box: tuple[float, float, float, float]) -> Box:
+    left, bottom, right, top = box
+    more = _PLANE_ROUNDING * (1.0 + max(abs(left), abs(bottom), abs(right), abs(top)))
+    grown = (left - more, bottom - more, right + more, top + more, 0.0, 0.0)
+    # NaN compares false: what overflowed may be anywhere.
+    return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
+
+
+def _straight(corners: tuple[Corner, ...], rows: Rows, reach: float) -> tuple[float, float, float, float]:
+    a, b, x = rows[0], rows[1], rows[3]
+    c, d, y = rows[4], rows[5], rows[7]
+    wide, high = reach * hypot(a, b), reach * hypot(c, d)
+    if not corners:
+        wide, high = wide + hypot(a, b), high + hypot(c, d)
+        return x - wide, y - high, x + wide, y + high
+    across = [a * p + b * q for p, q in corners]
+    along = [c * p + d * q for p, q in corners]
+    return x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high
+
+
+@dataclass(slots=True)
+class _Sector:
+    """Points about the origin: radii ``near``..``far``, angles ``first``..``last`` (a full turn: all)."""
+
+    near: float
+    far: float
+    first: float
+    last: float
+
+    @property
+    def whole(self) -> bool:
+        return not self.last - self.first < tau
+
+    def furthest(self, x: float, y: float) -> float:
+        """An upper bound of (x, y) . p over the sector."""
+        length = hypot(x, y)
+        if length == 0.0:
+            return 0.0
+        if self.whole:
+            return length * self.far
+        ahead = (atan2(y, x) - self.first) % tau
+        if ahead <= self.last - self.first:
+            return length * self.far
+        c = max(cos(ahead), cos(ahead - (self.last - self.first)))
+        return length * c * (self.far if c >= 0.0 else self.near)
+
+    def turned(self, warp: Warp) -> _Sector:
+        """A sector around the image of this one: each point turns by ``twirl |p| + bend . p``."""
+        if self.whole:
+            return self
+        twist = sorted((warp.twirl * self.near, warp.twirl * self.far))
+        x, y = warp.bend
+        most = hypot(x, y) * self.far
+        low, high = twist[0] - most, twist[1] + most
+        if most > 0.0:
+            # `p` is the turned point. Its angle is now known roughly, which bounds the bend better.
+            rough = _Sector(self.near, self.far, self.first + low, self.last + high)
+            low, high = twist[0] - rough.furthest(-x, -y), twist[1] + rough.furthest(x, y)
+        return _Sector(self.near, self.far, self.first + low, self.last + high)
+
+    def mapped(self, rows: Rows) -> _Sector:
+        """A sector around the image of this one under an affine map."""
+        x, y = rows[3], rows[7]
+        smallest, largest = stretches(rows[0], rows[1], rows[4], rows[5])
+        away, radius = hypot(x, y), largest * self.far
+        if away == 0.0:
+            return _Sector(smallest * self.near, radius, 0.0, tau)
+        if not away > radius:
+            return _Sector(0.0, away + radius, 0.0, tau)
+        middle, half = atan2(y, x), asin(radius / away)
+        return _Sector(away - radius, away + radius, middle - half, middle + half)
+
+
+def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, float]:
+    sector = _Sector(0.0, radius, -pi, pi)
+    pending = IDENTITY
+    for step in steps:
+        if isinstance(step, Affine):
+            pending = affine.compose(step.rows, pending)
+            continue
+        if not isinstance(step, Warp):
+            return EVERYWHERE[:4]
+        if pending is not IDENTITY:
+            sector, pending = sector.mapped(pending), IDENTITY
+        sector = sector.turned(step)
+    a, b, x = pending[0], pending[1], pending[3]
+    c, d, y = pending[4], pending[5], pending[7]
+    return (
+        x - sector.furthest(-a, -b),
+        y - sector.furthest(-c, -d),
+        x + sector.furthest(a, b),
+        y + sector.furthest(c, d),
+    )
+
+
+PLANE: Final = Plane()
+SPACES: Final[dict[int, Space]] = {2: PLANE, 3: Solid()}

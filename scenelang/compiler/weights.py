@@ -1,0 +1,185 @@
+"""Codes, header and digest of a model's weights, read without torch."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from scenelang.assets.files import read_regular
+from scenelang.assets.tensors import TensorError, read_tensors
+from scenelang.compiler.manifest import ROOT, Manifest, load_manifest, model_folder
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from scenelang.compiler.lifting import Lifting
+
+
+MOST_BYTES = 64 << 20
+REPLACED: Final = ROOT / "replaced"
+"""Folders of weights that others took the place of, by digest: what was saved draws with them as ever."""
+LIFTING = "lifting."
+"""In front of the names of a lifting's tensors, where a file holds it beside a renderer's."""
+
+
+class ModelError(Exception):
+    """A model's files are missing, damaged or not what its manifest says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """The learned codes that a Program carries, and which weights they belong to.
+
+    Args:
+        geometry: leaf name to code, 4 numbers; of a learned lifting the whole vector.
+        material: material name to code, 12 numbers; likewise.
+        digest: SHA-256 of the weights file, hex.
+        lifting: the encoders of a learned lifting.
+    """
+
+    geometry: dict[str, tuple[float, ...]]
+    material: dict[str, tuple[float, ...]]
+    digest: str
+    lifting: Lifting | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a weights file says about itself.
+
+    Args:
+        digest: SHA-256 of the file, hex.
+        training: its header: config, seed, iterations, seconds, device, revision.
+    """
+
+    digest: str
+    bytes: int
+    parameters: int
+    training: dict[str, Any]
+
+
+def replaced(digest: str) -> str:
+    """The digest of weights that Programs were saved for and that others replaced; of any other, ""."""
+    return digest if digest in os.listdir(REPLACED) else ""
+
+
+def weights_folder(name: str, digest: str = "") -> Path:
+    """Folder of a model's weights and of what is proved of them: today's, or those `replaced`, by digest."""
+    return REPLACED / digest if replaced(digest) else model_folder(name)
+
+
+def weights_path(name: str, digest: str = "") -> Path:
+    """File of a shipped model's weights, those of today or those `replaced`."""
+    return weights_folder(name, digest) / "weights.safetensors"
+
+
+def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:
+    """The bytes of a shipped model's weights file, or of the one at ``path``; of one too large, the first.
+
+    Raises:
+        ModelError: it cannot be read.
+    """
+    try:
+        return read_regular(path or weights_path(name, digest), MOST_BYTES)
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise ModelError(f"cannot read the weights of `{name}`: {why}") from error
+
+
+class Weights(NamedTuple):
+    """What a weights file holds: its header and its tensors by name, all finite."""
+
+    header: dict[str, Any]
+    arrays: dict[str, npt.NDArray[Any]]
+
+
+def open_weights(data: bytes) -> Weights:
+    """Read a weights file.
+
+    Raises:
+        ModelError: it is damaged, foreign or hostile, or holds numbers that are not finite.
+    """
+    try:
+        found = read_tensors(data, MOST_BYTES)
+        return Weights(found.header, found.arrays())
+    except TensorError as error:
+        raise ModelError(f"damaged weights: {error}") from None
+
+
+def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raise ModelError where tensors are not those of a network, float32 and of its shapes."""
+    for name in sorted(shapes.keys() | arrays.keys()):
+        found = arrays.get(name)
+        if name not in shapes or found is None or found.shape != shapes[name] or found.dtype != "float32":
+            held = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
+            wanted = f"float32 {list(shapes[name])} is needed" if name in shapes else "none is known"
+            raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
+
+
+def read_facts(name: str) -> Facts:
+    """What the weights file of a shipped model says about itself.
+
+    Raises:
+        OSError: it cannot be read.
+        ModelError: it is damaged.
+    """
+    data = read_regular(weights_path(name), MOST_BYTES)
+    header, arrays = open_weights(data)
+    parameters = sum(array.size for array in arrays.values())
+    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, header)
+
+
+@lru_cache(maxsize=8)
+def load_codes(name: str, digest: str = "") -> Codes:
+    """Read the codes of a shipped model, of its weights of today or of those `replaced`.
+
+    Raises:
+        KeyError: there is no such model.
+        FileNotFoundError: it has no weights.
+        ModelError: its weights are damaged.
+    """
+    return codes_of(load_manifest(name), read_regular(weights_path(name, digest), MOST_BYTES))
+
+
+def codes_of(manifest: Manifest, data: bytes) -> Codes:
+    """The codes that a weights file holds.
+
+    Raises:
+        ModelError: it is damaged, or not of this model.
+    """
+    from scenelang.compiler.lifting import LAYOUTS, WIDTH
+
+    tensors = open_weights(data).arrays
+    prefix = "" if manifest.renderer in ("framed", "solid") else LIFTING
+    learned = manifest.lifting == "learned"
+    at = LAYOUTS[manifest.dimension].places
+    own = at.code.stop - at.code.start, at.material.stop - at.material.start
+    sides = (WIDTH // 2, WIDTH // 2) if learned else own
+    geometry = _rows(manifest.geometries, tensors, f"{prefix}codes", sides[0])
+    material = _rows(manifest.materials, tensors, f"{prefix}material_codes", sides[1])
+    lifting = None
+    if learned:
+        from scenelang.compiler.lifting import read_lifting
+
+        try:
+            lifting = read_lifting(tensors, LIFTING)
+        except (KeyError, ValueError) as error:
+            raise ModelError(f"damaged weights: the lifting: {error}") from None
+    return Codes(geometry, material, hashlib.sha256(data).hexdigest(), lifting)
+
+
+def _rows(
+    names: tuple[str, ...], tensors: Mapping[str, Any], key: str, side: int
+) -> dict[str, tuple[float, ...]]:
+    table = tensors.get(key)
+    if table is None or table.dtype not in ("float32", "float16") or table.shape != (len(names), side):
+        found = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
+        raise ModelError(
+            f"damaged weights: tensor `{key}` {found}; {len(names)} rows of {side} floats are needed"
+        )
+    return {name: tuple(row) for name, row in zip(names, table.tolist(), strict=True)}

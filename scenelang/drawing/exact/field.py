@@ -1,0 +1,373 @@
+"""The exact field of the plane in float64: samples, textures, leaves and folds, part by part.
+
+Works on numpy arrays and torch tensors alike: only names that both offer are used, so that training makes its
+data on any device by the formulas of the reference image. Points are one array (d, …), or a sequence of its d
+coordinates.
+
+A disc of points is carried back to each leaf. As a leaf's distance changes by no more than a point moves, the
+distance at the centre tells whether all of the disc is outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache, reduce
+from itertools import product
+from math import hypot, inf, isnan
+from operator import add, mul
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.element import Element
+from scenelang.assets.picture import texels
+from scenelang.compiler.geometries import GEOMETRIES, namespace
+from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
+from scenelang.compiler.steps import Affine, Step, Warp
+from scenelang.drawing.image import decoded
+from scenelang.language.words import BLEND, TOKENS
+
+
+def sample_points(
+    canvas: tuple[int, int], rows: range, per_side: int, columns: range | None = None
+) -> npt.NDArray[np.float64]:
+    """World coordinates (2, M) of the samples of some pixel rows and columns, row by row of samples."""
+    width, height = canvas
+    unit = min(width, height) / 2
+    columns = columns or range(width)
+    x = ((np.arange(columns.start * per_side, columns.stop * per_side) + 0.5) / per_side - width / 2) / unit
+    fine = np.arange(rows.start * per_side, rows.stop * per_side)
+    y = (height / 2 - (fine + 0.5) / per_side) / unit
+    return np.stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+
+
+Values = npt.NDArray[np.float64]
+
+
+def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
+    """Colours (M, 3) of a look with an element.
+
+    Args:
+        q: its own coordinates (d, M): those of the leaf, through the moves of the texture.
+        light: whether they are linear, decoded before anything is mixed.
+    """
+    assert look.element is not None
+    values = _values(look.element, light)
+    if values.ndim == 4:
+        places = [(np.clip(x, -1, 1) + 1) / 2 * (len(values) - 1) for x in q]
+    else:
+        (u, v), (high, wide) = q, values.shape[:2]
+        places = [(1 - v) / 2 * high - 0.5, (u + 1) / 2 * wide - 0.5]
+    return _stepped(_mixed(values, places), look.colours)
+
+
+@lru_cache(maxsize=16)
+def _values(element: Element, light: bool) -> Values:
+    """Colours (h, w, 3) or (n, n, n, 3)."""
+    found = texels(element).astype(np.float64)
+    if element.form == "picture":  # of 8 bits
+        found = np.rint(found * 255) / 255
+    return np.asarray(decoded(found), np.float64) if light else found
+
+
+def _mixed(values: Values, places: list[Values]) -> Values:
+    """Colours between the nearest nodes along each axis, where the first follows the last."""
+    total: Values = np.zeros((len(places[0]), 3))
+    first = [np.floor(place).astype(int) for place in places]
+    for corner in np.ndindex(*(2,) * len(places)):
+        share, index = np.ones(len(places[0])), []
+        for place, low, side, up in zip(places, first, values.shape, corner, strict=False):
+            share = share * (place - low if up else 1 - (place - low))
+            index.append((low + up) % side)
+        total += share[:, None] * values[tuple(index)]
+    return total
+
+
+def _stepped(rgb: Values, steps: Iterable[ColourStep]) -> Values:
+    """Colours behind operations, clamped after each."""
+    for kind, *numbers in steps:
+        if kind == "color":
+            rgb = rgb * numbers
+        elif kind == "grayscale":
+            rgb = rgb + numbers[0] * ((rgb @ LUMA)[:, None] - rgb)
+        else:
+            rgb = _turned(rgb, numbers[0])
+        rgb = np.clip(rgb, 0.0, 1.0)
+    return rgb
+
+
+def _turned(rgb: Values, turns: float) -> Values:
+    """The same S and V of HSV, and H further by so many turns."""
+    most, least = rgb.max(1), rgb.min(1)
+    first = rgb.argmax(1)
+    other = [np.take_along_axis(rgb, ((first + k) % 3)[:, None], 1)[:, 0] for k in (1, 2)]
+    span = np.where(most > least, most - least, 1.0)
+    hue = (2 * first + (other[0] - other[1]) / span) / 6 + turns
+    # a channel is full within a sixth of a turn of its own hue, and empty beyond a third
+    away = [abs((hue - own / 3 + 0.5) % 1 - 0.5) for own in range(3)]
+    return np.stack([least + (most - least) * np.clip(2 - 6 * a, 0, 1) for a in away], 1)
+
+
+Array = Any  # numpy array or torch tensor
+
+Brought = Mapping[str, Any]
+"""True shapes of elements by geometry: each answers points (M, d) of the leaf's own space with signed
+``distances`` (M,), and in space with their gradients ``slopes`` (M, 3)."""
+
+
+def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Array:
+    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
+
+    Args:
+        p: points in leaf units, (d, …).
+        brought: shapes of elements, whose points are (d, M).
+    """
+    if brought and geometry in brought:
+        return brought[geometry].distances(np.transpose(p))
+    return GEOMETRIES[geometry].distance(p)
+
+
+def fold(
+    distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
+) -> Iterator[tuple[Array, Array]]:
+    """Yield (D, C) after each object.
+
+    Args:
+        distances: world distances d of the objects, each of shape S.
+        colours: colours c, each of a shape that broadcasts against (*S, 3).
+        tokens: each a number, or an array that broadcasts against S.
+    """
+    big_d = c_now = None
+    for d, c, token in zip(distances, colours, tokens, strict=True):
+        if big_d is None:
+            big_d, c_now = d, c
+        else:
+            big_d, c_now = combine(big_d, c_now, d, c, token)
+        yield big_d, c_now
+
+
+def combine(
+    big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = 0.0
+) -> tuple[Array, Array]:
+    """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one."""
+    xp = namespace(d)
+    if isinstance(token, int):
+        return _STEPS[token](xp, big_d, big_c, d, c, k)
+    out_d, out_c = big_d, big_c
+    for value, step in enumerate(_STEPS):
+        new_d, new_c = step(xp, big_d, big_c, d, c, k)
+        chosen = token == value
+        out_d = xp.where(chosen, new_d, out_d)
+        out_c = xp.where(chosen[..., None], new_c, out_c)
+    return out_d, out_c
+
+
+def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    over = d < xp.clip(big_d, 0.0, None)
+    return xp.minimum(big_d, d), xp.where(over[..., None], c, big_c)
+
+
+def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    k = k or BLEND
+    h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
+    mixed = big_c + (c - big_c) * h[..., None]
+    # each side by its own share: a difference of the two would swallow the nearer one's digits
+    return big_d * (1 - h) + d * h - k * h * (1 - h), mixed
+
+
+def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    return _cut(xp, big_d, -d, k), big_c
+
+
+def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+    return _cut(xp, big_d, d, k), big_c
+
+
+def _cut(xp: Any, big_d: Array, d: Array, k: float) -> Array:
+    if not k:
+        return xp.maximum(big_d, d)
+    h = xp.clip(0.5 - 0.5 * (d - big_d) / k, 0.0, 1.0)  # the share of what is cut
+    return d + (big_d - d) * h + k * h * (1 - h)
+
+
+_STEPS = (_union, _smooth, _subtract, _intersect)
+
+
+Floats = npt.NDArray[np.float64]
+
+
+def map_back(frame: Array, p: Array) -> list[Array]:
+    """Points (d, …) through the inverse of an affine map, as d rows of d factors and a shift."""
+    return [reduce(add, map(mul, row, p)) + row[-1] for row in frame]
+
+
+def warp_back(twirl: Array, bend: Sequence[Array], p: Array) -> list[Array]:
+    """``p -> R(twirl |p| + bend . p) p`` with ``R(a) p = (cos a x + sin a y, -sin a x + cos a y, …)``."""
+    x, y, *others = p
+    xp = namespace(x)
+    angle = reduce(add, map(mul, bend, p), twirl * xp.sqrt(reduce(add, (c * c for c in p))))
+    cos, sin = xp.cos(angle), xp.sin(angle)
+    return [cos * x + sin * y, cos * y - sin * x, *others]
+
+
+def carry_back(steps: Sequence[Step], p: Array) -> Array:
+    """World points (d, M) to leaf coordinates: from the last step to the first."""
+    for step in reversed(steps):
+        if isinstance(step, Affine):
+            p = map_back(frame_back(step, len(p)), p)
+        elif isinstance(step, Warp):
+            p = warp_back(step.twirl, step.bend, p)
+    return p
+
+
+@lru_cache(maxsize=1 << 12)
+def frame_back(step: Affine, dimension: int) -> Floats:
+    """The inverse of an affine map, as d rows of d factors and a shift."""
+    inverse = np.linalg.inv(_linear(step, dimension))
+    shift = -inverse @ np.reshape(step.rows, (3, 4))[:dimension, 3]
+    return np.column_stack([inverse, shift])
+
+
+def _linear(step: Affine, dimension: int) -> Floats:
+    return np.reshape(step.rows, (3, 4))[:dimension, :dimension]
+
+
+@lru_cache(maxsize=1 << 12)
+def distance_scale(steps: tuple[Step, ...], dimension: int = 2) -> float:
+    """The smallest singular value of the linear part of the affine steps composed in order."""
+    linear = np.eye(dimension)
+    for step in steps:
+        if isinstance(step, Affine):
+            linear = _linear(step, dimension) @ linear
+    return float(np.linalg.svd(linear, compute_uv=False)[-1])
+
+
+def evaluate(
+    node: Node,
+    p: Array,
+    outer: tuple[Step, ...] = (),
+    *,
+    owners: bool = False,
+    brought: Brought | None = None,
+) -> tuple[Any, Any]:
+    """Distance D (M,) and colour C (M, 3) of a node at world points.
+
+    Args:
+        p: world points (d, M), float64.
+        outer: steps of the folds around it, nearest first.
+        owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
+        brought: shapes of elements.
+    """
+    steps = (*(move.step for move in node.moves), *outer)
+    if isinstance(node, Leaf):
+        q = carry_back(steps, p)
+        d = leaf_distance(node.geometry, q, brought) * distance_scale(steps, len(p))
+        if node.look.element is not None and not owners:
+            return d, colour_at(node.look, carry_back(node.look.texture, q[: node.look.element.dimension]))
+        paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
+        return d, np.broadcast_to(paint, (*d.shape, len(paint)))
+    big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))
+    for index, link in enumerate(node.links):
+        d, c = evaluate(link.node, p, steps, owners=owners, brought=brought)
+        if index == 0:
+            big_d, big_c = d, c
+        else:
+            # nothing blends with the empty set, which is infinitely far from everywhere
+            empty = np.isinf(big_d).all() or np.isinf(d).all()
+            token = TOKENS["union" if empty and link.op == "smooth" else link.op]
+            width = 0.0 if empty else link.width
+            with np.errstate(invalid="ignore"):
+                if owners:
+                    big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, width)
+                    big_c = np.where(share > 0.5, c, big_c)
+                else:
+                    big_d, big_c = combine(big_d, big_c, d, c, token, width)
+    return big_d, big_c
+
+
+_MOST, _LEAST = 1 << 16, 1 << 10  # pixels of a part that is halved whatever it holds, and of one that is not
+_FEW = 4  # objects that are no reason to go on halving
+_DIGITS = 1e-12  # of a coordinate: more than float64 loses in a step
+
+
+def parts(
+    root: Fold, canvas: tuple[int, int], brought: Brought | None
+) -> Iterator[tuple[Node, range, range]]:
+    """What there is to draw in each part of a picture: a node, rows and columns."""
+    (width, height), unit = canvas, min(canvas) / 2
+    todo: list[tuple[Node, range, range]] = [(root, range(height), range(width))]
+    while todo:
+        node, rows, columns = todo.pop()
+        across, down = columns.start + columns.stop - width, height - rows.start - rows.stop
+        radius = hypot(len(rows), len(columns)) / 2 / unit * (1.0 + 1e-9)
+        low, node = within(node, np.array([[across], [down]]) / 2 / unit, radius, brought=brought)
+        few = low > 0 or sum(1 for _ in leaves(node)) <= _FEW
+        if len(rows) * len(columns) <= (_MOST if few else _LEAST):
+            yield Fold("scene", ()) if low > 0 else node, rows, columns
+        else:
+            todo += [(node, *half) for half in product(_halves(rows), _halves(columns))]
+
+
+def _halves(side: range) -> list[range]:
+    middle = len(side) // 2
+    return [half for half in (side[:middle], side[middle:]) if half]
+
+
+def within(
+    node: Node,
+    centre: Array,
+    radius: float,
+    outer: tuple[Step, ...] = (),
+    *,
+    signed: bool = True,
+    brought: Brought | None = None,
+) -> tuple[float, Node]:
+    """A bound below the distance of a node in a disc of world points, and the node without what is outside.
+
+    Args:
+        centre, radius: of the disc, (2, 1) and world units.
+        outer: steps of the folds around the node, nearest first.
+        signed: whether no more is asked for than the sign of the distance, and the colour where it is
+            negative. Else nothing is left out: a blend wants the distance itself.
+        brought: shapes of elements.
+    """
+    steps = (*(move.step for move in node.moves), *outer)
+    if isinstance(node, Leaf):
+        q, spread = _carried(steps, centre, radius)
+        low = float(leaf_distance(node.geometry, q, brought)[0] - spread) * distance_scale(steps)
+        return (-inf if isnan(low) else low), node
+    last = max((index for index, link in enumerate(node.links) if link.width), default=-1)
+    low = inf
+    kept: list[Link] = []
+    for index, link in enumerate(node.links):
+        free = signed and index > last
+        own, child = within(link.node, centre, radius, steps, signed=free, brought=brought)
+        if free and ((own > 0 and link.op != "intersect") or (index and not kept and link.op != "union")):
+            low = min(low, own) if link.op == "union" else low
+            continue
+        kept.append(Link(link.op, child, link.k))
+        if link.op == "intersect":
+            low = max(low, own)
+        elif link.op != "subtract":
+            low = min(low, own) - link.width / 4  # what a blend adds at most
+    return low, Fold(node.kind, tuple(kept), node.moves, node.span)
+
+
+def _carried(steps: tuple[Step, ...], centre: Array, radius: float) -> tuple[Array, float]:
+    """A disc carried back: the centre, and the radius of a disc around it that holds all of its points."""
+    for step in reversed(steps):
+        size = hypot(*np.ravel(centre))
+        if isinstance(step, Affine):
+            radius = _stretch(step) * (radius + _DIGITS * (size + hypot(step.rows[3], step.rows[7])))
+        elif isinstance(step, Warp):
+            rate = abs(step.twirl) + hypot(*step.bend)  # how fast the angle changes
+            radius = (radius + _DIGITS * size) * (1.0 + rate * (size + radius))
+        centre = np.asarray(carry_back((step,), centre))
+    return centre, radius
+
+
+@lru_cache(maxsize=1 << 12)
+def _stretch(step: Affine) -> float:
+    """By how much the way back through an affine map lengthens at most."""
+    return float(np.linalg.norm(frame_back(step, 2)[:, :2], 2))

@@ -1,0 +1,571 @@
+"""Pictures as textures, and drawings and pictures as flat shapes.
+
+What is tried is WebP without loss, which suits drawings, and AV1 still pictures of one quality after another,
+found by halving. Others were measured and are larger (docs/training-log.md, Textures).
+
+Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy. A shape is a union of
+layers: filled areas, and strokes as wide as they are drawn, with round joins and ends.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
+
+from scenelang.assets.element import TEXELS, Element, Painted
+from scenelang.assets.picture import frame_of, painted, texels
+from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
+from scenelang.language.diagnostics import plural
+
+MOST_OF_PICTURE: Final = dict.fromkeys((".png", ".jpg", ".jpeg"), 32 << 20)  # bytes of a file
+MOST_PIXELS: Final = 50_000_000
+MOST_DECODED: Final = 1_000_000_000  # pixels times the scans of a JPEG, each of which goes over all of them
+NEAR_COLOUR: Final = 0.01  # root mean square off that is near enough: 40 dB
+_BEST: Final = 100  # quality of AV1
+_PROFILED: Final = "CMYK", "RGB", "L"  # modes whose colours a profile tells of
+
+
+class Picture(NamedTuple):
+    """A picture that is to be a texture.
+
+    Args:
+        colours: (h, w, 3), sRGB-encoded, 8 bits, the first row at the top.
+        notes: what was found and changed.
+    """
+
+    colours: npt.NDArray[np.uint8]
+    notes: tuple[str, ...] = ()
+
+
+class Coded(NamedTuple):
+    """A form that was tried.
+
+    Args:
+        form: what it is called.
+        error: root mean square off, of channels in [0, 1].
+    """
+
+    form: str
+    bytes: int
+    error: float
+
+
+@contextmanager
+def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
+    """A picture of at most so many pixels (.png, .jpg), which it says before anything is decoded.
+
+    Raises:
+        FitError: it is damaged, another kind of file or too large; also of what is done with it.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data), formats=["PNG", "JPEG"]) as found:
+                if found.width * found.height > most:
+                    raise FitError(f"a picture of more than {most:,} pixels")
+                scans = data.count(b"\xff\xda") if found.format == "JPEG" else 1
+                if found.width * found.height * scans > MOST_DECODED:
+                    raise FitError(f"a picture of {scans:,} scans")
+                yield found
+    except (FitError, MemoryError):
+        raise
+    except UnidentifiedImageError:
+        raise FitError("neither a PNG nor a JPEG") from None
+    except Exception as error:  # readers of large formats, which a stranger's file may break in many ways
+        raise FitError(f"damaged or not a picture: {error}"[:200]) from error
+
+
+def read_picture(data: bytes, side: int = TEXELS) -> Picture:
+    """Read a picture (.png, .jpg): turned as its EXIF says, in sRGB, laid over white, made smaller.
+
+    Args:
+        side: most texels along the longer side.
+    """
+    with opened(data) as file:
+        notes = [f"{file.width} × {file.height} pixels"]
+        image = ImageOps.exif_transpose(file)
+        if file.getexif().get(ExifTags.Base.Orientation, 1) != 1:
+            notes.append("turned as its EXIF says")
+        if image.mode.startswith("I"):  # 16 bits of grey
+            grey = np.asarray(image).astype(np.float64) / 257
+            image = Image.fromarray(np.clip(grey + 0.5, 0, 255).astype(np.uint8))
+            notes.append("16 bits made 8")
+        elif image.has_transparency_data:
+            image = image.convert("RGBA")
+        cover = image.getchannel("A") if image.mode == "RGBA" else None
+        plain = image if image.mode in _PROFILED else image.convert("RGB")
+        plain = _profiled(plain, file.info.get("icc_profile"), notes).convert("RGB")
+        if cover is not None and cover.getextrema() != (255, 255):
+            plain = Image.composite(plain, Image.new("RGB", plain.size, "white"), cover)
+            notes.append("laid over white")
+        if (longer := max(plain.size)) > side:
+            width, height = (max(1, round(length * side / longer)) for length in plain.size)
+            plain = plain.resize((width, height), Image.Resampling.LANCZOS)
+            notes.append(f"made {width} × {height}")
+        return Picture(np.asarray(plain), tuple(notes))
+
+
+def _profiled(image: Image.Image, profile: bytes | None, notes: list[str]) -> Image.Image:
+    """A picture in sRGB whose colours a profile tells of."""
+    if not profile:
+        return image
+    try:
+        known = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+        called = "".join(c for c in ImageCms.getProfileDescription(known).strip() if c.isprintable())[:60]
+        if "srgb" in called.lower():
+            return image
+        found = ImageCms.profileToProfile(image, known, ImageCms.createProfile("sRGB"), outputMode="RGB")
+    except (ImageCms.PyCMSError, OSError, ValueError, TypeError):
+        notes.append("its colour profile cannot be read: taken as sRGB")
+        return image
+    notes.append(f"from the colour profile `{called}`")
+    return found or image
+
+
+def fit_picture(
+    picture: Picture,
+    name: str,
+    *,
+    max_error: float | None = None,
+    budget_s: float = np.inf,
+    steps: int | None = None,
+    about: dict[str, str | float] | None = None,
+    report: Callable[[Coded], None] = lambda coded: None,
+) -> tuple[Element, list[Coded]]:
+    """The smallest texture whose error is at most ``max_error``.
+
+    Args:
+        max_error: root mean square of channels in [0, 1]; `NEAR_COLOUR` if left out.
+        budget_s: nothing further is tried after so many seconds.
+        steps: how many are tried at most, whatever the time; the same number gives the same bytes.
+        about: what the element says of itself, beside its figures.
+        report: called with each that was tried.
+    """
+    started, tried, asked = time.monotonic(), [], max_error or NEAR_COLOUR
+    true = picture.colours.astype(np.float32) / np.float32(255)
+
+    def measured(element: Element, form: str) -> float:
+        error = float(np.sqrt(np.square(texels(element) - true, dtype=np.float64).mean()))
+        tried.append(Coded(form, len(element.data), error))
+        report(tried[-1])
+        return error
+
+    best, error, ended = painted(name, picture.colours), 0.0, "near enough"
+    measured(best, "without loss")
+    low, high = (0, _BEST) if features.check("avif") else (1, 0)
+    while low <= high:
+        if len(tried) >= steps if steps is not None else time.monotonic() - started > budget_s:
+            ended = "steps"
+            break
+        quality = (low + high) // 2
+        element = _still(name, picture.colours, quality)
+        if (off := measured(element, f"quality {quality}")) > asked:
+            low = quality + 1
+            if len(element.data) >= len(best.data):
+                break
+        else:
+            high = quality - 1
+            if len(element.data) < len(best.data):
+                best, error = element, off
+    said = {**(about or {}), "error": error, "steps": len(tried), "ended": ended}
+    return Element(name, "picture", best.sizes, best.coding, best.data, said), tried
+
+
+def _still(name: str, colours: npt.NDArray[np.uint8], quality: int) -> Element:
+    """An AV1 still picture, with as many samples of colour as of light."""
+    file = io.BytesIO()
+    image = Image.fromarray(colours)
+    image.save(file, "AVIF", quality=quality, subsampling="4:4:4", speed=6, max_threads=1)
+    return Element(name, "picture", colours.shape[:2], "av1", frame_of(file.getvalue()))
+
+
+MOST_EDGES: Final = 200_000
+MOST_TRACED: Final = 16_000_000
+PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
+_STRIP: Final = 64  # points of neighbouring heights
+_TOGETHER: Final = 10_000  # edges that are asked at a time
+_BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
+Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
+Inside = Callable[[Points], npt.NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """What lies on one side of edges, or near them.
+
+    Args:
+        edges: (E, 2, 2).
+        inside: tells of points (M, 2) whether the layer covers them; None of a stroke.
+        half: of a stroke's width.
+        color: sRGB, 0 to 1; empty where it has none.
+    """
+
+    edges: Edges
+    inside: Inside | None
+    half: float = 0.0
+    color: Painted = ()
+
+    def touches(self, other: Layer) -> bool:
+        """Whether the boxes around both share a point."""
+        boxes = [
+            (layer.edges.min((0, 1)) - layer.half, layer.edges.max((0, 1)) + layer.half)
+            for layer in (self, other)
+        ]
+        return bool((boxes[0][0] <= boxes[1][1]).all() and (boxes[1][0] <= boxes[0][1]).all())
+
+    def pieces(self) -> Edges:
+        """Edges cut to `PIECE`, of a filled area those with just one side in it."""
+        length = np.linalg.norm(self.edges[:, 1] - self.edges[:, 0], axis=1)
+        counts = np.maximum(1, np.ceil(length / PIECE)).astype(int)
+        if counts.sum() > 20 * MOST_EDGES:
+            raise FitError("its outline is too long")
+        at = np.repeat(np.arange(len(counts)), counts)
+        step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
+        a, b = self.edges[at, 0], self.edges[at, 1]
+        ends = [a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)]
+        found = np.stack(ends, 1)
+        if self.inside is None:
+            return found
+        middle, beside = found.mean(1), _BESIDE * _normals(found)
+        return np.asarray(found[self.inside(middle + beside) != self.inside(middle - beside)])
+
+
+def _normals(edges: Edges) -> Points:
+    along = edges[:, 1] - edges[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    return np.asarray(np.stack([along[:, 1], -along[:, 0]], 1) / length)
+
+
+class Outline:
+    """A flat shape in the unit disc: the midpoint of its bounding box is the origin, its farthest point at 1.
+
+    Raises:
+        FitError: the layers cover nothing.
+    """
+
+    dimension = 2
+
+    def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
+        from scipy.spatial import cKDTree
+
+        self.notes, self._source = notes, layers
+        if not layers or sum(len(layer.edges) for layer in layers) == 0:
+            raise FitError("it draws nothing")
+        if sum(len(layer.edges) for layer in layers) > MOST_EDGES:
+            raise FitError(f"an outline of more than {MOST_EDGES:,} edges")
+        ends = np.concatenate([layer.edges.reshape(-1, 2) for layer in layers])
+        halves = np.concatenate([np.full(2 * len(layer.edges), layer.half) for layer in layers])[:, None]
+        low, high = (ends - halves).min(0), (ends + halves).max(0)
+        if not np.isfinite([low, high]).all():
+            raise FitError("a point is not finite")
+        middle = (low + high) / 2
+        self.size = float((np.linalg.norm(ends - middle, axis=1) + halves[:, 0]).max())
+        self.centre = (float(middle[0]), float(middle[1]))
+        if not self.size > 1e-12 * (1 + abs(middle).max()):
+            raise FitError("all of it lies at one point")
+        self._layers = []
+        for layer in layers:
+            moved = replace(
+                layer,
+                edges=(layer.edges - middle) / self.size,
+                inside=None if layer.inside is None else _moved(layer.inside, middle, self.size),
+                half=layer.half / self.size,
+            )
+            if len(pieces := moved.pieces()):
+                self._layers.append((moved, pieces, cKDTree(pieces.mean(1))))
+        if not self._layers:
+            raise FitError("it covers nothing")
+
+    def painted(self) -> list[tuple[Painted, list[Layer]]]:
+        """Its colours in the order of painting, and the layers of each, as they lay in the file.
+
+        A layer joins earlier ones of its colour where nothing that was painted since touches it.
+        """
+        found: list[tuple[Painted, list[Layer]]] = []
+        for layer in self._source:
+            for color, layers in reversed(found):
+                if color == layer.color:
+                    layers.append(layer)
+                    break
+                if any(layer.touches(other) for other in layers):
+                    found.append((layer.color, [layer]))
+                    break
+            else:
+                found.append((layer.color, [layer]))
+        return found
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points (M, 2), negative inside."""
+        found = np.full(len(p), np.inf)
+        for layer, pieces, tree in self._layers:
+            _, near = tree.query(p, k=min(4, len(pieces)))
+            ends = pieces[near.reshape(len(p), -1)]  # (M, k, 2, 2)
+            a, along = ends[:, :, 0], ends[:, :, 1] - ends[:, :, 0]
+            share = ((p[:, None] - a) * along).sum(2) / np.maximum((along * along).sum(2), 1e-30)
+            away = np.linalg.norm(a + share.clip(0, 1)[..., None] * along - p[:, None], axis=2).min(1)
+            if layer.inside is None:
+                away -= layer.half
+            else:
+                away[layer.inside(p)] *= -1
+            found = np.minimum(found, away)
+        return found
+
+    def surface(self, count: int) -> tuple[Points, Points, float]:
+        """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
+
+        Also the share of the outline that has no inside on either side.
+
+        Raises:
+            FitError: nothing is thick enough to have an outline.
+        """
+        random, points, normals = np.random.default_rng(1), [], []
+        for layer, pieces, _ in self._layers:
+            way = _normals(pieces)
+            sides = (1, -1) if layer.inside is None else (1,)
+            for side in sides:
+                points.append(pieces.mean(1) + side * layer.half * way)
+                normals.append(side * way)
+        all_points, all_normals = np.concatenate(points), np.concatenate(normals)
+        chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
+        found, out, thin = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
+        if not len(found):
+            raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
+        return found, out, thin
+
+
+def _moved(inside: Inside, middle: Points, size: float) -> Inside:
+    return lambda p: inside(p * size + middle)
+
+
+def winding(edges: Edges, odd: bool) -> Inside:
+    """Whether points lie within closed polygons, by the rule ``nonzero`` or ``evenodd``."""
+
+    low, high = edges[..., 1].min(1), edges[..., 1].max(1)
+
+    def inside(p: Points) -> npt.NDArray[np.bool_]:
+        total, order = np.zeros(len(p), np.int64), np.argsort(p[:, 1])
+        for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
+            at = order[first : first + _STRIP]
+            x, y = p[at].T[..., None]
+            reach = edges[(low <= y[-1]) & (high >= y[0])]
+            for part in (reach[k : k + _TOGETHER] for k in range(0, len(reach), _TOGETHER)):
+                (ax, ay), (bx, by) = part.swapaxes(0, 1).swapaxes(1, 2)
+                up, down = (ay <= y) & (by > y), (ay > y) & (by <= y)
+                left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+                total[at] += (up & left).sum(1) - (down & ~left).sum(1)
+        return np.asarray(total % 2 != 0 if odd else total != 0)
+
+    return inside
+
+
+def traced(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+    """The outline of the dark or opaque part of a picture in the bytes of a file."""
+    with opened(data, MOST_TRACED) as file:
+        pixels = np.asarray(file.convert("RGBA"), float) / 255
+    opaque = bool((pixels[..., 3] < 0.5).any())
+    luma = pixels[..., :3] @ (0.2126, 0.7152, 0.0722)
+    value = pixels[..., 3] if opaque else 1 - luma
+    value = np.pad(value, 1)[::-1]  # y up, and nothing outside
+    note = "its opaque part" if opaque else "its dark part"
+    with needed("contourpy"):
+        from contourpy import contour_generator
+    lines: Any = contour_generator(z=value).lines(0.5)
+    edges = np.concatenate([np.zeros((0, 2, 2)), *(np.stack([line[:-1], line[1:]], 1) for line in lines)])
+    return [Layer(edges, winding(edges, odd=True))], (note,)
+
+
+MOST_OF_DRAWING: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
+_CURVE: Final = 48  # edges of a curve
+_PAINT: Final = re.compile(r"""url\(\s*['"]?#([^)'"\s]+)['"]?\s*\)[^;"}]*""")  # and what is meant without it
+_OPACITY: Final = re.compile(r"(?<![-\w])opacity\s*:\s*([^;]*)")
+_MOST_DRAWN: Final = 50_000  # elements of a drawing, each counted as often as it is used
+_MOST_STYLE: Final = 100_000  # letters of its style sheets, which are read again for each element
+_MOST_SAID: Final = 1_000_000  # letters of its paths, transforms and styles
+_UNSEEN: Final = {"mask": "masks", "marker": "markers", "filter": "filters", "clipPath": "clip paths"}
+
+
+def read_outline(data: bytes, suffix: str) -> Outline:
+    """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file."""
+    return Outline(*(drawn(data) if suffix == ".svg" else traced(data)))
+
+
+def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+    """The layers of a drawing in the order of painting, y up, and what there is to say of it.
+
+    Gradients are their mean colours, what is not opaque is mixed with white.
+    """
+    with needed("svgelements"):
+        import svgelements
+    try:  # a reader of a large format, which a stranger's file may break in many ways
+        root = ElementTree.fromstring(data)
+        notes = _simplified(root, svgelements)
+        simple = io.BytesIO(ElementTree.tostring(root))
+        parsed = [*svgelements.SVG.parse(simple, reify=True).elements()]
+        shapes = [e for e in parsed if isinstance(e, svgelements.Shape)]
+        others = {type(e).__name__.lower() for e in parsed} & {"text", "image"}
+        layers = [layer for shape in shapes for layer in _layers(shape, svgelements)]
+    except (FitError, MemoryError):
+        raise
+    except Exception as error:
+        raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
+    strokes = sum(layer.inside is None for layer in layers)
+    counts = f"{plural(len(layers) - strokes, 'area')}, {plural(strokes, 'stroke')}"
+    return layers, (counts, *(f"{name} left out" for name in sorted(others)), *notes)
+
+
+def _simplified(root: Any, svg: Any) -> list[str]:
+    """Change a tree into what svgelements draws as it is meant; what is lost by that."""
+    found = [(element, element.tag.rpartition("}")[2]) for element in root.iter()]
+    named = {element.get("id"): element for element, _ in found}
+    if sum(len(element.text or "") for element, tag in found if tag == "style") > _MOST_STYLE:
+        raise FitError(f"style sheets of more than {_MOST_STYLE:,} letters")
+    said = (value for element, _ in found for key, value in element.items() if not key.endswith("href"))
+    if sum(map(len, said)) > _MOST_SAID:
+        raise FitError(f"paths and styles of more than {_MOST_SAID:,} letters")
+    if _drawn(root, named) > _MOST_DRAWN:
+        raise FitError(f"a drawing of more than {_MOST_DRAWN:,} elements")
+    means = {
+        element.get("id"): _mean(element, named, svg) for element, tag in found if tag.endswith("Gradient")
+    }
+    notes = [f"{said} left out" for tag, said in _UNSEEN.items() if any(tag == t for _, t in found)]
+    notes += ["gradients in their mean colours"] if means else []
+    notes += ["patterns left out"] if any(tag == "pattern" for _, tag in found) else []
+
+    def meant(match: re.Match[str]) -> str:
+        return means.get(match[1], "none")
+
+    for element, _ in found:
+        for key in ("fill", "stroke", "style"):
+            if key in element.attrib:
+                element.set(key, _PAINT.sub(meant, element.get(key)))
+        if element.text and "url(" in element.text:
+            element.text = _PAINT.sub(meant, element.text)
+    for element, _ in found:
+        opacity = _opacity(element)
+        for child in list(element):
+            tag = child.tag.rpartition("}")[2]
+            if tag in _UNSEEN:
+                element.remove(child)
+            elif tag == "symbol":  # seen where it is used
+                element.remove(child)
+                ElementTree.SubElement(element, child.tag.replace("symbol", "defs")).append(child)
+            elif (own := opacity * _opacity(child)) < 1:
+                child.set("opacity", str(own))
+    if any(_opacity(element) < 1 or "opacity" in "".join(element.attrib) for element, _ in found):
+        notes.append("what is not opaque mixed with white")
+    return notes
+
+
+def _drawn(root: Any, named: dict[str, Any]) -> int:
+    """How many elements svgelements goes through, those that are used as often as they are.
+
+    A use of itself counts as too many.
+    """
+    counts: dict[Any, int] = {}
+    waiting = [(root, False)]
+    while waiting:
+        element, counted = waiting.pop()
+        href = next((value for key, value in element.attrib.items() if key.endswith("href")), "")
+        used = named.get(href[1:]) if element.tag.endswith("use") else None
+        inner = [*element, *([] if used is None else [used])]
+        if counted:
+            counts[element] = 1 + sum(counts[part] or _MOST_DRAWN for part in inner)
+        elif element not in counts:
+            counts[element] = 0  # until all in it are
+            waiting += [(element, True), *((part, False) for part in inner)]
+    return counts[root]
+
+
+def _opacity(element: Any) -> float:
+    style = _OPACITY.search(element.get("style", ""))
+    return _share(element.get("opacity") or (style[1] if style else "1"))
+
+
+def _share(text: str) -> float:
+    """A number from 0 to 1, which may be written in per cent; 1 of what is none."""
+    try:
+        number = float(text.strip().removesuffix("%")) / (100 if text.strip().endswith("%") else 1)
+    except ValueError:
+        return 1.0
+    return min(max(number, 0.0), 1.0)
+
+
+def _mean(gradient: Any, named: dict[str, Any], svg: Any) -> str:
+    """The mean colour of a gradient, which may have the stops of another."""
+    for _ in range(9):
+        stops = [child for child in gradient if child.tag.endswith("stop")]
+        href = next((value for key, value in gradient.attrib.items() if key.endswith("href")), "")
+        if stops or href[1:] not in named:
+            break
+        gradient = named[href[1:]]
+    rows = []
+    for stop in stops:
+        style = dict(part.split(":", 1) for part in stop.get("style", "").split(";") if ":" in part)
+        given = {key.strip(): value.strip() for key, value in (stop.attrib | style).items()}
+        colour = svg.Color(given.get("stop-color", "black"))
+        alpha = _share(given.get("stop-opacity", "1")) * (colour.alpha or 0) / 255
+        rows.append((_share(given.get("offset", "0")), colour.red, colour.green, colour.blue, alpha))
+    if not rows:
+        return "none"
+    offsets, *channels = np.array(rows, float).T
+    at = (np.arange(64) + 0.5) / 64
+    red, green, blue, alpha = (np.interp(at, offsets, channel) for channel in channels)
+    weight = alpha / max(alpha.sum(), 1e-9)
+    shown = [round((channel * weight).sum()) for channel in (red, green, blue)]
+    return "#" + bytes([*shown, round(255 * alpha.mean())]).hex()
+
+
+def _seen(paint: Any, shape: Any) -> Painted | None:
+    """The colour of a paint on white; None of one that is not seen."""
+    if paint is None or paint.value is None:
+        return None
+    alpha = paint.alpha / 255 * _share(str(shape.values.get("opacity", "1")))
+    if alpha == 0:
+        return None
+    red, green, blue = (
+        round(1 - alpha * (1 - channel / 255), 4) for channel in (paint.red, paint.green, paint.blue)
+    )
+    return red, green, blue
+
+
+def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
+    """What a shape of a drawing paints, y up."""
+    open_edges, closing = [], []
+    for part in svg.Path(shape).as_subpaths():
+        points = [at for segment in svg.Path(part) for at in _ends(segment, svg)]
+        if len(points) > 1:
+            line = np.array(points) * (1.0, -1.0)
+            open_edges.append(np.stack([line[:-1], line[1:]], 1))
+            closing.append(np.stack([line[-1:], line[:1]], 1))
+    if not open_edges:
+        return
+    edges, closed = np.concatenate(open_edges), np.concatenate([*open_edges, *closing])
+    if shape.values.get("visibility") in ("hidden", "collapse"):
+        return
+    if (color := _seen(shape.fill, shape)) is not None:
+        odd = shape.values.get("fill-rule") == "evenodd"
+        yield Layer(closed, winding(closed, odd), color=color)
+    width = float(shape.stroke_width or 0.0)
+    if (color := _seen(shape.stroke, shape)) is not None and width > 0:
+        yield Layer(edges, None, width / 2, color)
+
+
+def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:
+    """Points of a segment, its last one among them."""
+    if segment.end is None:
+        return []
+    if isinstance(segment, svg.Move | svg.Line | svg.Close):
+        return [(segment.end.x, segment.end.y)]
+    found = [segment.point(at) for at in np.linspace(0, 1, _CURVE + 1)[1:]]
+    return [(point.x, point.y) for point in found]

@@ -1,0 +1,135 @@
+"""The exact picture of a scene and its outputs, in float64: the definition that accuracy is measured against.
+
+It is drawn from the graph as written (`scenelang.compiler.lower`), before any pass, so that it checks the
+compiler too. No renderer imports it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from scenelang.compiler.graph import Graph, leaves
+from scenelang.compiler.spaces import EXTINCTION, Stage
+from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
+from scenelang.drawing.exact.solid import OPAQUE, TILE, Field, facing, seen_along, solid_image, ways
+from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
+
+
+def reference_image(
+    graph: Graph,
+    *,
+    per_side: int = 2,
+    brought: Brought | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Image:
+    """Draw the exact picture of a lowered graph.
+
+    Args:
+        graph: from `lower`; passes keep its picture.
+        per_side: samples along each side of a pixel; 2 is the definition (4 spp).
+        brought: shapes of elements.
+        progress: called with the share done, in [0, 1].
+
+    Returns:
+        (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
+
+    Raises:
+        ValueError: the eye is inside something opaque, or a shape is known only by what was made of it.
+    """
+    check_shapes(graph, brought)
+    if graph.stage is not None:
+        return solid_image(
+            graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought, progress=progress
+        )
+    width, height = graph.canvas
+    colour = np.empty((height, width, 3))
+    alpha = np.empty((height, width))
+    done = 0
+    for node, rows, columns in parts(graph.root, graph.canvas, brought):
+        d, c = evaluate(node, sample_points(graph.canvas, rows, per_side, columns), brought=brought)
+        inside = (d < 0).reshape(len(rows), per_side, len(columns), per_side)
+        shown = np.where(inside[..., None], c.reshape(*inside.shape, 3), 0.0)
+        part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
+        colour[part] = shown.mean((1, 3))
+        alpha[part] = inside.mean((1, 3))
+        done += len(rows) * len(columns)
+        progress(done / (width * height))
+    if graph.background is None:
+        return from_samples(colour, alpha)
+    return from_samples(colour + (1 - alpha)[..., None] * np.asarray(graph.background), None)
+
+
+def check_shapes(graph: Graph, brought: Brought | None) -> None:
+    """Raise `ValueError` where a graph shows an element whose true shape is not given."""
+    unknown = graph.elements.keys() - (brought or {}).keys()
+    name = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in unknown), None)
+    if name is not None:
+        raise ValueError(f"the exact shape of `{name}` is not known")
+
+
+def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
+    """All outputs that a lowered graph has.
+
+    Args:
+        brought: shapes of elements.
+
+    Raises:
+        ValueError: as `reference_image`.
+    """
+    check_shapes(graph, brought)
+    width, height = graph.canvas
+    found = np.zeros((6, height, width))  # depth, normal, object and alpha
+    if graph.stage is None:
+        for node, rows, columns in parts(graph.root, graph.canvas, brought):
+            part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
+            p = sample_points(graph.canvas, rows, 1, columns)
+            d, owner = evaluate(node, p, owners=True, brought=brought)
+            found[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
+            covered = evaluate(node, sample_points(graph.canvas, rows, 2, columns), brought=brought)[0] < 0
+            found[5][part] = covered.reshape(len(rows), 2, len(columns), 2).mean((1, 3))
+        return Outputs(object=found[4].astype(np.int32), alpha=found[5].astype(np.float32))
+    step = max(1, TILE // (4 * width))
+    field = Field(graph.root, brought)
+    for top in range(0, height, step):
+        rows = range(top, min(top + step, height))
+        centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
+        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
+        found[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
+        found[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
+    depth, normal, owner, alpha = found[0], np.moveaxis(found[1:4], 0, 2), found[4], found[5]
+    return Outputs(
+        depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
+    )
+
+
+def _covered(field: Field, stage: Stage, d: Array) -> Array:
+    """How much of what is behind objects hide along unit directions d (3, M)."""
+    _, end, changes = seen_along(field, stage, d)
+    hit = changes.after == OPAQUE
+    end[changes.ray[hit]] = changes.t[hit]
+    covered = (changes.last == OPAQUE).astype(float)
+    ray, enter, leave = changes.media(end)
+    depth = np.bincount(ray, leave - enter, len(end))
+    return 1.0 - (1.0 - covered) * np.exp(-EXTINCTION * depth)
+
+
+def _shown(field: Field, stage: Stage, d: Array) -> Array:
+    """Depth, normal and object (5, M) along unit directions d (3, M)."""
+    o, end, changes = seen_along(field, stage, d)
+    forward = np.asarray(stage.camera.axes()[0])
+    out = np.zeros((5, len(end)))
+    out[2, end < np.inf] = 1.0
+    hit = changes.after == OPAQUE
+    ray = changes.ray[hit]
+    end[ray] = changes.t[hit]
+    inside, enter, leave = changes.media(end)
+    inside, first = np.unique(inside, return_index=True)
+    t = np.minimum((enter[first] + leave[first]) / 2.0, enter[first] + DEEP)
+    out[4, inside] = field.at(o[:, inside] + t * d[:, inside]).owner
+    p = o[:, ray] + end[ray] * d[:, ray]
+    state, out[1:4, ray] = facing(field, p, d[:, ray])
+    out[4, ray] = state.owner
+    out[0] = np.where(end < np.inf, (forward @ d) * np.where(end < np.inf, end, 1.0), np.inf)
+    return out

@@ -1,0 +1,676 @@
+"""The exact picture of solids in float64: leaves, field, rays, light, shadows and media, by docs/language.md.
+
+A world point goes back through maps and turns. A turn is a warp or a twist: ``p -> R(a) p`` in the plane of x
+and another axis, with ``a = twirl |p| + slope . p``.
+
+A ray steps as far as the field says that nothing changes, and at least `STEP`; so what is thinner than that,
+along the ray, may be passed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.geometries import GEOMETRIES
+from scenelang.compiler.graph import Fold, Leaf, Node
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
+from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp
+from scenelang.drawing.exact.field import (
+    Array,
+    Brought,
+    carry_back,
+    colour_at,
+    distance_scale,
+    leaf_distance,
+    sample_points,
+)
+from scenelang.drawing.image import Image, from_light
+
+_REACH = 0.15
+_TINY = 1e-300  # added to lengths that something is divided by
+
+
+def length(p: Array) -> Array:
+    """Lengths (M,) of vectors (3, M)."""
+    x, y, z = p
+    return np.sqrt(x * x + y * y + z * z)
+
+
+class Map(NamedTuple):
+    """``p -> inverse p + shift``, (3, 3) and (3, 1), and the largest stretch of the inverse."""
+
+    inverse: Array
+    shift: Array
+    grows: float
+
+    @staticmethod
+    def back(matrix: Array) -> Map:
+        """The way back through a 4 x 4 matrix."""
+        inverse: Array = np.linalg.inv(matrix[:3, :3])
+        return Map(inverse, -inverse @ matrix[:3, 3:], float(np.linalg.norm(inverse, 2)))
+
+    def __call__(self, p: Array) -> Array:
+        return self.inverse @ p + self.shift
+
+    def stretch(self, most: Array | float) -> float:
+        """The largest stretch; it is the same everywhere."""
+        return self.grows
+
+    def pull(self, p: Array, g: Array) -> Array:
+        """A gradient after the map as the one before it, at p."""
+        return self.inverse.T @ g
+
+
+class Turn(NamedTuple):
+    """See the module; ``other`` is the index of the other axis."""
+
+    other: int
+    twirl: float
+    slope: tuple[float, float, float]
+
+    def trig(self, p: Array) -> tuple[Array, Array]:
+        """Cosine and sine of the angle at points."""
+        a = self.twirl * length(p) if self.twirl else 0.0
+        for factor, c in zip(self.slope, p, strict=True):
+            if factor:
+                a = a + factor * c
+        return np.cos(a), np.sin(a)
+
+    def __call__(self, p: Array) -> Array:
+        cos, sin = self.trig(p)
+        q = p.copy()
+        q[0] = cos * p[0] + sin * p[self.other]
+        q[self.other] = cos * p[self.other] - sin * p[0]
+        return q
+
+    def stretch(self, most: Array | float) -> Array:
+        """The largest stretch over all points no longer than ``most``.
+
+        With u = dR/da p and v = grad a it is ``(m + sqrt(m² + 4 + 4 u.v)) / 2``, m = |u| |v|: the larger
+        singular value of 1 + u v^T. u is no longer than p, and at a right angle to it.
+        """
+        m = most * (abs(self.twirl) + np.linalg.norm(self.slope))
+        across = most * np.hypot(self.slope[0], self.slope[self.other])
+        return (m + np.sqrt(m * m + 4.0 + 4.0 * across)) / 2.0
+
+    def pull(self, p: Array, g: Array) -> Array:
+        """A gradient after the turn as the one before it, at p."""
+        cos, sin = self.trig(p)
+        x, y = cos * p[0] + sin * p[self.other], cos * p[self.other] - sin * p[0]
+        along = g[0] * y - g[self.other] * x  # the gradient times dR/da p
+        out = g + along * np.reshape(self.slope, (3, 1))
+        out[0] += (cos - 1.0) * g[0] - sin * g[self.other]
+        out[self.other] += (cos - 1.0) * g[self.other] + sin * g[0]
+        if self.twirl:
+            out += along * self.twirl / (length(p) + _TINY) * p
+        return out
+
+
+def way_back(steps: Sequence[Step]) -> Any:
+    """Maps and turns, the world's first, which is a map; neighbouring affine maps are one."""
+    back: list[Map | Turn] = []
+    pending = np.eye(4)
+    for step in reversed(steps):
+        if isinstance(step, Affine):
+            pending = pending @ np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)])
+        elif not isinstance(step, Displace):
+            if not back or (pending != np.eye(4)).any():
+                back.append(Map.back(pending))
+                pending = np.eye(4)
+            slope = (0.0, step.twist, 0.0) if isinstance(step, Twist) else (*step.bend, 0.0)
+            back.append(Turn(1, step.twirl, slope) if isinstance(step, Warp) else Turn(2, 0.0, slope))
+    return back if back and (pending == np.eye(4)).all() else [*back, Map.back(pending)]
+
+
+class Body:
+    """A leaf with all steps into the world.
+
+    Args:
+        leaf: its own look and geometry; colours are linear.
+        steps: nearest the leaf first.
+        margin: the ball holds every point whose distance is below it, in world units.
+        brought: shapes of elements.
+    """
+
+    def __init__(
+        self, leaf: Leaf, steps: Sequence[Step], margin: float, brought: Brought | None = None
+    ) -> None:
+        self.geometry, self.brought = leaf.geometry, brought or {}
+        self.look, self.rgb = leaf.look, np.reshape(leaf.look.colour(), (3, 1))
+        self.medium = leaf.look.material == "volumetric"
+        first = steps[0] if steps else None
+        self.displace = first if isinstance(first, Displace) and not first.idle else None
+        self.first, *self.back = way_back(steps)
+        self.scale = distance_scale(steps, 3)
+        self.rate, self.deep = self.scale, self.scale  # deep: no point is further inside
+        radius = 1.0 + margin / self.scale
+        if self.displace:
+            self.rate *= 1.0 + abs(self.displace.amount * self.displace.frequency)
+            self.deep *= 1.0 + abs(self.displace.amount)
+            radius += abs(self.displace.amount)
+        # How far around a point the rate that `distance` tells holds: without turns anywhere.
+        self.reach = _REACH * self.scale if self.back else np.inf
+        centre = np.zeros((3, 1))
+        for step in reversed(self.back):
+            if isinstance(step, Map):
+                matrix = np.linalg.inv(step.inverse)
+                centre, radius = matrix @ (centre - step.shift), radius * float(np.linalg.norm(matrix, 2))
+            else:  # it keeps lengths
+                centre, radius = np.zeros((3, 1)), radius + float(np.linalg.norm(centre))
+        self.centre, self.radius = centre, radius
+
+    def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
+        """Where rays o + t d enter and leave the ball, an ellipsoid of the world, and how fast they go there.
+
+        Rays that miss it enter at inf and leave at -inf. The speed is that behind the first map.
+        """
+        o, d = self.first(o) - self.centre, self.first.inverse @ d
+        a, b, c = (d * d).sum(0), (o * d).sum(0), (o * o).sum(0) - self.radius**2
+        root = b * b - a * c
+        hit = root > 0.0
+        root = np.sqrt(np.where(hit, root, 0.0))
+        return np.where(hit, (-b - root) / a, np.inf), np.where(hit, (root - b) / a, -np.inf), np.sqrt(a)
+
+    def distance(self, p: Array) -> tuple[Array, Any]:
+        """World distances, and how fast they may change within `reach` of the points, by a ray's speed."""
+        p, far, rate = self.first(p), self.reach * self.first.grows, self.rate
+        for step in self.back:
+            stretch = step.stretch(length(p) + far)
+            rate, far, p = rate * stretch, far * stretch, step(p)
+        d = leaf_distance(self.geometry, p, self.brought)
+        if self.displace:
+            x, y, z = np.sin(self.displace.frequency * p)
+            d = d + self.displace.amount * x * y * z
+        return d * self.scale, rate
+
+    def colour(self, p: Array) -> Array:
+        """Linear colours (3, M) or, of one everywhere, (3, 1)."""
+        if self.look.element is None:
+            return self.rgb
+        for step in (self.first, *self.back):
+            p = step(p)
+        own = carry_back(self.look.texture, p[: self.look.element.dimension])
+        return colour_at(self.look, own, light=True).T
+
+    def gradient(self, p: Array) -> Array:
+        """Gradients (3, M) of the world distance."""
+        back = [self.first, *self.back]
+        points = [p]
+        for step in back:
+            points.append(step(points[-1]))
+        q = points[-1]
+        if self.geometry in self.brought:
+            g = self.brought[self.geometry].slopes(q.T).T
+        else:
+            slopes = GEOMETRIES[self.geometry].slopes
+            assert slopes is not None
+            g = np.stack(slopes(q)[1:])
+        if self.displace:
+            f = self.displace.frequency
+            (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)
+            g = g + self.displace.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
+        for step, at in zip(reversed(back), reversed(points[:-1]), strict=True):
+            g = step.pull(at, g)
+        return g * self.scale
+
+
+FAR = 1e9  # distance to what is not there
+OUT, MEDIUM, OPAQUE = range(3)
+
+_MARGIN = 2e-2
+"""Balls are this much larger than what they hold, in world units: more than the least step of a ray."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What a fold carries: distance (M,), whether the material is a medium, and what else was asked for.
+
+    Args:
+        d: distance.
+        medium: a bool, or an array (M,).
+        near: no nearer than this does the kind of material change inside.
+        rgb: linear colour, (3, 1) or (3, M).
+        slope: gradient of d, (3, M).
+        owner: number of the object whose material holds, from 1.
+    """
+
+    d: Any
+    medium: Any
+    near: Any = None
+    rgb: Any = None
+    slope: Any = None
+    owner: Any = None
+
+    def kind(self) -> npt.NDArray[np.int8]:
+        """`OUT`, `MEDIUM` or `OPAQUE`, (M,)."""
+        kind = np.where(self.d < 0.0, np.where(self.medium, MEDIUM, OPAQUE), OUT)
+        return np.asarray(kind, np.int8)
+
+
+NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)), 0)
+
+
+def join(op: str, k: float, a: State, b: State) -> State:
+    """One step of the fold; of two operands of equal distance the gradient is the later's."""
+    near = None if a.near is None or b.near is None else np.minimum(a.near, b.near)
+    paint: Any = None
+    side = 1.0
+    if op == "union":
+        d, paint, turn = np.minimum(a.d, b.d), b.d < np.maximum(a.d, 0.0), b.d <= a.d
+    elif op == "smooth":
+        h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0.0, 1.0)
+        d, paint, turn = (1.0 - h) * a.d + h * b.d - k * h * (1.0 - h), h, h
+        near = None if near is None else np.minimum(near, abs(a.d - b.d) / 2.0)
+    else:
+        side = -1.0 if op == "subtract" else 1.0
+        cut = side * b.d
+        d, turn = np.maximum(a.d, cut), cut >= a.d
+        if k:
+            h = np.clip(0.5 + 0.5 * (cut - a.d) / k, 0.0, 1.0)
+            d, turn = (1.0 - h) * a.d + h * cut + k * h * (1.0 - h), h
+    slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
+    if paint is None:
+        return State(d, a.medium, near, a.rgb, slope, a.owner)
+    medium = np.where(paint > 0.5, b.medium, a.medium)
+    rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
+    owner = None if a.owner is None or b.owner is None else np.where(paint > 0.5, b.owner, a.owner)
+    return State(d, medium, near, rgb, slope, owner)
+
+
+class Field:
+    """The objects of a graph's root, with every step into the world.
+
+    Folds may nest; the boolean rule is not needed.
+
+    Args:
+        brought: shapes of elements.
+    """
+
+    def __init__(self, root: Fold, brought: Brought | None = None) -> None:
+        self.root = root
+        found = list(_leaves(root))
+        # A leaf far from a point changes no sign there if it is further than all blends together can reach,
+        # and one that is taken away further than anything is deep.
+        blends = 1.25 * sum(_blends(root))
+        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in found), default=0.0)
+        self.bodies = [
+            Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
+            for leaf, steps, taken in found
+        ]
+        kinds = {body.medium for body in self.bodies}
+        self.mixed = len(kinds) > 1
+        self.media = True in kinds
+
+    def spans(self, o: Array, d: Array) -> Array:
+        """`Body.span` of all objects, (3, N, M)."""
+        spans = np.empty((3, len(self.bodies), o.shape[1]))
+        for index, body in enumerate(self.bodies):
+            spans[:, index] = body.span(o, d)
+        return spans
+
+    def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
+        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each.
+
+        Args:
+            p: world points (3, M).
+            met: (N, M), in which objects' balls they lie; the others count as far away.
+            speed: (N, M), as `spans` tells, of the rays on which they lie.
+        """
+        count = p.shape[1]
+        fastest, most = np.full(count, 1e-9), np.full(count, FAR)
+        d = np.full(met.shape, FAR)
+        for body, row, here, fast in zip(self.bodies, d, met, speed, strict=True):
+            at = np.nonzero(here)[0]
+            if len(at):
+                row[at], rate = body.distance(p if len(at) == count else p.take(at, 1))
+                fastest[at] = np.maximum(fastest[at], rate * fast[at])
+                if body.back:
+                    most[at] = np.minimum(most[at], body.reach)
+        rows = zip(self.bodies, d, strict=True)
+
+        def known() -> State:
+            body, row = next(rows)
+            return State(row, np.bool_(body.medium), abs(row) if self.mixed else None)
+
+        state = _fold(self.root, known)
+        way = abs(state.d)
+        if self.mixed:
+            way = np.where(state.d < 0.0, np.minimum(way, state.near), way)
+        return state.d, state.kind(), np.minimum(way / fastest, most)
+
+    def at(self, p: Array, *, gradient: bool = False) -> State:
+        """All that the fold carries at world points (3, M), near left out, the gradient only if asked for."""
+        bodies = enumerate(self.bodies, 1)
+
+        def known() -> State:
+            number, body = next(bodies)
+            slope = body.gradient(p) if gradient else None
+            return State(body.distance(p)[0], np.bool_(body.medium), None, body.colour(p), slope, number)
+
+        return _fold(self.root, known)
+
+
+def _fold(node: Node, known: Callable[[], State]) -> State:
+    """The fold of a node; ``known`` is called for each leaf in order."""
+    if isinstance(node, Leaf):
+        return known()
+    if not node.links:
+        return NOTHING
+    state = _fold(node.links[0].node, known)
+    for link in node.links[1:]:
+        state = join(link.op, link.width, state, _fold(link.node, known))
+    return state
+
+
+def _leaves(
+    node: Node, outer: tuple[Step, ...] = (), taken: bool = False
+) -> Iterator[tuple[Leaf, tuple[Step, ...], bool]]:
+    """Leaves in order with all their steps, and whether a `subtract` takes them away."""
+    steps = (*(move.step for move in node.moves), *outer)
+    if isinstance(node, Leaf):
+        yield node, steps, taken
+    else:
+        for at, link in enumerate(node.links):
+            yield from _leaves(link.node, steps, taken or (at > 0 and link.op == "subtract"))
+
+
+def _blends(fold: Fold) -> Iterator[float]:
+    """Widths of all blends."""
+    for at, link in enumerate(fold.links):
+        if at and link.width:
+            yield link.width
+        if isinstance(link.node, Fold):
+            yield from _blends(link.node)
+
+
+STEP = 2e-3
+STEPS = 5_000  # of a ray at most
+
+Ints = npt.NDArray[np.int64]
+Kinds = npt.NDArray[np.int8]
+
+
+class Changes(NamedTuple):
+    """What M rays meet up to where they end or meet something opaque.
+
+    Args:
+        first, last: the kind where each starts and where it ends, (M,).
+        ray, t: of each change the ray and the place, (K,), in order along each ray.
+        before, after: kinds, (K,).
+    """
+
+    first: Kinds
+    last: Kinds
+    ray: Ints
+    t: Array
+    before: Kinds
+    after: Kinds
+
+    def media(self, end: Array) -> tuple[Ints, Array, Array]:
+        """Stretches of rays inside media: ray, where it enters and where it leaves, in order along each ray.
+
+        Args:
+            end: where the rays end, (M,).
+        """
+
+        def sorted_(edge: Kinds, kinds: Kinds, at: Array) -> tuple[Ints, Array]:
+            whole, part = np.nonzero(edge == MEDIUM)[0], kinds == MEDIUM
+            ray, t = np.concatenate([self.ray[part], whole]), np.concatenate([self.t[part], at[whole]])
+            order = np.lexsort((t, ray))
+            return ray[order], t[order]
+
+        ray, enter = sorted_(self.first, self.after, np.zeros_like(end))
+        return ray, enter, sorted_(self.last, self.before, end)[1]
+
+
+def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
+    """Follow rays o + t d, t from 0 to ``end``, until they end or meet something opaque.
+
+    Args:
+        field: of the scene.
+        o, d: origins and unit directions, (3, M).
+        end: (M,), may be infinite.
+        exact: places to 1e-9 or so; otherwise to about 1e-6.
+    """
+    enter, leave, speed = field.spans(o, d)
+    leave = np.minimum(leave, end)
+    enter = np.where(leave > np.maximum(enter, 0.0), enter, np.inf)
+    first, last = np.full(o.shape[1], OUT, np.int8), np.full(o.shape[1], OUT, np.int8)
+    ray = np.nonzero((enter < np.inf).any(0))[0]
+    enter, leave = enter[:, ray], np.where(enter < np.inf, leave, -np.inf)[:, ray]
+    stop, t = leave.max(0, initial=-np.inf), np.maximum(enter.min(0, initial=np.inf), 0.0)
+    origin, along, speed = o.take(ray, 1), d.take(ray, 1), speed.take(ray, 1)
+    lower: Any = None
+    found: list[tuple[Any, ...]] = []
+    taken = 0
+    while len(ray):
+        taken += 1
+        if taken > STEPS:
+            raise ValueError(f"a ray of the exact picture takes more than {STEPS:,} steps")
+        value, kind, way = field.probe(origin + t * along, (enter <= t) & (t <= leave), speed)
+        if lower is None:
+            first[ray] = np.where(t == 0.0, kind, OUT)
+            lower = t, np.full_like(t, FAR), first[ray]
+        at = np.nonzero(kind != lower[2])[0]
+        if len(at):
+            found.append((ray[at], *(v[at] for v in (*lower, t, value, kind))))
+        last[ray] = kind
+        following = np.where(enter > t, enter, np.inf).min(0)
+        lower, t = (t, value, kind), np.minimum(np.minimum(t + np.maximum(way, STEP), following), stop)
+        going = np.nonzero((kind != OPAQUE) & (lower[0] < stop))[0]
+        if len(going) < len(ray):
+            ray, t, stop, lower = ray[going], t[going], stop[going], tuple(v[going] for v in lower)
+            origin, along, enter, leave, speed = (
+                v.take(going, 1) for v in (origin, along, enter, leave, speed)
+            )
+    if not found:
+        return Changes(first, last, np.zeros(0, int), np.zeros(0), first[:0], first[:0])
+    ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*found, strict=True))
+    # Where d passes through 0 a straight line finds the place; where the material alone changes, halving.
+    surface = (before == OUT) != (after == OUT)
+    for at, rounds in ((np.nonzero(surface)[0], 2), (np.nonzero(~surface)[0], 20)):
+        for _ in range(rounds if exact and len(at) else 0):
+            low_at, high_at = low[at], high[at]
+            share = low_d[at] / (low_d[at] - high_d[at]) if rounds == 2 else 0.5
+            middle = low_at + share * (high_at - low_at)
+            here = field.at(o.take(ray[at], 1) + middle * d.take(ray[at], 1))
+            same = here.kind() == before[at]
+            low[at], low_d[at] = np.where(same, middle, low_at), np.where(same, here.d, low_d[at])
+            high[at], high_d[at] = np.where(same, high_at, middle), np.where(same, high_d[at], here.d)
+    line = low + low_d / np.where(surface, low_d - high_d, 1.0) * (high - low)
+    return Changes(first, last, ray, np.where(surface, line, high), before, after)
+
+
+TILE = 1 << 15  # samples at a time
+TOLERANCE = 2e-4
+"""A part of a ray in a medium is halved until its scattered light changes by less."""
+
+HALVINGS = 9
+
+_INSIDE = 1e-7  # how far behind a surface its colour is asked for
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])
+
+
+def solid_image(
+    root: Fold,
+    stage: Stage,
+    canvas: tuple[int, int],
+    *,
+    per_side: int = 2,
+    brought: Brought | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Image:
+    """Draw the exact picture of a scene of solids.
+
+    Args:
+        root: of a lowered graph, its looks in linear colours.
+        stage: the rest of the scene.
+        canvas: width and height in pixels.
+        per_side: samples along each side of a pixel; 2 is the definition (4 spp).
+        brought: shapes of elements.
+        progress: called with the share done, in [0, 1].
+
+    Returns:
+        (H, W, 3), or (H, W, 4) with straight alpha where the stage is transparent.
+
+    Raises:
+        ValueError: the stage has a fault, or the eye is inside something opaque.
+    """
+    if fault := stage.camera.fault() or stage.light.fault():
+        raise ValueError(fault)
+    field = Field(root, brought)
+    width, height = canvas
+    step = max(1, TILE // (width * per_side * per_side))
+    picture = np.empty((4, height, width))
+    for top in range(0, height, step):
+        rows = range(top, min(top + step, height))
+        samples = radiance(field, stage, ways(stage, canvas, rows, per_side))
+        picture[:, top : rows.stop] = samples.reshape(4, len(rows), per_side, width, per_side).mean((2, 4))
+        progress(rows.stop / height)
+    return from_light(picture, stage.transparent)
+
+
+def radiance(field: Field, stage: Stage, d: Array) -> Array:
+    """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M)."""
+    behind = np.concatenate([_sky(stage, d), np.full((1, d.shape[1]), not stage.transparent)])
+    o, end, changes = seen_along(field, stage, d)
+    if stage.ground:
+        seen = np.nonzero((end < np.inf) & (changes.last != OPAQUE))[0]
+        behind[:3, seen] = _ground(field, stage, stage.ground, o[:, seen] + end[seen] * d[:, seen])
+        behind[3, seen] = 1.0
+    hit = changes.after == OPAQUE
+    seen, end[changes.ray[hit]] = changes.ray[hit], changes.t[hit]
+    behind[:3, seen] = _surface(field, stage.light, o[:, seen] + end[seen] * d[:, seen], d[:, seen])
+    behind[3, seen] = 1.0
+    if not field.media:
+        return behind
+    ray, enter, leave = changes.media(end)
+    depth = EXTINCTION * (leave - enter)
+    before = np.cumsum(depth) - depth
+    before -= before[np.searchsorted(ray, ray)]  # of the ray's own
+    light = _scattered(field, stage.light, o[:, ray], d[:, ray], enter, depth, np.exp(-before))
+    through = np.exp(-np.bincount(ray, depth, d.shape[1]))
+    out = behind * through
+    for row, values in zip(out, light, strict=False):
+        row += np.bincount(ray, values, d.shape[1])
+    out[3] += 1.0 - through
+    return out
+
+
+def seen_along(field: Field, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
+    """Of rays along d (3, M) where each begins (3, M), where the ground ends it (M,), and what it meets."""
+    o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
+    end = np.full(d.shape[1], np.inf)
+    if stage.ground and stage.camera.eye[1] > stage.ground.y:
+        down = np.nonzero(d[1] < 0.0)[0]
+        end[down] = (stage.ground.y - stage.camera.eye[1]) / d[1, down]
+    changes = march(field, o, d, end, exact=True)
+    if (changes.first == OPAQUE).any():
+        raise ValueError("the eye is inside an opaque object")
+    return o, end, changes
+
+
+def ways(stage: Stage, canvas: tuple[int, int], rows: range, per_side: int) -> Array:
+    """Unit directions (3, M) of the samples of some pixel rows, row by row of samples."""
+    forward, right, up = (np.reshape(axis, (3, 1)) for axis in stage.camera.axes())
+    x, y = sample_points(canvas, rows, per_side)
+    way: Array = forward / np.tan(stage.camera.fov_rad / 2.0) + x * right + y * up
+    return way / length(way)
+
+
+def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
+    """What holds just behind surface points met along d, and unit normals towards where d comes from."""
+    state = field.at(p + _INSIDE * d, gradient=True)
+    normal = state.slope / np.maximum(length(state.slope), 1e-12)
+    return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
+
+
+def _sky(stage: Stage, d: Array) -> Array:
+    if stage.transparent:
+        return np.zeros(d.shape)
+    horizon, zenith = np.reshape(stage.horizon, (3, 1)), np.reshape(stage.zenith, (3, 1))
+    return horizon + (zenith - horizon) * np.clip(d[1] / 0.5, 0.0, 1.0)
+
+
+def _ground(field: Field, stage: Stage, ground: Ground, p: Array) -> Array:
+    """Light from points of the ground, faded into the horizon."""
+    upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
+    shade = np.reshape(ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
+    clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
+    return clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
+
+
+def _surface(field: Field, light: Light, p: Array, d: Array) -> Array:
+    """Light from points of solids to where the directions d come from."""
+    state, normal = facing(field, p, d)
+    return state.rgb * _received(field, light, p, normal)
+
+
+def _received(field: Field, light: Light, p: Array, normal: Array) -> Array:
+    """Light (3, M) that surfaces of a normal receive, ambient and direct."""
+    way = np.reshape(light.position, (3, 1)) - p
+    r = np.maximum(length(way), NEAREST)
+    direct = light.power * np.maximum((normal * way).sum(0) / r, 0.0) / r**2
+    lit = np.nonzero(direct > 0.0)[0]
+    direct[lit] *= _visible(field, light, p[:, lit] + LIFT * normal[:, lit])
+    return np.reshape(light.rgb, (3, 1)) * direct + AMBIENT[0] + AMBIENT[1] * normal[1]
+
+
+def _visible(field: Field, light: Light, p: Array) -> Array:
+    """Transmittance (M,) from points to the light."""
+    way = np.reshape(light.position, (3, 1)) - p
+    r = length(way)
+    changes = march(field, p, way / np.maximum(r, 1e-300), r)
+    clear = (changes.last != OPAQUE).astype(np.float64)
+    if not field.media:
+        return clear
+    ray, enter, leave = changes.media(r)
+    return clear * np.exp(-EXTINCTION * np.bincount(ray, leave - enter, len(r)))
+
+
+def _scattered(
+    field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
+) -> Array:
+    """Light (3, K) that parts of rays inside media scatter to where the rays come from.
+
+    Args:
+        o, d: the rays, (3, K).
+        enter: where each part begins.
+        depth: optical depth of each part.
+        weight: transmittance from the eye to where it begins.
+    """
+    opaque = -np.expm1(-depth)
+
+    def part(at: Ints, low: Array, high: Array) -> Array:
+        """Gauss-Legendre quadrature over what shares ``low`` to ``high`` of a part's opacity."""
+        share = low + (high - low) / 2.0 * _NODES[:, None]
+        t = (enter[at] - np.log1p(-share * opaque[at]) / EXTINCTION).ravel()
+        p = np.tile(o[:, at], len(_NODES)) + t * np.tile(d[:, at], len(_NODES))
+        r = np.maximum(length(np.reshape(light.position, (3, 1)) - p), NEAREST)
+        direct = light.power / (4.0 * r**2) * _visible(field, light, p)
+        source = field.at(p).rgb * (np.reshape(light.rgb, (3, 1)) * direct + AMBIENT[0])
+        mean = np.einsum("cnk,n->ck", source.reshape(3, len(_NODES), -1), _WEIGHTS)
+        return mean * (high - low) / 2.0 * opaque[at] * weight[at]
+
+    at, low = np.arange(len(enter)), np.zeros(len(enter))
+    high = low + 1.0
+    value, total = part(at, low, high), np.zeros((3, len(enter)))
+    for left in reversed(range(HALVINGS)):
+        middle = (low + high) / 2.0
+        halves = part(np.tile(at, 2), np.concatenate([low, middle]), np.concatenate([middle, high]))
+        both = halves.reshape(3, 2, -1).sum(1)
+        rough = (abs(both - value).max(0) > TOLERANCE) & (left > 0)
+        for row, values in zip(total, both[:, ~rough], strict=True):
+            row += np.bincount(at[~rough], values, len(row))
+        value, rough = halves[:, np.tile(rough, 2)], np.nonzero(rough)[0]
+        at = np.tile(at[rough], 2)
+        low, high = (
+            np.concatenate([low[rough], middle[rough]]),
+            np.concatenate([middle[rough], high[rough]]),
+        )
+    return total

@@ -1,0 +1,124 @@
+"""Image metrics between a picture and its reference, PSNR, SSIM and FLIP, and sheets that show both.
+
+All take float arrays (H, W, 3) of sRGB-encoded values in [0, 1].
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image as pillow
+from PIL import ImageDraw
+
+from scenelang.drawing.image import Image
+
+Array = npt.NDArray[Any]
+MOST_DB = 50.0
+UNCAPPED_DB = 100.0  # what no picture in single precision reaches
+GAP, TEXT = 4, 14  # pixels of a sheet, between pictures and for a line of text
+
+
+def over_white(picture: Array) -> Array:
+    """Colours (H, W, 3), float64, of a picture that may have alpha."""
+    values = np.asarray(picture, np.float64)
+    if values.shape[2] == 3:
+        return values
+    return np.asarray(values[..., :3] * values[..., 3:] + 1 - values[..., 3:])
+
+
+def psnr(picture: Array, reference: Array, most: float = MOST_DB) -> float:
+    """Peak signal-to-noise ratio in dB, at most ``most``, so that a perfect picture counts for something."""
+    error = float(np.mean((np.asarray(picture, np.float64) - np.asarray(reference, np.float64)) ** 2))
+    return most if error <= 0 else min(most, -10 * math.log10(error))
+
+
+def ssim(picture: Array, reference: Array) -> float:
+    """Structural similarity (Wang et al. 2004), 11-pixel Gaussian window; in [-1, 1], 1 for equal ones.
+
+    Pictures under 11 pixels along a side get a smaller window, which makes their figures their own.
+    """
+    import torch
+    from pytorch_msssim import ssim as torch_ssim
+
+    window = min(11, *((side - 1) // 2 * 2 + 1 for side in reference.shape[:2]))
+    a, b = (
+        torch.from_numpy(np.ascontiguousarray(np.moveaxis(np.asarray(v, np.float32), 2, 0)))[None]
+        for v in (picture, reference)
+    )
+    return float(torch_ssim(a, b, data_range=1.0, win_size=window))
+
+
+def flip_map(picture: Array, reference: Array, *, magma: bool = False) -> npt.NDArray[np.float32]:
+    """FLIP error of each pixel, LDR: (H, W) in [0, 1], or (H, W, 3) in the tool's colours, dark for 0.
+
+    Source: Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020 (their tool).
+    """
+    import flip_evaluator
+
+    a, b = (np.ascontiguousarray(v, np.float32) for v in (reference, picture))
+    error = np.asarray(flip_evaluator.evaluate(a, b, "LDR", applyMagma=magma)[0], np.float32)
+    return error if magma else error[:, :, 0]
+
+
+def flip(picture: Array, reference: Array) -> float:
+    """Mean FLIP error in [0, 1], 0 for equal pictures."""
+    return float(flip_map(picture, reference).mean())
+
+
+def compare(picture: Array, reference: Array) -> dict[str, float]:
+    """How near a picture is to another: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
+
+    Args:
+        picture: float (H, W, 3) or, with straight alpha, (H, W, 4), sRGB-encoded in [0, 1]; alpha is put over
+            white first.
+        reference: the like, of the same size.
+
+    Raises:
+        ValueError: they differ in size.
+        ImportError: the packages of the extra ``eval`` are not installed.
+    """
+    a, b = over_white(picture), over_white(reference)
+    if a.shape != b.shape:
+        sizes = [f"{v.shape[1]} × {v.shape[0]}" for v in (a, b)]
+        raise ValueError(f"pictures of {sizes[0]} and {sizes[1]} pixels")
+    return {"psnr": psnr(a, b), "ssim": ssim(a, b), "flip": flip(a, b)}
+
+
+# ---------------------------------------------------------------- side by side
+
+
+def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
+    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3).
+
+    Args:
+        plain: instead of the map, which needs the extra ``eval``, eight times how far each channel is off.
+    """
+    far = ("8 × difference", np.clip(8 * np.abs(picture - reference), 0, 1)) if plain else None
+    parts = [
+        ("network", picture),
+        ("reference", reference),
+        far or ("FLIP", flip_map(picture, reference, magma=True)),
+    ]
+    height, width = reference.shape[:2]
+    sheet = pillow.new("RGB", (3 * width + 2 * GAP, height + TEXT), "white")
+    pen = ImageDraw.Draw(sheet)
+    for column, (name, part) in enumerate(parts):
+        left = column * (width + GAP)
+        sheet.paste(np.asarray(part, np.float32).view(Image).to_pil(), (left, TEXT))
+        pen.text((left + 2, 1), f"{name} {label}" if column == 0 else name, fill="black")
+    return (np.asarray(sheet, np.float32) / 255).view(Image)
+
+
+def contact_sheet(rows: Sequence[Image], columns: int = 2) -> Image:
+    """Put pictures of one size on a sheet, row by row."""
+    height, width = rows[0].shape[:2]
+    lines = -(-len(rows) // columns)
+    sheet = np.ones((lines * (height + GAP), columns * (width + 3 * GAP), 3), np.float32)
+    for index, row in enumerate(rows):
+        top, left = index // columns * (height + GAP), index % columns * (width + 3 * GAP)
+        sheet[top : top + height, left : left + width] = row
+    return sheet.view(Image)

@@ -1,0 +1,229 @@
+"""Grids and pictures that users bring, looked up at points of the plane or of space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from scenelang.assets.element import Element
+from scenelang.assets.picture import texels
+from scenelang.assets.pyramid import unpacked
+from scenelang.assets.tensors import TensorError
+from scenelang.compiler.graph import LUMA, ColourStep
+from scenelang.compiler.program import Paint, ProgramError
+from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.image import decoded
+from scenelang.drawing.neural.frames import Affine
+from scenelang.drawing.neural.network import CELLS, NODE, RADII, RADIUS, STEEP, Slopes, around
+
+
+def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corners: Sequence[int]) -> Array:
+    """Values (…, M) inside cells of a grid, linear along each axis.
+
+    Args:
+        xp: the library.
+        flat: values at nodes (…, K), the last axis first to change.
+        first: the least node (M,) of each cell.
+        share: how far into the cell a point lies, d times (M,).
+        corners: where from there the 2^(d - 1) edges along the last axis begin.
+    """
+    values = []
+    for corner in corners:
+        row = first + corner
+        values.append(_between(xp.take(flat, row), xp.take(flat, row + 1), share[-1]))
+    for along in reversed(share[:-1]):
+        pairs = zip(values[::2], values[1::2], strict=True)
+        values = [_between(a, b, along) for a, b in pairs]
+    return values[0]
+
+
+def _between(a: Array, b: Array, share: Array) -> Array:
+    """``a + (b - a) share``, in place of b."""
+    b -= a
+    b *= share
+    b += a
+    return b
+
+
+class Lattice:
+    """Values at nodes of [-1, 1]^d, linear between them.
+
+    Args:
+        xp: the library.
+        flat: values (…, n^d), the last axis first to change.
+        side: n.
+        d: 2 or 3.
+    """
+
+    def __init__(self, xp: Arrays, flat: Array, side: int, d: int) -> None:
+        self.xp, self.d, self.half = xp, d, (side - 1) / 2
+        self.nodes, self.side = flat, side
+        self._corners = [0, side] if d == 2 else [0, side, side * side, side * side + side]
+
+    def at(self, q: Array) -> Array:
+        """Values (…, M) at points (d, M) of the cube."""
+        place = (q + 1.0) * self.half
+        cell = self.xp.whole(place).clip(0, self.side - 2)
+        first = cell[0]
+        for axis in range(1, self.d):
+            first = first * self.side + cell[axis]
+        return blended(self.xp, self.nodes, first, [*(place - self.xp.narrow(cell))], self._corners)
+
+
+class GridShape(Lattice):
+    """A grid of distances. Outside the cube a distance is the least that what lies inside can have."""
+
+    def distance(self, q: Array) -> Array:
+        """Distances (M,), in leaf units, at leaf coordinates (d, M)."""
+        at = q.clip(-1.0, 1.0)
+        found, off = self.at(at), q - at
+        beyond = (off * off).sum(0)
+        return self.xp.select(beyond > 0, self.xp.sqrt(found * found + beyond), found)
+
+    def slopes(self) -> Slopes:
+        """How fast the distance in the plane changes; nothing is known of grids that end inside."""
+        n, side = self.side, 2 * RADIUS / CELLS
+        grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(n, n)
+        rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
+        # of each cell the largest slopes along x and along y: along each they change linearly over a cell
+        steep = np.hypot(np.maximum(rows[:, 1:], rows[:, :-1]), np.maximum(columns[1:], columns[:-1]))
+        if min(grid[[0, -1]].min(), grid[:, [0, -1]].min()) < 0:
+            steep = np.full_like(steep, np.inf)
+        first = np.clip((-RADIUS + side * np.arange(CELLS) + 1.0) * self.half, 0, n - 1)
+        last = np.clip((-RADIUS + side * np.arange(1, CELLS + 1) + 1.0) * self.half, 0, n - 1)
+        spans = [(int(a), max(int(np.ceil(b)), int(a) + 1)) for a, b in zip(first, last, strict=True)]
+        spans = [(min(a, n - 2), max(min(b, n - 1), min(a, n - 2) + 1)) for a, b in spans]
+        across = np.stack([steep[:, a:b].max(1) for a, b in spans], 1)
+        found = np.stack([across[a:b].max(0) for a, b in spans])
+        found = np.maximum(found.T, 1.0)  # outside, one along the way there
+        more = [
+            (around(found, int(np.ceil(radius / side))) - STEEP).clip(0.0) * np.hypot(radius, NODE)
+            for radius in RADII
+        ]
+        return Slopes(np.stack(more), 1.0)
+
+    def field(self, q: Array, gradient: bool) -> Array:
+        """Distances (1, M), or these and how they change (1 + d, M).
+
+        The change is that over a cell, as the edges of one would show in the light.
+        """
+        xp, step, rows = self.xp, 0.5 / self.half, [self.distance(q)]
+        for axis in range(self.d) if gradient else ():
+            moved = [*q]
+            moved[axis] = q[axis] + step
+            ahead = self.distance(xp.stack(moved, 0))
+            moved[axis] = q[axis] - step
+            rows.append((ahead - self.distance(xp.stack(moved, 0))) / (2 * step))
+        return xp.stack(rows, 0)
+
+
+@lru_cache(maxsize=8)
+def _grid(element: Element) -> np.ndarray:
+    try:
+        return unpacked(element)
+    except TensorError as error:
+        raise ProgramError(str(error)) from None
+
+
+def grid_shape(element: Element, xp: Arrays, like: Array) -> GridShape:
+    """The shape of an element, where an array lies.
+
+    Raises:
+        ProgramError: the element is damaged.
+    """
+    grid = _grid(element)
+    return GridShape(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
+
+
+MOST = 1e20  # of a frame's numbers: points times these stay in float32
+
+
+class Texture:
+    """What a paint makes of leaf coordinates.
+
+    Args:
+        xp: the library.
+        paint: the element and the steps of its colours.
+        frame: the way (6,) from leaf coordinates x and y to the picture's.
+        like: an array that lies where the colours are asked for.
+        light: whether colours are linear there, not as they are written.
+
+    Raises:
+        ProgramError: the element is damaged, or the frame beyond float32.
+    """
+
+    def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
+        self._xp, self.steps = xp, paint.steps
+        values = _nodes(paint.element, light)
+        flat = xp.array(values.reshape(3, -1), like)
+        self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
+        if not abs(frame).max() < MOST:
+            raise ProgramError("a texture's frame beyond float32")
+        # from leaf coordinates to shares of the picture's sides, from its upper left corner
+        (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
+        self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
+        self.texels, self.sides = flat, values.shape[-2:]
+        across = abs(np.array([row[:2] for row in self.place.rows])).max() if values.ndim == 3 else 0.5
+        self.detail = float(across) * max(values.shape)
+        """Texels that a way of a leaf unit may cross, about."""
+
+    def at(self, q: Array) -> Array:
+        """Colours (3, M) at leaf coordinates (d, M)."""
+        found = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
+        return stepped(self._xp, found, self.steps)
+
+    def _picture(self, q: Array) -> Array:
+        xp, (high, wide) = self._xp, self.sides
+        cells, shares = [], []
+        for share, count in zip(self.place(xp, [q[0], q[1]]), (wide - 2, high - 2), strict=True):
+            place = (share - xp.floor(share)) * count + 0.5  # among the texels and the one before the first
+            cells.append(xp.whole(place))
+            shares.append(place - xp.narrow(cells[-1]))
+        return blended(xp, self.texels, cells[1] * wide + cells[0], shares[::-1], [0, wide])
+
+
+@lru_cache(maxsize=32)
+def _nodes(element: Element, light: bool) -> np.ndarray:
+    """Colours (3, n, n, n) of space, or (3, h + 2, w + 2) of a picture, which goes on beyond its sides."""
+    try:
+        values = texels(element)
+    except TensorError as error:
+        raise ProgramError(str(error)) from None
+    if values.ndim == 3:
+        values = np.pad(values, ((1, 1), (1, 1), (0, 0)), "wrap")
+    if light:
+        values = decoded(values).astype(np.float32)
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0))
+
+
+def stepped(xp: Arrays, rgb: Array, steps: tuple[ColourStep, ...]) -> Array:
+    """Colours (3, M) behind colour steps, clamped after each.
+
+    Args:
+        steps: of a paint.
+    """
+    for name, *numbers in steps:
+        if name == "color":
+            rgb = rgb * xp.array(np.array(numbers, np.float32)[:, None], rgb)
+        elif name == "grayscale":
+            luma = LUMA[0] * rgb[0] + LUMA[1] * rgb[1] + LUMA[2] * rgb[2]
+            rgb = rgb + float(numbers[0]) * (luma - rgb)
+        else:
+            rgb = turned(xp, rgb, float(numbers[0]))
+        rgb = rgb.clip(0.0, 1.0)
+    return rgb
+
+
+def turned(xp: Arrays, rgb: Array, turns: float) -> Array:
+    """Colours (3, M) with another hue of HSV, in turns, of the same saturation and value."""
+    r, g, b = rgb
+    value, least = xp.maximum(xp.maximum(r, g), b), xp.minimum(xp.minimum(r, g), b)
+    chroma = value - least
+    sixth = 1.0 / chroma.clip(1e-12)  # of grey, which has no hue, 0 of it is taken
+    of_green, of_blue = (b - r) * sixth + 2.0, (r - g) * sixth + 4.0
+    hue = xp.select(value == r, (g - b) * sixth, xp.select(value == g, of_green, of_blue)) / 6.0 + turns % 1.0
+    hue = (hue - xp.floor(hue)) * 6.0
+    shares = abs(hue - 3.0) - 1.0, 2.0 - abs(hue - 2.0), 2.0 - abs(hue - 4.0)
+    return xp.stack([least + chroma * share.clip(0.0, 1.0) for share in shares], 0)

@@ -1,0 +1,434 @@
+"""Coverage: how pixels of the plane ask the field, with as few questions as show; textures and blends.
+
+Blocks of pixels are asked before pixels. An object is looked at by the blocks that it can reach; of each
+such pair the distance at the block's centre, and how fast it is proved to change, bound it on all of the
+block, and intervals through the cell bound what the block shows (`bounds.py`). Blocks of one colour are
+filled; of the others, objects that are proved to change nothing there are dropped, and so is what lies behind
+one that hides it. What is left is asked again in smaller blocks, and pixel by pixel in the end.
+
+A pixel is the mean of four samples at a quarter of a pixel from its centre. Most pixels have no outline near
+them and one look at the centre is as good; only pixels that the network says are near one are sampled four
+times. Blocks lie where they do whatever the tiles are, so that tiles and threads change nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenelang.compiler.groups import SMOOTH, UNION
+from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.neural.field import NO_TEXTURE, Field, Trace
+from scenelang.drawing.neural.meetings import (
+    LEVELS,
+    ROUNDING,
+    Index,
+    Meetings,
+    Nesting,
+    Pairs,
+    Raster,
+    meetings_of,
+    raster,
+)
+from scenelang.drawing.neural.network import RADIUS
+
+QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
+"""Where the samples of a pixel lie (2, 4), pixels from its centre."""
+CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
+NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
+LEAST = 1e-4  # of a colour, that counts as part of what a point shows
+
+
+def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
+    """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
+    xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
+    found = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
+    worn = np.zeros(len(meetings.columns), bool)
+    worn[place[field.texture[objects] != NO_TEXTURE]] = True
+    width = field.widths[objects]
+    narrow = (field.tokens[objects] == SMOOTH) & (px > NARROW * width) & ~meetings.pairs.open & worn[place]
+    gap = xp.array((width + CORNER * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
+    for part in meetings.slots():
+        if narrow[part].any():
+            some = found[:, : part.stop - part.start]
+            some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
+    if trace.joined and worn.any():
+        most = CORNER * px * (1 + float(field.frames.stretch.max()))
+        for (columns, groups, _), _, margin, _ in trace.joined:
+            width = field.group_widths[groups]
+            narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
+            near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
+            found[:, columns] |= near & xp.array(narrow, field.like)
+    return found
+
+
+def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
+    """Which pixels (groups, B), of a side, may see where one object's colour gives way to another's.
+
+    In a union, outside both of them, that is not an outline, but a later blend may show it.
+    """
+    xp, token = field.xp, field.tokens[meetings.pairs.object]
+    joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
+    tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
+    for part in meetings.slots():
+        n, paint = part.stop - part.start, trace.paint[:, part]
+        shown[:, :n] |= tied[:, :n] & blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
+        tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * CORNER * px)
+    if not trace.joined:
+        return shown
+    blended = 0.0 * tied > 0
+    for part in meetings.slots():
+        n, paint = part.stop - part.start, trace.paint[:, part]
+        blended[:, :n] |= blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
+    for (columns, groups, _), paint, margin, _ in trace.joined:
+        joins, blends = (xp.array(field.groups.joins[groups] == kind, field.like) for kind in (UNION, SMOOTH))
+        blended[:, columns] |= blends & (paint > LEAST) & (paint < 1 - LEAST)
+        tied[:, columns] |= joins & (abs(margin) < 2 * CORNER * px)
+    return shown | (tied & blended)
+
+
+def add_textures(
+    field: Field, meetings: Meetings, trace: Trace, p: Array, memory: Array, seen: Array, px: float
+) -> None:
+    """Add the textures that points show to their colours.
+
+    Args:
+        p: the points (2, groups, B).
+        memory: state and register (groups, S + 3, B).
+        seen: (groups, B) of which points.
+        px: side of the pixels for which textures are looked up four times, world units; 0: once.
+    """
+    xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
+    shares = trace.shares(meetings, field.nesting(meetings), seen)
+    groups, columns = seen.shape
+    offsets = xp.array(QUARTER * np.float32(px), p)[:, :, None] if px else None
+    total = xp.full((3, groups * columns), 0.0, p)
+    texture = field.texture[objects]
+    for number in np.unique(texture[texture != NO_TEXTURE]).tolist():
+        pairs = np.flatnonzero(texture == number)
+        share = xp.take(shares, xp.array(pairs, p)).reshape(-1)
+        some = xp.where(share > LEAST)
+        if not len(some):
+            continue
+        group, pair = np.divmod(xp.to_numpy(some), len(pairs))
+        pair = pairs[pair]
+        index = xp.array(group * columns + place[pair], p)
+        spots = xp.take(p.reshape(2, -1), index)
+        if offsets is not None:
+            spots = spots[:, None] + offsets
+        q = field.frames.local(xp, objects[pair], spots)
+        found = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
+        xp.add(total, index, found.mean(1) * xp.take(share, some))
+    s = field.network.config.state
+    memory[:, s : s + 3] += total.reshape(3, groups, columns).swapaxes(0, 1)
+
+
+ENOUGH = 1 << 14  # pairs of an object and a pixel up to which blocks are not looked at again
+PAIRS = 1 << 16  # of an object and a point that are met at a time
+NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
+MANY = 2  # objects a pixel above which it is asked which of them matter to its samples
+FLAT = 1e-4  # of a channel: a block that is known so well has one colour
+
+
+@dataclass(slots=True)
+class Tile:
+    """Some rows of pixels.
+
+    Args:
+        picture: (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4).
+        background: (3,), if any.
+        pairs: (object, sample) pairs that went through the network.
+        refined: pixels that were sampled four times.
+        met: pixels that were asked one by one.
+    """
+
+    picture: np.ndarray
+    background: np.ndarray | None
+    pairs: int = 0
+    refined: int = 0
+    met: int = 0
+
+    def over(self, picture: np.ndarray) -> np.ndarray:
+        """What is shown (…, 3 or 4) of premultiplied colour and coverage (…, 4)."""
+        if self.background is None:
+            return picture
+        shown: np.ndarray = picture[..., :3] + (1 - picture[..., 3:]) * self.background
+        return shown
+
+
+class Coverage:
+    """Asks a field for pixels.
+
+    Args:
+        skip: leave out what objects cannot reach or is proved not to matter.
+        prove: leave out the latter, too.
+    """
+
+    def __init__(self, field: Field, *, skip: bool = True, prove: bool = True) -> None:
+        self.field, self.xp, self.skip = field, field.xp, skip
+        self.prove = prove and field.provable
+        self._all_draw = bool(field.draws.all())
+        self._flat = not field.groups.deepest
+
+    def tile(
+        self, canvas: tuple[int, int], rows: range, samples: str, background: np.ndarray | None = None
+    ) -> Tile:
+        """Draw some rows of a picture; see `scenelang.drawing.neural.draw.draw`."""
+        grid = raster(canvas, rows)
+        nothing = np.zeros(4, np.float32) if background is None else background
+        picture = np.empty((grid.high, grid.wide, len(nothing)), np.float32)
+        picture[:] = nothing
+        tile = Tile(picture, background)
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(picture, side)
+            for columns, part, points in self._pixels(grid, side, meetings):
+                inside = grid.inside(columns, side)
+                tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
+                found = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
+                values = tile.over(np.ascontiguousarray(found.transpose(2, 0, 1))).reshape(
+                    len(part.columns), side, side, -1
+                )
+                blocks[columns[1] // side, :, columns[0] // side] = values
+        tile.picture = picture[: len(rows), : canvas[0]]
+        return tile
+
+    def _points(
+        self, meetings: Meetings, p: Array, px: float, samples: str, tile: Tile, wanted: np.ndarray | None
+    ) -> Array:
+        """Pictures (groups, 4, B) of pixels with centres (2, groups, B)."""
+        if samples == "four":
+            tile.refined += p.shape[1] * p.shape[2] if wanted is None else int(wanted.sum())
+            return self._four(meetings, p, px, tile)
+        if samples == "one":
+            return self._picture(meetings, p, tile)
+        field = self.field
+        traced = field.textured or field.blended or not self._flat
+        trace = field.trace(p.shape[1], len(meetings.pairs)) if traced else None
+        q, d, memory = self.ask(meetings, p, tile, trace)
+        edge = abs(memory[:, 0]) / field.unit
+        rate = self.xp.array((1 / self.field.frames.stretch[meetings.pairs.object]).astype(np.float32), p)
+        near = abs(d[:, 0]) * rate
+        for part in meetings.slots():
+            some = edge[:, : part.stop - part.start]
+            some[:] = self.xp.minimum(some, near[:, part])
+        for (columns, _, _), _, _, distance in trace.joined if trace is not None else ():
+            edge[:, columns] = self.xp.minimum(edge[:, columns], abs(distance))
+        near = edge < NEAR * px
+        if trace is not None:
+            seen = memory[:, 0] * field.slope < 0.5
+            near = near | (seen & ties(field, meetings, trace, px))
+            if field.textured:
+                near = near | (seen & blending(field, meetings, trace, px))
+                add_textures(field, meetings, trace, p, memory, seen & ~near, px)
+        picture = field.picture(memory)
+        close = self.xp.to_numpy(near)
+        column, group = np.nonzero((close if wanted is None else close & wanted).T)
+        if not len(column):
+            return picture
+        many = meetings.counts()[column] > MANY
+        if self.prove and many.any():
+            left, kept = self._matter(meetings, column[many], group[many], px, q, d)
+            few = ~many
+            jobs = [(meetings.some(column[few])[0], column[few], group[few]), (left, *kept)]
+        else:
+            jobs = [(meetings.some(column)[0], column, group)]
+        planes = self.xp.packed(picture.swapaxes(0, 1)).reshape(4, -1)
+        for some, column, group in jobs:
+            tile.refined += len(column)
+            flat = self.xp.array(group * p.shape[2] + column, p)
+            centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
+            for first, portion in _portions(some, 4):
+                last = first + len(portion.columns)
+                found = self._four(portion, centres[..., first:last], px, tile)[0]
+                self.xp.put(planes, flat[first:last], found)
+        return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
+
+    def _matter(
+        self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
+    ) -> tuple[Meetings, tuple[Index, Index]]:
+        """What matters to the four samples of pixels, given leaf coordinates and distances in their middles.
+
+        Pixels that are proved to show what their middles do are left out.
+        """
+        some, source = meetings.some(column)
+        place = some.places()
+        by = np.argsort(place, kind="stable")
+        source, place = source[by], place[by]
+        pairs = replace(some.pairs.take(by), block=place)
+        middle = self.xp.to_numpy(d)[group[place], 0, source]
+        here = self.xp.to_numpy(q)[:, group[place], source].astype(np.float64)
+        rise = self.field.rise(pairs.object, here, pairs.rate * (CORNER * px))
+        some, _ = meetings_of(self._proved(pairs, middle, rise)[0])
+        return some, (column[some.columns], group[some.columns])
+
+    def owners(self, canvas: tuple[int, int], rows: range) -> np.ndarray:
+        """Numbers (rows, width), from 1, of the objects that paint pixels' centres, 0 where none does."""
+        grid = raster(canvas, rows)
+        tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
+        found = np.zeros((grid.high, grid.wide), np.int32)
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(found[..., None], side)
+            for columns, part, points in self._pixels(grid, side, meetings):
+                own = np.zeros(points.shape[1:], np.int32)
+                trace = self.field.trace(points.shape[1], len(part.pairs))
+                memory = self.ask(part, points, tile, trace)[2]
+                painted = self.xp.to_numpy(trace.paint) > 0.5
+                if (nest := self.field.nesting(part)) is not None:
+                    own = _owners(self.xp, nest, trace, painted, part.pairs.object)
+                for slot in part.slots() if nest is None else ():
+                    some = own[:, : slot.stop - slot.start]
+                    some[:] = np.where(painted[:, slot], part.pairs.object[slot] + 1, some)
+                covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
+                values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
+                blocks[columns[1] // side, :, columns[0] // side] = values
+        return found[: len(rows), : canvas[0]]
+
+    def _pixels(
+        self, grid: Raster, side: int, meetings: Meetings
+    ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
+        """Where blocks begin, what they meet, and their pixels' centres (2, groups, B), row by row."""
+        for _, part in _portions(meetings, side * side):
+            columns = grid.place(part.columns, side)
+            yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
+
+    def _four(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
+        """Means (groups, 4, B) of the four samples of pixels."""
+        offsets = self.xp.array(QUARTER * np.float32(px), p)
+        samples = (p[:, :, None] + offsets[:, None, :, None]).reshape(2, -1, p.shape[2])
+        picture = self._picture(meetings, samples, tile)
+        return picture.reshape(p.shape[1], 4, 4, p.shape[2]).mean(1)
+
+    def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
+        """What single points (2, groups, B) show (groups, 4, B)."""
+        field = self.field
+        trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
+        memory = self.ask(meetings, p, tile, trace)[2]
+        if trace is not None:
+            seen = memory[:, 0] * field.slope < 0.5
+            add_textures(field, meetings, trace, p, memory, seen, 0.0)
+        return field.picture(memory)
+
+    def ask(
+        self, meetings: Meetings, p: Array, tile: Tile, trace: Trace | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Leaf coordinates (2, groups, P), features (groups, F, P), memory (groups, S + 3, B)."""
+        field, objects = self.field, meetings.pairs.object
+        q = field.frames.local(self.xp, objects, self.xp.take(p, self.xp.array(meetings.places(), p)))
+        d = field.features(objects, q, meetings.pairs.far)
+        tile.pairs += d.shape[0] * len(objects)
+        return q, d, field.fold(meetings, d, trace)
+
+    # ------------------------------------------------------------ blocks
+
+    def meetings(self, grid: Raster, tile: Tile) -> tuple[int, Meetings]:
+        """What blocks, and of what side, have to be asked pixel by pixel; fills others in the tile."""
+        count = len(self.field.tokens)
+        if not self.skip:
+            side = LEVELS[-1]
+            blocks = grid.high // side * (grid.wide // side)
+            block, objects = np.divmod(np.arange(blocks * count), max(count, 1))
+            every = np.ones(len(block), bool)
+            rate = np.full(len(block), np.inf)
+            return side, meetings_of(Pairs(block, objects, ~every, every, rate))[0]
+        pairs = self.candidates(grid)
+        side = LEVELS[0]
+        pairs = self._looked(grid, pairs, side, tile)
+        for smaller in LEVELS[1:]:
+            if len(pairs) * side * side <= ENOUGH:
+                break
+            pairs, side = pairs.split(grid.wide // side, side // smaller), smaller
+            pairs = self._looked(grid, pairs, side, tile)
+        return side, meetings_of(pairs)[0]
+
+    def candidates(self, grid: Raster) -> Pairs:
+        """Objects at the largest blocks that their bounds meet."""
+        return grid.reached(self.field.frames, self.field.reach)
+
+    def _looked(self, grid: Raster, pairs: Pairs, side: int, tile: Tile) -> Pairs:
+        """What pairs are left of some when their blocks have been looked at."""
+        field, objects = self.field, pairs.object
+        across, down = grid.place(pairs.block, side)
+        half = side / 2 - 0.5
+        centre = np.stack([grid.left + (across + half) * grid.px, grid.top - (down + half) * grid.px])
+        world = side * grid.px / 2**0.5 + ROUNDING
+        q, radius = field.frames.blocks(objects, centre, np.full(len(objects), world))
+        length = np.hypot(*q)
+        with np.errstate(invalid="ignore"):
+            kept = ~(length - radius > field.reach[objects])
+            far = ~(length + radius <= RADIUS)
+        if not self._all_draw:
+            # what draws nothing by itself matters where something was drawn before
+            drawn = np.cumsum(kept & (field.draws[objects] | (pairs.open & self._flat)))
+            begins = np.searchsorted(pairs.block, pairs.block)
+            kept &= drawn > np.where(begins > 0, drawn[begins - 1], 0)
+        index = np.flatnonzero(kept)
+        pairs, q = replace(pairs, far=far).take(index), q[:, index]
+        if not (self.prove and len(index)):
+            return pairs
+        tile.pairs += len(pairs)
+        rise = field.rise(pairs.object, q, radius[index])
+        pairs = replace(pairs, rate=radius[index] / world)
+        left, flat, values = self._proved(pairs, field.middles(pairs.object, q), rise)
+        x, y = grid.place(flat, side)
+        grid.blocks(tile.picture, side)[y // side, :, x // side] = tile.over(values)[:, None, None]
+        return left
+
+    def _proved(self, pairs: Pairs, middle: np.ndarray, rise: np.ndarray) -> tuple[Pairs, Index, np.ndarray]:
+        """What is left of pairs, and blocks of one colour (n,) with their pictures (n, 4).
+
+        Args:
+            pairs: sorted by block.
+            middle, rise: distances at the blocks' centres, and by how much others in them differ at most.
+        """
+        meetings, source = meetings_of(pairs)
+        shown = self.field.proved(meetings, middle[source], rise[source])
+        low, high = shown.picture
+        flat = (high - low).max(0) <= FLAT
+        # back in the order of pairs, where those in front of an open one go
+        left, opened = np.empty((2, len(pairs)), bool)
+        left[source], opened[source] = ~shown.shut & ~flat[meetings.places()], shown.open
+        if self._flat:  # with groups that is known already
+            later = np.cumsum(opened[::-1])[::-1]  # open pairs from each on
+            ends = np.searchsorted(pairs.block, pairs.block, "right")
+            after = np.where(ends < len(pairs), later[np.minimum(ends, len(pairs) - 1)], 0)
+            left &= later - after - opened == 0
+        kept = replace(pairs, open=opened).take(np.flatnonzero(left))
+        return kept, meetings.columns[flat], ((low + high) / 2).T[flat]
+
+
+def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, objects: Index) -> np.ndarray:
+    """Numbers (groups, B), from 1, of the objects that paint, of a stream with groups; 0 for none."""
+    own = np.zeros((nest.levels, len(painted), len(nest.turns[0].level)), np.int32)
+    rounds = iter(trace.joined)
+
+    def close(count: int) -> None:
+        for (columns, _, level), paint, *_ in (next(rounds) for _ in range(count)):
+            top, here = own[level, :, columns], xp.to_numpy(paint).T > 0.5
+            own[level - 1, :, columns] = np.where(here, top, own[level - 1, :, columns])
+            own[level, :, columns] = 0
+
+    for part, level, _, before, after in nest.turns:
+        close(len(before))
+        columns = np.arange(len(level))
+        mine = objects[part][:, None] + 1
+        own[level, :, columns] = np.where(painted[:, part].T, mine, own[level, :, columns])
+        close(len(after))
+    found: np.ndarray = own[0]
+    return found
+
+
+def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:
+    """Columns in turn, as many at a time as make `PAIRS` with so many points each, and which is the first."""
+    total = len(meetings.pairs) * points
+    if not total:
+        return []
+    if total <= PAIRS:
+        return [(0, meetings)]
+    which = np.cumsum(meetings.counts() * points) // PAIRS
+    starts = np.flatnonzero(np.concatenate([[True], which[1:] != which[:-1]])).tolist()
+    ends = [*starts[1:], len(which)]
+    return [(a, meetings.some(np.arange(a, b))[0]) for a, b in zip(starts, ends, strict=True)]

@@ -1,0 +1,263 @@
+"""Programs to pictures and outputs: tiles and threads around coverage and rays.
+
+A tile's pixels depend on the objects that reach the tile, on nothing else, and in no way on how fast or
+where they are computed. Where all of those are, bit for bit, as in the picture before, so are the pixels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.image import Image, Outputs, enlarged, from_samples
+from scenelang.drawing.neural.coverage import Coverage, Tile
+from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.meetings import LEVELS
+from scenelang.drawing.neural.network import FramedNetwork
+from scenelang.drawing.solid.draw import solid_outputs
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.network import SolidNetwork
+
+if TYPE_CHECKING:
+    from scenelang.drawing.solid.march import Work
+
+
+_ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
+
+
+@dataclass(slots=True)
+class Kept:
+    """The last picture of a sequence.
+
+    Args:
+        keys: what each of its tiles showed, a digest.
+        picture: (H, W, 3 or 4), as `Tile` has it.
+    """
+
+    keys: list[bytes] = field(default_factory=list)
+    picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
+
+    def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
+        """Whether a tile of a picture with such keys shows what it did before."""
+        return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
+
+    def look(self, coverage: Coverage, program: Program, tiles: Sequence[range]) -> list[bytes]:
+        """A digest of what each tile of a new picture will show."""
+        width, height = program.canvas
+        px = 2 / min(width, height)  # world units
+        scene = coverage.field
+        reach, frames = scene.reach, scene.frames
+        low, high = frames.boxes(reach + _ROOM_PX * px * frames.growth)
+        low, high = (np.where(np.isinf(reach), end, y[1]) for end, y in ((-np.inf, low), (np.inf, high)))
+        brought = [held and held.digest for held in scene.brought]
+        paints = [held and (held.element.digest, held.steps) for held in scene.paints]
+        looks = [hashlib.sha256(repr(pair).encode()).digest() for pair in zip(brought, paints, strict=True)]
+        shown = (
+            *(scene.vectors, scene.xp.to_numpy(scene.colours).T, scene.tokens, reach),
+            np.frombuffer(b"".join(looks), np.uint8).reshape(-1, 32),
+            *scene.nests(),
+        )
+        common = (
+            repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()
+            + scene.codes.tobytes()
+        )
+        keys = []
+        for tile in tiles:
+            top = (height / 2 - tile.start + _ROOM_PX) * px
+            bottom = (height / 2 - tile.start - LEVELS[0] * -(-len(tile) // LEVELS[0]) - _ROOM_PX) * px
+            reaching = (low <= top) & (high >= bottom)
+            what = b"".join(part[reaching].tobytes() for part in shown)
+            keys.append(hashlib.sha256(common + what).digest())
+        return keys
+
+
+TILE = 1 << 18  # pixels that are drawn at a time
+
+
+@dataclass(slots=True)
+class Drawing:
+    """A picture and what it cost.
+
+    Args:
+        image: (H, W, 3), or (H, W, 4) with straight alpha.
+        pairs: (object, sample) pairs that went through the network.
+        refined: pixels that were sampled four times.
+        met: pixels that an object reached; the others show the background, unseen by the network.
+        work: of solids, what it took in rays and steps.
+    """
+
+    image: Image
+    pairs: int
+    refined: int
+    met: int
+    work: Work | None = None
+
+
+def draw_objects(
+    network: FramedNetwork | SolidNetwork,
+    program: Program,
+    *,
+    threads: int = 1,
+    split: int | None = None,
+    kept: Kept | None = None,
+    skip: bool = True,
+    samples: str = "adaptive",
+    progress: Callable[[float], None] | None = None,
+) -> Drawing:
+    """Draw a Program of the plane or of solids, as `draw` does.
+
+    Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out; all of their
+    pixels count as met. There are two further ``samples``: ``"draft"``, one for each 2 x 2 pixels, and
+    ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled four times.
+
+    Raises:
+        ProgramError: as `draw`, or the Program and the network are of different dimensions.
+    """
+    if samples == "draft":
+        drawing = draw_objects(network, halved(program), threads=threads, samples="one", progress=progress)
+        return replace(drawing, image=enlarged(drawing.image, program.canvas))
+    if network.layout.dimension == 2:
+        if program.stage is not None:
+            raise ProgramError("a program of solids, which the model does not draw")
+        return draw(
+            network,  # type: ignore[arg-type]
+            program,
+            threads=threads,
+            split=split,
+            kept=kept,
+            skip=skip,
+            samples="adaptive" if samples == "quick" else samples,
+            progress=progress,
+        )
+    from scenelang.drawing.solid.draw import draw_solids
+    from scenelang.drawing.solid.field import SolidField
+
+    if program.stage is None:
+        raise ProgramError("a program of the plane, which the model does not draw")
+    brought, paints = program.brought(), program.paints()
+    field = SolidField(network, program.vectors, program.tokens, brought, paints)  # type: ignore[arg-type]
+    image, work = draw_solids(
+        field,
+        program.stage,
+        program.canvas,
+        threads=threads,
+        split=split,
+        samples=samples,
+        progress=progress,
+    )
+    return Drawing(image, work.met, work.refined, image.shape[0] * image.shape[1], work)
+
+
+def draw(
+    network: FramedNetwork,
+    program: Program,
+    *,
+    threads: int = 1,
+    split: int | None = None,
+    kept: Kept | None = None,
+    skip: bool = True,
+    samples: str = "adaptive",
+    tile: int = TILE,
+    progress: Callable[[float], None] | None = None,
+) -> Drawing:
+    """Draw a Program's objects in stream order.
+
+    Args:
+        network: trained parameters; the picture is computed on their device.
+        threads: tiles drawn at the same time.
+        split: tiles are as high as for so many threads; by default ``threads``.
+        kept: the picture before this one, of which tiles that show the same are taken over.
+        samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
+        tile: pixels at a time, at least one row.
+        progress: called with the share done, from any thread.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
+            proportion; no compiled scene has such.
+    """
+    width, height = program.canvas
+    field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
+    coverage = Coverage(field, skip=skip)
+    rows = max(1, min(tile // width, -(-height // (split or threads))))
+    rows = LEVELS[0] * -(-rows // LEVELS[0])
+    tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
+    background = None if program.background is None else np.asarray(program.background, np.float32)
+    out = np.empty((height, width, 4 if background is None else 3), np.float32)
+    drawn: list[Tile] = []
+    finished: list[int] = []
+    seen = kept.look(coverage, program, tiles) if kept is not None and skip and samples != "four" else None
+
+    def one(index: int) -> None:
+        band = tiles[index]
+        if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
+            out[band.start : band.stop] = kept.picture[band.start : band.stop]
+        else:
+            found = coverage.tile(program.canvas, band, samples, background)
+            out[band.start : band.stop] = found.picture
+            drawn.append(found)
+        finished.append(index)
+        if progress is not None:
+            progress(len(finished) / len(tiles))
+
+    if threads == 1 or len(tiles) == 1:
+        for index in range(len(tiles)):
+            one(index)
+    else:
+        from concurrent.futures import ThreadPoolExecutor
+
+        # every worker computes on one core; torch would otherwise split each small product again
+        with ThreadPoolExecutor(threads, initializer=network.xp.one_core) as pool:
+            list(pool.map(one, range(len(tiles))))
+    if kept is not None and seen is not None:
+        kept.picture, kept.keys = out.copy(), seen
+    cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
+    return Drawing(as_image(out), *cost)
+
+
+def halved(program: Program) -> Program:
+    """The same on a canvas with half of the columns and half of the rows."""
+    width, height = program.canvas
+    return replace(program, canvas=(-(-width // 2), -(-height // 2)))
+
+
+def as_image(picture: npt.NDArray[np.float32]) -> Image:
+    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage.
+
+    Raises:
+        ProgramError: some of it is not finite.
+    """
+    if not np.isfinite(picture.sum()):
+        raise ProgramError("a damaged program: numbers that the network cannot draw with")
+    return from_samples(picture[..., :3], picture[..., 3] if picture.shape[2] == 4 else None)
+
+
+def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, threads: int = 1) -> Outputs:
+    """All outputs that a Program has, its objects numbered as in the scene.
+
+    Raises:
+        ProgramError: no compiled scene has such numbers.
+    """
+    if program.stage is not None:
+        solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
+        found = solid_outputs(solids, program.stage, program.canvas, threads=threads)
+    else:
+        found = _plane(network, program)  # type: ignore[arg-type]
+    assert found.object is not None
+    return replace(found, object=np.array((0, *program.numbers), np.int32)[found.object])
+
+
+def _plane(network: FramedNetwork, program: Program) -> Outputs:
+    image = draw(network, replace(program, background=None)).image
+    field = Field(network, program.vectors, program.tokens, program.brought())
+    coverage = Coverage(field, prove=False)
+    height, rows = program.canvas[1], max(1, TILE // program.canvas[0])
+    found = [
+        coverage.owners(program.canvas, range(top, min(top + rows, height))) for top in range(0, height, rows)
+    ]
+    return Outputs(object=np.concatenate(found), alpha=np.asarray(image)[..., 3])

@@ -1,0 +1,441 @@
+"""The framed renderer's field: what it answers at points, whoever asks and by whichever library.
+
+Letters are those of `network.py`. Each object's frame (`frames.py`) carries points into its own space, where
+the network meets them. All pairs of an object and a point are carried and decoded together, however many
+objects they are of; then the cell takes a point's objects in one by one. Nothing here knows a pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from scenelang.assets.element import Element
+from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
+from scenelang.compiler.program import Paint, ProgramError
+from scenelang.drawing.arrays import Array
+from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.neural.frames import FAR, Frames
+from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
+from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, Floats, FramedNetwork, Slopes
+
+SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
+BLEND = 0.15  # world units: the width of the blends that the cell is trained on
+FARTHER = 1.3  # widths of a blend at which objects cannot change where its outline lies
+FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 10⁻⁶ world units
+CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
+ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
+NO_TEXTURE = -1
+ROUNDED = (
+    3  # from a cut to the cell of one with a width: a smooth union's, and two cuts', stand behind the four
+)
+_UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What P pairs did to points.
+
+    Args:
+        paint: (groups, P) how far the object's colour came in.
+        margin: (groups, P) by how much what was there before is nearer than the object, world units.
+        joined: the same of groups of the stream that ended, round by round, with which these were and their
+            distances.
+    """
+
+    paint: Array
+    margin: Array
+    joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
+
+    def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
+        """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
+        left, found = 1.0 * seen, 0.0 * self.paint
+        if nest is not None:
+            return self._nested(nest, left, found)
+        for part in reversed(meetings.slots()):
+            rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
+            found[:, part] = rest * paint
+            rest *= 1.0 - paint
+        return found
+
+    def _nested(self, nest: Nesting, seen: Array, found: Array) -> Array:
+        left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
+        rounds = iter(reversed(self.joined))
+
+        def opened(closings: list[Closing]) -> None:
+            for (columns, _, level), (_, paint, *_) in zip(reversed(closings), rounds, strict=False):
+                for at in np.unique(level).tolist():
+                    some = np.flatnonzero(level == at)
+                    below = left[at - 1][:, columns[some]]
+                    left[at][:, columns[some]] = below * paint[:, some]
+                    left[at - 1][:, columns[some]] = below * (1.0 - paint[:, some])
+
+        for part, level, _, before, after in reversed(nest.turns):
+            opened(after)
+            paint = self.paint[:, part]
+            for at in np.unique(level).tolist():
+                some = np.flatnonzero(level == at)
+                rest = left[at][:, some]
+                found[:, part.start + some] = rest * paint[:, some]
+                left[at][:, some] = rest * (1.0 - paint[:, some])
+            opened(before)
+        return found
+
+
+class Field:
+    """A program's objects with their weights, ready to be met by points.
+
+    Args:
+        network: trained parameters, on any device.
+        vectors: (N, 64) float32, geometry and material vectors.
+        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
+        paints: likewise, None where a row has the colour of its vector.
+
+    Attributes:
+        frames: of the objects.
+        reach: (N,) leaf units from an object's origin beyond which it changes nothing; inf where it concerns
+            every point.
+        draws: (N,) whether something may be seen, where it is met, of what was empty before.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
+    """
+
+    def __init__(
+        self,
+        network: FramedNetwork,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        brought: Sequence[Element | None] | None = None,
+        paints: Sequence[Paint | None] | None = None,
+    ) -> None:
+        self.network, self.xp, self.like = network, network.xp, network.codes
+        self.vectors, self.groups = vectors, read_groups(tokens)
+        self.tokens = self.groups.tokens
+        self._raw = np.asarray(tokens, np.intp) & OPERATOR
+        self.brought, self.paints = brought or [None] * len(vectors), paints or [None] * len(vectors)
+        self.layout = layout = network.layout
+        self.parts = layout.unpack(vectors)
+        self.frames = Frames(vectors[:, : layout.geometry], layout)
+        cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
+        self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
+        with self.xp.inference():
+            self.slope = float(self.xp.exp(network.read_slope)) / 4
+            self.unit = float(np.linalg.norm(self.xp.to_numpy(network.cell_weights()[2][UNION, 0])))
+            """Growth of the state per world unit."""
+            self._shapes()
+            self._cells()
+            self._colours()
+
+    def _shapes(self) -> None:
+        """Decoders of the leaves in use, grids of elements, and which object has which."""
+        xp, network = self.xp, self.network
+        every = np.ascontiguousarray(self.parts.code)
+        found, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
+        codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
+        self.codes = codes = codes.reshape(len(found), every.shape[1])
+        """Of the leaves in use (K, C): decoders are computed together."""
+        self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
+        self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
+        for element in dict.fromkeys(element for element in self.brought if element is not None):
+            if network.config.features != 1:
+                raise ProgramError("elements for a network that knows more than distances")
+            self.shape[[held == element for held in self.brought]] = len(self.shapes)
+            self.shapes.append(grid_shape(element, xp, self.like))
+            self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+
+    def _cells(self) -> None:
+        """Cells by operator and width of the blend; behind them the same with gates that are open."""
+        xp, groups = self.xp, self.groups
+        widths = widths_of(self._raw, self.parts.width.astype(np.float64))
+        self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
+        """Of the blends by which objects join (N,), world units."""
+        self.group_widths = widths[groups.rows]
+        """And of those by which groups do (G,), 0 for none."""
+        seen = felt(groups, widths)
+        self.widest = max([BLEND, *seen.widest.tolist()])
+        beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
+        # in a block a row may hide all before it in its group, and be out of reach in a part of the block
+        self.reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + SLACK + beyond)
+        operators = [*self.tokens.tolist(), *groups.joins.tolist()]
+        blends = [*np.where(groups.first, 0.0, widths).tolist(), *self.group_widths.tolist()]
+        kinds, which = _numbered(list(zip(operators, blends, strict=True)))
+        self._cell, self._joins = which[: len(self.tokens)], which[len(self.tokens) :]
+        cells = Cell(*(np.asarray(xp.to_numpy(part)) for part in self.network.cell_weights()))
+        # The fold of s d and s D is s D', so that the cell's own width is that of any other.
+        scale = np.array([BLEND / (width or BLEND) for _, width in kinds], np.float32)
+        shown = [
+            operator if operator == SMOOTH or not width else operator + ROUNDED for operator, width in kinds
+        ]
+        lines, bias, candidate, bump = (part[shown].T for part in rounded(cells, self.network.config.state))
+        lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
+        table = Cell(lines * scale, bias, candidate, bump[0] / scale)
+        opened = Cell(0 * lines, 0 * bias + 1, candidate, 0 * bump[0])
+        host = [np.concatenate(pair, -1).astype(np.float32) for pair in zip(table, opened, strict=True)]
+        self._opened = len(kinds)
+        self._table = Cell(*(xp.array(part, self.like) for part in host))
+        self._host = Cell(*host)
+
+    def _colours(self) -> None:
+        xp, parts = self.xp, self.parts
+        albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
+        self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
+        """Of the objects (3, N); 0 where a texture is worn."""
+        self.textures: list[Texture] = []
+        self.texture = np.full(len(self.paints), NO_TEXTURE)
+        """Which of the textures an object wears (N,)."""
+        known: dict[tuple[Paint, bytes], int] = {}
+        for i, paint in enumerate(self.paints):
+            if paint is None or not self.draws[i]:  # the others leave colours as they are
+                continue
+            self.texture[i] = known.setdefault((paint, parts.texture[i].tobytes()), len(known))
+            if len(known) > len(self.textures):
+                self.textures.append(Texture(xp, paint, parts.texture[i], self.like, light=False))
+            self.colours[:, i] = 0.0
+
+    @property
+    def provable(self) -> bool:
+        """Whether the network is of the kind that `shown` folds intervals of."""
+        return self.network.config.state == self.network.config.features == 1
+
+    @property
+    def blended(self) -> bool:
+        """Whether some object joins by a blend."""
+        return bool((self._raw == SMOOTH).any())
+
+    @property
+    def textured(self) -> bool:
+        """Whether some object wears a texture."""
+        return bool(self.textures)
+
+    @property
+    def nothing(self) -> float:
+        """The state of points that have met nothing."""
+        return float(EMPTY * self.widest / BLEND)
+
+    def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
+        """Cells of objects, which come last, on the host; with gates that are open if asked for."""
+        return Cell(*(part.take(self._cell[objects] + self._opened * opened, -1) for part in self._host))
+
+    def joins(self) -> Cell:
+        """Cells of all groups, which come last, on the host."""
+        return Cell(*(part.take(self._joins, -1) for part in self._host))
+
+    def empty(self, groups: int, count: int, register: int = 3) -> Array:
+        """State and register (groups, S + R, count) of points that have met nothing."""
+        memory = self.xp.full((groups, self.network.config.state + register, count), 0.0, self.like)
+        memory[:, 0] = self.nothing
+        return memory
+
+    def features(self, objects: np.ndarray, q: Array, far: np.ndarray) -> Array:
+        """Features (groups, F, P) in world units of objects (P,) at leaf coordinates (2, groups, P).
+
+        Args:
+            far: (P,) whether points of a column may lie beyond `RADIUS`.
+        """
+        xp, shape = self.xp, self.shape[objects]
+        used = np.flatnonzero(np.bincount(shape)).tolist()
+        groups = q.shape[1]
+        found = None
+        for at in used:
+            index = None if len(used) == 1 else np.flatnonzero(shape == at)
+            part = q if index is None else xp.take(q, xp.array(index, q))
+            rim = far.any() if index is None else far[index].any()
+            one = self._decoded(self.shapes[at], part.reshape(2, -1), bool(rim)).reshape(
+                -1, groups, part.shape[2]
+            )
+            if index is None:
+                found = one
+                break
+            if found is None:
+                found = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
+            for feature, values in zip(found, one, strict=True):
+                xp.put(feature, xp.array(index, q), values)
+        assert found is not None
+        scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
+        found = found.swapaxes(0, 1) * scale
+        return found.clip(-FAR, FAR) if self.frames.wild[objects].any() else found
+
+    def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
+        """Features (F, M) in leaf units."""
+        if not isinstance(shape, Decoder):
+            return shape.distance(q)[None]
+        parts = []
+        for start in range(0, q.shape[1], CHUNK):
+            part = q[:, start : start + CHUNK]
+            radius = self.xp.length(list(part)) if far else None
+            parts.append(self.network.decode(part, radius, 1.0, shape))
+        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
+
+    def nests(self) -> tuple[np.ndarray, ...]:
+        """The groups around each object (N, D), their operators and widths, -1 for none."""
+        path, joins = self.groups.path, np.append(self.groups.joins, -1)
+        return path, joins[path], np.append(self.group_widths, -1.0)[path]
+
+    def nesting(self, meetings: Meetings) -> Nesting | None:
+        """Find the states that pairs join, None where no column has a group with a state of its own."""
+        return nesting(meetings, self.groups) if self.groups.deepest else None
+
+    def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
+        """State and register (groups, S + 3, B) of columns that have met their objects.
+
+        Args:
+            features: of the pairs (groups, F, P).
+            trace: where to write down what each object did.
+        """
+        xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
+        nest = self.nesting(meetings)
+        fresh = pairs.open
+        if nest is not None:
+            fresh = fresh | np.concatenate([turn.fresh for turn in nest.turns])
+        memory = self.empty(features.shape[0], len(meetings.columns), 3 if trace is None else 4)
+        cell = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
+        colours = xp.take(self.colours, xp.array(pairs.object, self.like))
+        if trace is not None:  # a colour of 1 over a register of 0 shows the gate
+            colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
+        if nest is not None:
+            return self._fold_nested(nest, features, memory, cell, colours, trace)[:, : s + 3]
+        for part in meetings.slots():
+            old = memory[..., : part.stop - part.start]
+            lines, bias, candidate, bump = cell
+            own = Cell(lines[..., part], bias[:, part], candidate[..., part], bump[:, part])
+            took = self._took(old, own, features[..., part], colours[:, part], trace is not None)
+            if trace is not None:
+                trace.paint[:, part], trace.margin[:, part] = took
+        return memory[:, : s + 3]
+
+    def _cells_at(self, kinds: np.ndarray) -> Cell:
+        index = self.xp.array(kinds, self.like)
+        return Cell(*(self.xp.take(part, index) for part in self._table))
+
+    def _took(self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool) -> tuple[Array, Array]:
+        """Let memories (groups, S + R, n) take an object in each; how far its colour came in, and the margin.
+
+        Args:
+            cell: of the objects (…, n).
+            d: their features (groups, F, n).
+            colours: their registers (R, n), or (groups, R, n).
+        """
+        s, (lines, bias, candidate, bump) = self.network.config.state, cell
+        levels, wanted = bias, 0.0
+        for i in range(d.shape[1]):
+            levels = levels + d[:, i : i + 1] * lines[:, i]
+            wanted = wanted + d[:, i : i + 1] * candidate[:, i]
+        for i in range(s):
+            levels = levels + memory[:, i : i + 1] * lines[:, d.shape[1] + i]
+        paint = margin = None
+        if traced:
+            margin = memory[:, 0] / self.unit - d[:, 0]
+            memory[:, s + 3] = 0.0
+        new = self.network.update(levels, wanted, bump, memory[:, :s], memory[:, s:], colours)
+        memory[:, :s], memory[:, s:] = new
+        if traced:
+            paint = memory[:, s + 3] + 0.0
+        return paint, margin
+
+    def _fold_nested(
+        self, nest: Nesting, features: Array, memory: Array, cell: Cell, colours: Array, trace: Trace | None
+    ) -> Array:
+        """`fold` with a stack of memories; a group that ends joins the one below as an object."""
+        xp, s, count = self.xp, self.network.config.state, memory.shape[2]
+        stack = xp.concat([memory] * nest.levels, 2)
+
+        def close(closings: list[Closing]) -> None:
+            for columns, groups, level in closings:
+                top = xp.array(level * count + columns, self.like)
+                below = xp.array((level - 1) * count + columns, self.like)
+                inner, outer = xp.take(stack, top), xp.take(stack, below)
+                if trace is not None:
+                    inner[:, s + 3] = 1.0
+                given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
+                took = self._took(outer, *given, trace is not None)
+                if trace is not None:
+                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
+                put(below, outer)
+                put(top, xp.take(memory, xp.array(columns, self.like)))
+
+        def put(index: Array, values: Array) -> None:
+            for plane, new in zip(stack, values, strict=True):
+                xp.put(plane, index, new)
+
+        for part, level, _, before, after in nest.turns:
+            close(before)
+            index = xp.array(level * count + np.arange(len(level)), self.like)
+            old = xp.take(stack, index)
+            given = Cell(*(each[..., part] for each in cell)), features[..., part], colours[:, part]
+            took = self._took(old, *given, trace is not None)
+            put(index, old)
+            if trace is not None:
+                trace.paint[:, part], trace.margin[:, part] = took
+            close(after)
+        return stack[..., :count]
+
+    def trace(self, groups: int, pairs: int) -> Trace:
+        """Room for a trace."""
+        return Trace(*(self.xp.full((groups, pairs), 0.0, self.like) for _ in range(2)))
+
+    def picture(self, memory: Array) -> Array:
+        """Premultiplied colour and coverage (groups, 4, B), in [0, 1], of points that met all objects."""
+        coverage = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0)
+        return self.xp.concat([memory[:, self.network.config.state :] * coverage, coverage], 1)
+
+    def middles(self, objects: np.ndarray, q: Floats) -> np.ndarray:
+        """World distances (P,) at leaf coordinates (2, P)."""
+        seen = np.nan_to_num(q).clip(-FAR, FAR)
+        far = np.full(len(objects), bool((np.hypot(*seen) > RADIUS).any()))
+        points = self.xp.array(seen.astype(np.float32)[:, None], self.like)
+        found: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
+        return found
+
+    def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
+        """By how much world distances (P,) at leaf coordinates differ at most from those in radii (P,)."""
+        found, shape = np.full(len(objects), np.inf), self.shape[objects]
+        for at, slopes in enumerate(self.slopes):
+            here = np.flatnonzero(shape == at)
+            if slopes is not None and len(here):
+                found[here] = slopes.rise(q.take(here, -1), radius[here])
+        most = np.fmin((found + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
+        return np.asarray(most, np.float32)
+
+    def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
+        """What blocks are proved to show, whose pairs' distances lie within ``rise`` of ``middle``."""
+        objects = meetings.pairs.object
+        rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
+        distance = Interval(middle - rise, middle + rise)
+        cell = self.cells(objects)
+        dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
+        colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
+        with np.errstate(all="ignore"):
+            nest = self.nesting(meetings)
+            joins = None if nest is None else self.joins()
+            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, joins)
+
+
+def rounded(cells: Cell, s: int) -> Cell:
+    """Cells with tokens in front, and behind them those of operators whose edges have a width.
+
+    A cut that rounds its edge is a smooth union turned inside out: where that takes (D, d) to D', the
+    intersection takes (-D, -d) to -D', and the subtraction (-D, d). So its lines are those that were learned
+    of the union, with their signs turned. Colours are kept: gates of the register stay shut.
+    """
+    lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
+    features = lines.shape[-1] - s
+    found = [lines], [bias], [candidate], [bump]
+    for sign in (1.0, -1.0):  # of the object's features
+        turned = lines * np.array([sign] * features + [-1.0] * s, np.float32)
+        shut = np.where(np.arange(len(bias)) < s, bias, -1.0).astype(np.float32)
+        turned[s:] = 0.0
+        for part, more in zip(found, (turned, shut, -sign * candidate, -bump), strict=True):
+            part.append(more)
+    more = Cell(*(np.stack(part) for part in found))
+    return Cell(*(np.concatenate([one, two]) for one, two in zip(cells, more[:], strict=True)))
+
+
+def _numbered(things: list[Any]) -> tuple[list[Any], np.ndarray]:
+    """The different ones, in the order in which they come, and which of these each is."""
+    numbers: dict[Any, int] = {}
+    index = [numbers.setdefault(thing, len(numbers)) for thing in things]
+    return list(numbers), np.array(index, np.intp)

@@ -1,0 +1,189 @@
+"""Networks out of weights files as numpy arrays, and the proved slopes beside them.
+
+`python -m lab.slopes NAME` writes it. Weights without one are drawn without blocks being ruled out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import astuple
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.files import read_regular
+from scenelang.assets.tensors import TensorError, read_tensors
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.weights import (
+    ModelError,
+    check_shapes,
+    open_weights,
+    replaced,
+    shipped_weights,
+    weights_folder,
+)
+from scenelang.drawing.neural.network import (
+    CELLS,
+    NODE,
+    RADII,
+    STEEP,
+    FramedArrays,
+    FramedConfig,
+    Slopes,
+    parameter_shapes,
+)
+from scenelang.drawing.solid.network import SolidArrays, SolidConfig, solid_shapes
+
+MOST_BYTES = 1 << 20
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+def slopes_path(name: str, digest: str = "") -> Path:
+    """File of a shipped model's weights, those of today or those `replaced`."""
+    return weights_folder(name, digest) / "slopes.safetensors"
+
+
+def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:
+    """The arrays of a file of proofs; None where it is missing or about something else, as its header says.
+
+    Args:
+        header: what it has to say, among it the digest of the weights.
+        shapes: of its arrays.
+
+    Raises:
+        ModelError: it is damaged.
+    """
+    try:
+        found = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
+        arrays = found.arrays()
+    except OSError:
+        return None
+    except TensorError as error:
+        raise ModelError(f"damaged file `{path.name}`: {error}") from None
+    if any(found.header.get(key) != value for key, value in header.items()):
+        return None
+    if {key: value.shape for key, value in arrays.items()} != shapes:
+        raise ModelError(f"damaged file `{path.name}`: not the arrays that it should have")
+    return arrays
+
+
+def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: float) -> Mapping[bytes, Slopes]:
+    """Slopes by the bytes of codes (geometries, C); none where the file is missing or of other weights.
+
+    Raises:
+        ModelError: it is damaged.
+    """
+    header = {"weights": digest, "node": NODE, "steep": STEEP}
+    arrays = read_proof(slopes_path(name, digest), header, {"cells": (len(codes), len(RADII), CELLS, CELLS)})
+    if arrays is None:
+        return {}
+    if (arrays["cells"] < 0).any():
+        raise ModelError(f"damaged slopes of `{name}`: negative ones")
+    return {code.tobytes(): Slopes(own, far) for code, own in zip(codes, arrays["cells"], strict=True)}
+
+
+MOST_SIZE: Final = 128
+"""Of a layer: so many units squared, times the code, are 9 MB."""
+
+
+def solid_config(config: Any) -> SolidConfig:
+    """Sizes of the network in a weights file.
+
+    Raises:
+        ModelError: they are missing, unknown or out of range.
+    """
+    try:
+        found = SolidConfig(**config["network"])
+    except (KeyError, TypeError) as error:
+        raise ModelError(f"bad network sizes: {error}") from None
+    *sizes, segment = astuple(found)
+    if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in (*sizes, segment or 1)):
+        raise ModelError("a network size is out of range")
+    return found
+
+
+def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
+    """The network that a weights file holds, of so many geometries and materials.
+
+    Raises:
+        ModelError: the file does not fit the model or itself, or holds numbers that are not finite.
+    """
+    header, arrays = open_weights(data)
+    config = solid_config(header.get("config"))
+    check_shapes(arrays, solid_shapes(config, geometries, materials))
+    return SolidArrays(config, arrays)
+
+
+MOST_WIDTH = 1024
+
+
+class ArrayModel(NamedTuple):
+    """A shipped network that numpy draws with, and the SHA-256 of its weights file, hex."""
+
+    network: FramedArrays | SolidArrays
+    digest: str
+
+
+def framed_config(config: dict[str, Any], size: int) -> FramedConfig:
+    """Sizes of the network in a weights file of ``size`` bytes.
+
+    Raises:
+        ModelError: they are missing, unknown, out of range, or larger than the file.
+    """
+    sizes = config.get("network") if isinstance(config, dict) else None
+    if not isinstance(sizes, dict):
+        raise ModelError("no network sizes")
+    if "cell_width" in sizes:
+        raise ModelError("weights of an earlier framed renderer, whose cell was another; train them again")
+    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+        raise ModelError("a network size is out of range")
+    try:
+        known = FramedConfig(**sizes)
+    except TypeError as error:
+        raise ModelError(f"bad network sizes: {error}") from None
+    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
+    rows = known.state + known.paint_lines
+    cell = (known.features + known.state) * rows + known.features * known.state
+    if 4 * max(decoder, cell) > size:
+        raise ModelError("a network larger than its file")
+    return known
+
+
+def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
+    """The network that a weights file holds.
+
+    Raises:
+        ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
+    """
+    header, arrays = open_weights(data)
+    config = framed_config(header.get("config", {}), len(data))
+    check_shapes(arrays, parameter_shapes(config, len(manifest.geometries), len(manifest.materials)))
+    return FramedArrays(config, arrays)
+
+
+def load_arrays(name: str, weights: str = "") -> ArrayModel:
+    """Load a shipped model.
+
+    Args:
+        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
+
+    Raises:
+        KeyError: there is no such model.
+        ModelError: its weights are missing or damaged.
+    """
+    return _load(name, replaced(weights))
+
+
+@lru_cache(maxsize=8)
+def _load(name: str, weights: str) -> ArrayModel:
+    manifest, data = load_manifest(name), shipped_weights(name, weights)
+    digest = hashlib.sha256(data).hexdigest()
+    if manifest.renderer == "solid":
+        return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
+    network = framed_arrays(data, manifest)
+    network.slopes = load_slopes(name, digest, network.codes, float(network.far[0]))
+    return ArrayModel(network, digest)

@@ -1,0 +1,141 @@
+"""A model ready to draw: manifest, trained network, digest of its weights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenelang.compiler.lifting import WIDTH
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.weights import LIFTING, Codes, check_shapes, codes_of, open_weights, shipped_weights
+from scenelang.compiler.weights import ModelError as ModelError
+from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_slopes, solid_config
+from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
+from scenelang.drawing.neural.torch_networks import Framed, Solids
+
+RENDERER = "renderer."
+"""In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
+
+Network = Framed | Solids | Streaming | Reading
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What draws programs.
+
+    Args:
+        network: the trained network, in evaluation mode, without gradients.
+        codes: of its weights, as `compile_scene` takes them.
+        header: how the weights were trained (config, seed, revision, budget).
+    """
+
+    manifest: Manifest
+    network: Network
+    codes: Codes
+    header: dict[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the weights file, hex."""
+        return self.codes.digest
+
+    @property
+    def framed(self) -> Framed:
+        """The network of a model that meets objects in their frames.
+
+        Raises:
+            ModelError: it is another one.
+        """
+        if not isinstance(self.network, Framed):
+            raise ModelError(f"model `{self.manifest.name}` has no framed renderer")
+        return self.network
+
+
+def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
+    """Build the network that a weights file holds.
+
+    Raises:
+        ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
+    """
+    header, arrays = open_weights(data)
+    make = _MAKERS.get(manifest.renderer)
+    if make is None:
+        raise ModelError(f"an unknown renderer `{manifest.renderer}`")
+    try:
+        with torch.random.fork_rng(devices=[]):
+            # Not on the meta device, which takes no memory but 1.8 s to import what it stands on.
+            network = make(header["config"], manifest, len(data))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise ModelError(f"bad network sizes: {error}") from None
+    if not isinstance(network, Framed | Solids):
+        arrays = {
+            name.removeprefix(RENDERER): array.astype(np.float32) if array.dtype == np.float16 else array
+            for name, array in arrays.items()
+            if not name.startswith(LIFTING)
+        }
+    check_shapes(arrays, {name: tuple(held.shape) for name, held in network.state_dict().items()})
+    network.load_state_dict({k: torch.from_numpy(array) for k, array in arrays.items()}, assign=True)
+    return network.requires_grad_(False).eval().to(device)
+
+
+def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
+    return Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
+
+
+def _solid(config: dict[str, Any], manifest: Manifest, size: int) -> Solids:
+    return Solids(solid_config(config), len(manifest.geometries), len(manifest.materials))
+
+
+def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
+    sizes = config["student"]["streaming"]
+    known = StreamingConfig(**{**sizes, "vector": WIDTH})
+    if manifest.sizes != ((known.resolution, known.resolution),):
+        raise ModelError(f"a network for {known.resolution} pixels, which the manifest does not say")
+    filters = known.filters(known.resolution)
+    if 2 * 25 * (2 * filters + 4) * 4 * filters > size:  # in half precision
+        raise ModelError("a network larger than its file")
+    return Streaming(known)
+
+
+def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
+    sizes = {**config["student"]["reading"], "vector": WIDTH}
+    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+        raise ModelError("a network size is out of range")
+    known = ReadingConfig(**sizes)
+    if 4 * 9 * known.hidden**2 > size or known.reads > 64 or known.octaves > 16:
+        raise ModelError("a network larger than its file, or that reads too often")
+    return Reading(known)
+
+
+_Make = Callable[[dict[str, Any], Manifest, int], Network]
+_MAKERS: dict[str, _Make] = {"framed": _framed, "solid": _solid, "streaming": _streaming, "reading": _reading}
+
+
+def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
+    """Load a shipped model, or one whose weights lie at ``path``.
+
+    Args:
+        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
+
+    Raises:
+        KeyError: there is no such model.
+        ModelError: its weights are missing or damaged.
+    """
+    manifest, data = load_manifest(name), shipped_weights(name, weights, path)
+    network, codes = load_network(data, manifest, device), codes_of(manifest, data)
+    if isinstance(network, Framed):
+        host = network.codes.cpu().numpy()
+        network.slopes = load_slopes(name, codes.digest, host, float(network.far[0]))
+    return Model(manifest, network, codes, open_weights(data).header)
+
+
+def place_of(network: Network) -> torch.device:
+    """The device that a network lies on."""
+    parameter: Tensor = next(network.parameters())
+    return parameter.device

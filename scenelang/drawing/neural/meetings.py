@@ -1,0 +1,538 @@
+"""Blocks of pixels: where they lie, which objects they meet, and what they are proved to show.
+
+A pair is an object at a block. Blocks with the most objects are the first columns; then all pairs that come
+first at their block, all that come second, and so on: each of these slots is as long as there are columns
+with so many objects, and column i is its i-th pair.
+
+Everything is float32 on the host. Distances come widened by more than that may be off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.groups import SMOOTH, Groups
+from scenelang.drawing.neural.frames import Floats, Frames
+from scenelang.drawing.neural.network import Cell
+
+Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """P pairs.
+
+    Args:
+        block, object: (P,).
+        open: (P,) whether what the block met before is proved not to matter.
+        far: (P,) whether points of the block may be seen at the rim of what the decoder knows.
+        rate: (P,) how many leaf units two points of the block may be apart, per world unit.
+    """
+
+    block: Index
+    object: Index
+    open: Mask
+    far: Mask
+    rate: npt.NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def take(self, index: npt.NDArray[np.generic]) -> Pairs:
+        """Some of the pairs, or all in another order."""
+        return Pairs(
+            self.block[index], self.object[index], self.open[index], self.far[index], self.rate[index]
+        )
+
+    @classmethod
+    def of(cls, block: Index, objects: Index) -> Pairs:
+        """Pairs of which nothing else is known, sorted by block."""
+        by = np.argsort(block, kind="stable")
+        none = np.zeros(len(by), bool)
+        return cls(block[by], objects[by], none, none, np.full(len(by), np.inf))
+
+    def split(self, wide: int, parts: int) -> Pairs:
+        """The same pairs of blocks that are smaller in both directions by a factor.
+
+        Args:
+            wide: larger blocks in a row.
+        """
+        down, across = np.divmod(self.block, wide)
+        at = np.arange(parts)
+        first = (down * parts * wide + across) * parts
+        block = (first[:, None, None] + at[:, None] * (wide * parts) + at).reshape(-1)
+        by = np.argsort(block, kind="stable")
+        return replace(self.take(by // parts**2), block=block[by])
+
+
+@dataclass(frozen=True, slots=True)
+class Meetings:
+    """Pairs slot by slot.
+
+    Args:
+        columns: (B,) blocks.
+        pairs: slot by slot.
+        lengths: of the slots, none longer than the one before.
+    """
+
+    columns: Index
+    pairs: Pairs
+    lengths: Index
+
+    def slots(self) -> list[slice]:
+        """Where the pairs of each slot lie."""
+        ends = np.cumsum(self.lengths).tolist()
+        return [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)]
+
+    def counts(self) -> Index:
+        """How many objects each column meets (B,)."""
+        drops = np.bincount(self.lengths, minlength=len(self.columns) + 1)
+        return np.cumsum(drops[::-1])[::-1][1:]
+
+    def places(self) -> Index:
+        """The column of each pair (P,)."""
+        return np.concatenate([*map(np.arange, self.lengths.tolist()), self.columns[:0]])
+
+    def some(self, columns: Index) -> tuple[Meetings, Index]:
+        """Columns by ascending places, also more than once, and where their pairs come from."""
+        lengths = columns.searchsorted(self.lengths)
+        parts = [part.start + columns[:n] for part, n in zip(self.slots(), lengths.tolist(), strict=True)]
+        index = np.concatenate([*parts, columns[:0]])
+        return Meetings(self.columns[columns], self.pairs.take(index), lengths[lengths > 0]), index
+
+
+def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
+    """Pairs that are sorted by blocks, and by the order of objects within these; and where each came from."""
+    block = pairs.block
+    first = np.flatnonzero(np.concatenate([[True], block[1:] != block[:-1]])) if len(block) else block
+    counts = np.diff(np.append(first, len(block)))
+    by = np.argsort(-counts, kind="stable")
+    first, counts = first[by], counts[by]
+    lengths = (-counts).searchsorted(-np.arange(counts[0] if len(counts) else 0))
+    index = np.concatenate([*(first[:n] + k for k, n in enumerate(lengths.tolist())), block[:0]])
+    return Meetings(block[first], pairs.take(index), lengths), index
+
+
+class Closing(NamedTuple):
+    """Groups that end, one in each of some columns.
+
+    Args:
+        columns: (n,) in ascending order.
+        groups: (n,) their numbers.
+        level: (n,) of the states that go into the ones below them.
+    """
+
+    columns: Index
+    groups: Index
+    level: Index
+
+
+class Turn(NamedTuple):
+    """A slot of nested meetings.
+
+    Args:
+        part: where its pairs lie.
+        level: (n,) of the states that its pairs join; 0 is the stream's own.
+        fresh: (n,) whether an object begins its state as it is.
+        before, after: groups that end before the slot, and behind it where columns end, in rounds.
+    """
+
+    part: slice
+    level: Index
+    fresh: Mask
+    before: list[Closing]
+    after: list[Closing]
+
+
+class Nesting(NamedTuple):
+    """Meetings of a stream with groups.
+
+    Args:
+        turns: slot by slot.
+        levels: how many states are needed.
+    """
+
+    turns: list[Turn]
+    levels: int
+
+    def fold(
+        self,
+        blocks: int,
+        shut: Mask,
+        opened: Mask,
+        pair: Callable[[Turn, Index | slice], tuple[Mask, Mask]],
+        group: Callable[[Index | slice, Index | slice, Index], tuple[Mask, Mask]],
+    ) -> None:
+        """Fold pairs and groups; fill in which pairs change nothing or are hidden, and which hide the rest.
+
+        Args:
+            blocks: columns of the meetings; level l of column i is state ``l * blocks + i``.
+            shut, opened: (P,) of the pairs, filled in.
+            pair: takes a turn's pairs into states (n,); returns whether each changes nothing, and whether
+                nothing else is left.
+            group: takes states (n,) into others, as groups of these numbers end, and empties them; returns
+                the same.
+        """
+        done = []  # of groups that ended, round by round: where they join, and what came of it
+        every = np.arange(blocks)
+
+        def places(columns: Index, level: Index) -> Index | slice:
+            first, last = (columns[0], columns[-1]) if len(columns) else (0, -1)
+            if last - first + 1 == len(columns) and (level == level[:1]).all():  # numpy is faster with slices
+                start = int(first + blocks * level[0]) if len(level) else 0
+                return slice(start, start + len(columns))
+            return level * blocks + columns
+
+        def close(closings: list[Closing]) -> None:
+            for columns, ended, level in closings:
+                top, below = places(columns, level), places(columns, level - 1)
+                done.append((top, below, group(top, below, ended)))
+
+        for turn in self.turns:
+            close(turn.before)
+            shut[turn.part], opened[turn.part] = pair(turn, places(every[: len(turn.level)], turn.level))
+            close(turn.after)
+        hidden = np.zeros(self.levels * blocks, bool)
+
+        def reopen(closings: list[Closing]) -> None:
+            for _ in closings:
+                top, below, (closed, wide) = done.pop()
+                hidden[top] = hidden[below] | closed
+                hidden[below] |= wide
+
+        for part, level, _, before, after in reversed(self.turns):
+            reopen(after)
+            at = places(every[: len(level)], level)
+            shut[part] |= hidden[at]
+            hidden[at] |= opened[part]
+            reopen(before)
+
+
+def flat_nesting(meetings: Meetings) -> Nesting:
+    """Return the nesting of a stream without groups: all pairs join the stream's own state."""
+    sizes = [(part, part.stop - part.start) for part in meetings.slots()]
+    return Nesting([Turn(p, np.zeros(n, np.intp), np.zeros(n, bool), [], []) for p, n in sizes], 1)
+
+
+def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
+    """Find which states the pairs of each column join, None where all join the stream's own.
+
+    Of a group's rows a column may meet some or none. A group that draws goes on in the state around it where
+    that is still empty, so that only those that meet something take a state of their own.
+    """
+    slots, count = meetings.slots(), len(meetings.columns)
+    paths = groups.path[meetings.pairs.object]
+    same = np.zeros(paths.shape, bool)  # which groups were open at the pair before, too
+    for last, part in pairwise(slots):
+        n = part.stop - part.start
+        same[part] = (paths[part] == paths[last.start : last.start + n]) & (paths[part] >= 0)
+    shared = np.logical_and.accumulate(same, 1).sum(1)
+    number = np.arange(groups.deepest)
+    begins = (number >= shared[:, None]) & (paths >= 0)
+    own = begins & (number == shared[:, None])
+    own[: slots[0].stop if slots else 0] = False  # nothing stands before the first pairs
+    own |= begins & (groups.joins > SMOOTH)[paths]
+    if not own.any():
+        return None
+    fresh = own.any(1) & (groups.tokens[meetings.pairs.object] <= SMOOTH)
+    last_path = np.full((count, groups.deepest), -1)
+    real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
+    every = np.arange(count)
+    turns, levels = list[Turn](), 1
+    for at, part in enumerate(slots):
+        n = part.stop - part.start
+        before = _closings(every[:n], last_path, real, shared[part])
+        real[:n] = np.where(begins[part], own[part], real[:n] & (number < shared[part, None]))
+        last_path[:n] = paths[part]
+        level = real[:n].sum(1)
+        levels = max(levels, int(level.max(initial=0)) + 1)
+        left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
+        after = _closings(every[left:n], last_path, real, np.zeros(n - left, np.intp))
+        turns.append(Turn(part, level, fresh[part], before, after))
+    return Nesting(turns, levels)
+
+
+def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> list[Closing]:
+    """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
+    found = list[Closing]()
+    if not len(columns):
+        return found
+    for at in range(open_groups.shape[1] - 1, -1, -1):
+        some = columns[(kept <= at) & real[columns, at]]
+        if len(some):
+            found.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
+    return found
+
+
+Floats32 = npt.NDArray[np.float32]
+Columns = npt.NDArray[np.intp]
+
+
+class Interval(NamedTuple):
+    """Numbers from ``low`` to ``high``."""
+
+    low: Floats32
+    high: Floats32
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What is proved of blocks.
+
+    Args:
+        picture: premultiplied colour and coverage (4, B).
+        shut: (P,) objects that change nothing in their block.
+        open: (P,) objects behind which nothing matters that came before.
+    """
+
+    picture: Interval
+    shut: Mask
+    open: Mask
+
+
+def shown(
+    meetings: Meetings,
+    distance: Interval,
+    cell: Cell,
+    colours: Interval,
+    empty: float,
+    slope: float,
+    nest: Nesting | None = None,
+    joins: Cell | None = None,
+) -> Shown:
+    """Fold intervals, of a network whose state is one number and that knows one feature.
+
+    Args:
+        distance: of the pairs (P,), world units.
+        cell: of the pairs, which come last: lines (1 + L, 2, P), bias (1 + L, P), candidate and bump (1, P).
+        colours: of the pairs (3, P).
+        empty: the state before the first object.
+        slope: of coverage, per world unit.
+        nest: of a stream with groups.
+        joins: cells of these groups, which come last.
+    """
+    blocks, given = len(meetings.columns), meetings.pairs.open
+    state = _State.empty(empty, blocks * (1 if nest is None else nest.levels))
+    shut, wide = np.zeros((2, len(given)), bool)
+    if nest is None or joins is None:
+        gates = _Gates.of(cell, distance, given)
+        for part in meetings.slots():
+            own = _Operand(
+                Interval(distance.low[part], distance.high[part]),
+                Interval(colours.low[:, part], colours.high[:, part]),
+            )
+            shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
+        wide |= given
+    else:
+        fresh = np.concatenate([turn.fresh for turn in nest.turns])
+        gates = _Gates.of(cell, distance, given | fresh)
+
+        def pair(turn: Turn, places: Columns | slice) -> tuple[Mask, Mask]:
+            part = turn.part
+            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
+            keeps, hides = state.join(places, own, gates.some(part))
+            return keeps, hides | given[part]
+
+        def group(top: Columns | slice, below: Columns | slice, ended: Columns) -> tuple[Mask, Mask]:
+            operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
+            joined = state.join(
+                below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool))
+            )
+            state.clear(top, empty)
+            return joined
+
+        nest.fold(blocks, shut, wide, pair, group)
+    low, high = (side[:blocks] for side in state.distance)
+    covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
+    sides = zip(state.colour, covered, strict=True)
+    picture = Interval(*(np.vstack([c[:, :blocks] * share, share]) for c, share in sides))
+    return Shown(picture, shut, wide)
+
+
+class _Gates(NamedTuple):
+    """Gates of n operands: their cells, levels by their own distances, and slopes by the state's.
+
+    Those that are given as open have levels of infinity.
+    """
+
+    cell: Cell
+    own: Interval
+    up: Floats32
+    down: Floats32
+    given: Mask
+
+    @classmethod
+    def of(cls, cell: Cell, d: Interval, given: Mask) -> _Gates:
+        # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
+        up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
+        own = Interval(
+            up[:, 0] * d.low + down[:, 0] * d.high + cell.bias,
+            up[:, 0] * d.high + down[:, 0] * d.low + cell.bias,
+        )
+        own.low[:, given] = own.high[:, given] = np.inf
+        return cls(cell, own, up[:, 1], down[:, 1], given)
+
+    def some(self, which: slice | Columns) -> _Gates:
+        """Select some of the operands."""
+        lines, bias, candidate, bump = self.cell
+        return _Gates(
+            Cell(lines[..., which], bias[:, which], candidate[..., which], bump[:, which]),
+            Interval(self.own.low[:, which], self.own.high[:, which]),
+            self.up[:, which],
+            self.down[:, which],
+            self.given[which],
+        )
+
+
+class _Operand(NamedTuple):
+    """Operand of a state in n columns: its distance (n,) and colour (3, n)."""
+
+    distance: Interval
+    colour: Interval
+
+
+class _State(NamedTuple):
+    """Distances (B,) and colours (3, B) of a fold."""
+
+    distance: Interval
+    colour: Interval
+
+    @classmethod
+    def empty(cls, distance: float, count: int) -> _State:
+        return cls(
+            Interval(*np.full((2, count), distance, np.float32)),
+            Interval(*np.zeros((2, 3, count), np.float32)),
+        )
+
+    def at(self, columns: Columns | slice) -> _Operand:
+        """Return its distances and colours in some columns, as an operand."""
+        parts = ((low[..., columns], high[..., columns]) for low, high in self)
+        return _Operand(*(Interval(*part) for part in parts))
+
+    def clear(self, columns: Columns | slice, distance: float) -> None:
+        """Empty it in some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = distance, 0.0
+
+    def join(self, columns: Columns | slice, operand: _Operand, gates: _Gates) -> tuple[Mask, Mask]:
+        """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
+        d, own_colour = operand
+        low, high = self.distance.low[columns], self.distance.high[columns]
+        cell, own, up, down, given = gates
+        past = up * high + down * low
+        least, most = own.low + (up * low + down * high), own.high + past
+        paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
+        keeps, takes = least[0] < 1, most[0] > 0
+        # where the gate is not wide open, or not shut, its line bounds one number by the other
+        kept = _capped(Interval(low, high), cell.lines[0, 1], 1.0 - own.low[0])
+        taken = _capped(d, -cell.lines[0, 0], past[0] + cell.bias[0])
+        taken = Interval(*(np.where(given, *pair) for pair in zip(d, taken, strict=True)))
+        a, b = taken.low * cell.candidate[0, 0], taken.high * cell.candidate[0, 0]
+        dent = cell.bump[0] / 4 * (keeps & takes)
+        self.distance.low[columns] = np.minimum(
+            np.where(keeps, kept.low, np.inf), np.where(takes, np.minimum(a, b), np.inf)
+        ) - np.maximum(dent, 0.0)
+        self.distance.high[columns] = np.maximum(
+            np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
+        ) - np.minimum(dent, 0.0)
+        for side, c, choose in zip(self.colour, own_colour, (np.minimum, np.maximum), strict=True):
+            now = side[:, columns]
+            more = c - now
+            side[:, columns] = now + choose(paint.low * more, paint.high * more)
+        return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
+
+
+def _capped(x: Interval, factor: Floats32, most: Floats32) -> Interval:
+    """An interval of those x that have ``factor x <= most``, of which there are some."""
+    bound = most / factor
+    bound = np.minimum(np.maximum(bound, x.low), x.high)
+    return Interval(np.where(factor < 0, bound, x.low), np.where(factor > 0, bound, x.high))
+
+
+LEVELS = 8, 4  # sides of blocks, pixels
+ROUNDING = 1e-6  # world units
+
+
+@dataclass(frozen=True, slots=True)
+class Raster:
+    """Pixels in rows of blocks, of the largest size in both directions.
+
+    Args:
+        px: world units.
+        canvas: width, and rows of pixels that are wanted.
+        wide, high: pixels up to the ends of the last blocks.
+        left, top: world coordinates of the middle of the first pixel.
+        largest: side of the largest blocks, pixels.
+    """
+
+    px: float
+    canvas: tuple[int, int]
+    wide: int
+    high: int
+    left: float
+    top: float
+    largest: int = LEVELS[0]
+
+    def place(self, block: Index, side: int) -> tuple[Index, Index]:
+        """Column and row of the first pixels of blocks, numbered from the top row of them down."""
+        down, across = np.divmod(block, self.wide // side)
+        return across * side, down * side
+
+    def blocks(self, pixels: np.ndarray, side: int) -> np.ndarray:
+        """A view (down, row, across, column, .) by blocks of pixels (high, wide, .)."""
+        return pixels.reshape(self.high // side, side, self.wide // side, side, -1)
+
+    def inside(self, place: tuple[Index, Index], side: int) -> np.ndarray | None:
+        """Which pixels (side * side, B) of blocks are wanted; None if all of the raster's are."""
+        if self.canvas == (self.wide, self.high):
+            return None
+        down, across = np.divmod(np.arange(side * side)[:, None], side)
+        found: np.ndarray = (place[0] + across < self.canvas[0]) & (place[1] + down < self.canvas[1])
+        return found
+
+    def centres(self, place: tuple[Index, Index], side: int) -> np.ndarray:
+        """World coordinates (2, side * side, B), float32, of blocks' pixels row by row.
+
+        They are float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel.
+        """
+        found = np.empty((2, side, side, len(place[0])), np.float32)
+        steps = self.px * np.arange(side)[:, None]
+        found[0] = (self.left + self.px * place[0]) + steps
+        found[1] = ((self.top - self.px * place[1]) - steps)[:, None]
+        return found.reshape(2, side * side, -1)
+
+    def reached(self, frames: Frames, reach: Floats) -> Pairs:
+        """Objects at the largest blocks where they may be within their reach (N,), leaf units."""
+        size = self.largest * self.px
+        every = np.isinf(reach)
+        low, high = frames.boxes(np.where(every, 0.0, reach))
+        corner = self.left - self.px / 2, self.top + self.px / 2
+        most = np.array([[self.wide], [self.high]]) // self.largest
+        first = np.stack([low[0] - corner[0], corner[1] - high[1]]) - ROUNDING
+        last = np.stack([high[0] - corner[0], corner[1] - low[1]]) + ROUNDING
+        # a box of what are no numbers is everywhere
+        first = np.floor(np.fmin(np.fmax(first / size, 0), most)).astype(np.intp)
+        last = np.ceil(np.fmax(np.fmin(last / size, most), 0)).astype(np.intp)
+        first, last = np.where(every, 0, first), np.where(every, most, last)
+        across, down = (last - first).clip(0)
+        counts = across * down
+        objects = np.repeat(np.arange(len(counts)), counts)
+        at = np.arange(len(objects)) - np.repeat(np.cumsum(counts) - counts, counts)
+        y, x = np.divmod(at, across[objects])
+        return Pairs.of((first[1][objects] + y) * most[0] + first[0][objects] + x, objects)
+
+
+def raster(canvas: tuple[int, int], rows: range, largest: int = LEVELS[0]) -> Raster:
+    """The blocks that hold some rows of a picture."""
+    width, height = canvas
+    px = 2 / min(width, height)  # world units
+    wide, high = (-(-n // largest) * largest for n in (width, len(rows)))
+    left, top = (0.5 - width / 2) * px, (height / 2 - 0.5 - rows.start) * px
+    return Raster(px, (width, len(rows)), wide, high, left, top, largest)

@@ -1,0 +1,266 @@
+"""The plane's network, from top to bottom, for parameters of either library, and proved slopes of distances.
+
+Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, F = `features`, S = `state`,
+G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
+coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over contiguous numbers.
+
+For a point and an object the frame gives the point's leaf coordinates exactly (`frames.py`). Two learned
+parts then draw:
+
+1. The decoder turns leaf coordinates into F distance-like features. Its weights are a linear function of
+   the object's code, so that shapes live in codes: swap two codes and the shapes swap. It has rectified
+   linear units, which represent straight edges exactly, and its output is multiplied by the object's
+   distance scale.
+2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
+   and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
+   under one gate of its own, so that colour is kept, not re-learned.
+
+No point looks at another and nothing here knows a leaf, an operator's formula, a pixel or a library.
+
+For the distance f of a leaf, with leaf coordinates p of a cell and q within a radius of p,
+
+    |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s.
+
+s hangs on the cell and the radius. `lab.slopes` proves it of learned leaves, and it is shipped
+beside the weights. That of elements is read off their nodes. Of what nothing is known it is infinite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.lifting import PLANE_LAYOUT, Layout
+from scenelang.drawing.arrays import NUMPY, Array, Arrays, Layers
+from scenelang.language.words import TOKENS as WORDS
+
+TOKENS = len(WORDS)
+EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
+RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
+
+
+@dataclass(frozen=True, slots=True)
+class FramedConfig:
+    """Sizes of the network.
+
+    Args:
+        code: entries of the geometry code.
+        material_code: entries of the material code.
+        features: distance-like features F of an object at a point.
+        state: entries S of the LSTM state.
+        decoder_width: hidden units of the decoder's two layers.
+        paint_lines: lines L of which the highest opens the register's gate.
+    """
+
+    code: int = 4
+    material_code: int = 12
+    features: int = 1
+    state: int = 1
+    decoder_width: int = 32
+    paint_lines: int = 2
+
+
+class Decoder(NamedTuple):
+    """Weights of objects' decoders."""
+
+    layers: Layers
+    far: Array  # (F, 1): growth of the features beyond the rim
+
+
+class Cell(NamedTuple):
+    """Weights of the cell, of one token or with tokens or objects in front."""
+
+    lines: Array  # (…, S + L, F + S)
+    bias: Array  # (…, S + L)
+    candidate: Array  # (…, S, F)
+    bump: Array  # (…, S, 1): by how much a half-open gate lowers the state, times four
+
+
+class FramedNetwork:
+    """The formulas of the network, over parameters of either library.
+
+    Numpy's parameters are attributes of `FramedArrays`, torch's those of the module `Framed`.
+    """
+
+    config: FramedConfig
+    slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes
+    layout: Layout = PLANE_LAYOUT
+    xp: ClassVar[Arrays]
+    codes: Any  # (geometries, C)
+    material_codes: Any  # (materials, material_code)
+    albedo: Any  # (material_code + 1, 3)
+    decoder_w: Any  # (C + 1, d, G), (C + 1, G, G), (C + 1, G, F)
+    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, F)
+    far: Any  # (F,): growth of the features beyond the rim
+    cell_lines: Any  # (TOKENS, F + S, S + L)
+    cell_gain: Any  # (TOKENS, S + L): a logarithm
+    cell_bias: Any  # (TOKENS, S + L)
+    candidate: Any  # (TOKENS, F, S)
+    bump: Any  # (TOKENS, S)
+    read_slope: Any  # a logarithm
+
+    def decoder_weights(self, code: Array) -> Decoder:
+        """Decoders of objects from codes (M, C): each weight is linear in (code, 1)."""
+        one = self.xp.concat([code, self.xp.full((len(code), 1), 1.0, code)], 1)  # (M, C + 1)
+        layers = []
+        for w, b in zip(self.decoder_w, self.decoder_b, strict=True):
+            mixed = one[None] @ w.reshape(1, len(w), -1)  # (1, M, in * out)
+            layers.append((mixed.reshape(len(code), *w.shape[1:]).swapaxes(1, 2), one @ b))
+        return Decoder(layers, self.far[:, None])
+
+    def decoders(self, codes: Array) -> list[Decoder]:
+        """Of each of the codes (M, C), mixed together and contiguous."""
+        layers, far = self.decoder_weights(codes)
+        return [Decoder([(self.xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
+
+    def cell_weights(self) -> tuple[Array, ...]:
+        """The `Cell`, with tokens in front.
+
+        The steeper a gate, the lower its bump, so that what a blend adds shrinks as it narrows.
+        """
+        gain = self.xp.exp(self.cell_gain)
+        bump = self.bump / gain[:, : self.config.state]
+        lines = (self.cell_lines * gain[:, None]).swapaxes(1, 2)
+        candidate = self.candidate.clip(-1.0, 1.0).swapaxes(1, 2)
+        return Cell(lines, self.cell_bias, candidate, bump[..., None])
+
+    def object_albedo(self, material_code: Array) -> Array:
+        """Albedo (M, 3) of material codes (M, material_code); one constant value a material."""
+        return material_code @ self.albedo[:-1] + self.albedo[-1]
+
+    def decode(self, q: Array, radius: Array | None, scale: Array | float, decoder: Decoder) -> Array:
+        """Features (…, F, M) of leaf coordinates.
+
+        Args:
+            q: leaf coordinates (…, d, M).
+            radius: their lengths (…, 1, M), or (M,); None where none lies beyond `RADIUS`.
+            scale: world distance per leaf distance, a number or (…, 1, 1).
+        """
+        if radius is None:
+            return self.xp.perceptron(q, decoder.layers) * scale  # (…, F, M)
+        x = self.xp.perceptron(q * (RADIUS / radius.clip(RADIUS)), decoder.layers)
+        return (x + (radius - RADIUS).clip(0.0) * decoder.far) * scale
+
+    def step(
+        self, features: Array, state: Array, colour: Array, object_colour: Array, weights: tuple[Array, ...]
+    ) -> tuple[Array, Array]:
+        """One object: the LSTM cell and the register.
+
+        Args:
+            features: (…, F, M).
+            state: (…, S, M).
+            colour: the register (…, R, M).
+            object_colour: (…, R, 1).
+            weights: the `Cell` of the object's token.
+        """
+        lines, bias, candidate, bump = weights
+        levels = self.xp.dense(self.xp.concat([features, state], -2), lines, bias)  # (…, S + L, M)
+        return self.update(levels, candidate @ features, bump, state, colour, object_colour)
+
+    def update(
+        self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
+    ) -> tuple[Array, Array]:
+        """State and register behind the gates.
+
+        Args:
+            levels: of the gates before they are clamped (…, S + L, M).
+            candidate: what the state becomes where its gate is open (…, S, M).
+            bump: as in `Cell`, or (…, S, M).
+            state, colour, object_colour: as `step` takes them.
+        """
+        s, xp = self.config.state, self.xp
+        take = levels[..., :s, :].clip(0.0, 1.0)
+        paint = xp.largest(levels[..., s:, :]).clip(0.0, 1.0)
+        state = xp.add_product(state, take, candidate - state) - take * (1 - take) * bump
+        return state, xp.add_product(colour, paint, object_colour - colour)
+
+
+class FramedArrays(FramedNetwork):
+    """A trained network as numpy arrays.
+
+    Args:
+        arrays: parameters by the names of `parameter_shapes`.
+    """
+
+    xp = NUMPY
+
+    def __init__(self, config: FramedConfig, arrays: Mapping[str, np.ndarray]) -> None:
+        self.config = config
+        for name, value in arrays.items():
+            setattr(self, name, value)
+        self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
+
+
+def parameter_shapes(
+    c: FramedConfig, geometries: int, materials: int, d: int = 2
+) -> dict[str, tuple[int, ...]]:
+    """Shapes of a network's parameters in a file, by name."""
+    sizes, rows = [d, c.decoder_width, c.decoder_width, c.features], c.state + c.paint_lines
+    return {
+        "codes": (geometries, c.code),
+        "material_codes": (materials, c.material_code),
+        "albedo": (c.material_code + 1, 3),
+        **{f"decoder_w.{i}": (c.code + 1, *sizes[i : i + 2]) for i in range(3)},
+        **{f"decoder_b.{i}": (c.code + 1, sizes[i + 1]) for i in range(3)},
+        "far": (c.features,),
+        "edge_slope": (),
+        "cell_lines": (TOKENS, c.features + c.state, rows),
+        "cell_gain": (TOKENS, rows),
+        "cell_bias": (TOKENS, rows),
+        "candidate": (TOKENS, c.features, c.state),
+        "bump": (TOKENS, c.state),
+        "read_slope": (),
+    }
+
+
+Floats = npt.NDArray[np.float64]
+STEEP = 1.05  # that of a true distance is 1
+NODE = 1 / 128  # leaf units: of the grid in the proof
+CELLS = 32  # along a side of [-RADIUS, RADIUS]
+RADII = 1 / 16, 1 / 8, 1 / 4  # leaf units
+SIDE = 2 * RADIUS / CELLS
+
+
+class Slopes:
+    """s by place and radius.
+
+    Args:
+        slack: s (radii, CELLS, CELLS) for `RADII`, rows from the least y up.
+        far: by how much faster f may change where points may lie beyond `RADIUS`, which are seen at its rim.
+    """
+
+    def __init__(self, slack: npt.NDArray[Any], far: float) -> None:
+        self.far, levels, radius = far, [*np.asarray(slack, np.float64)], RADII[-1]
+        while radius < 2 * RADIUS:  # half of the way from p, and the other half from its middle
+            levels.append(levels[-1] + around(levels[-1], int(np.ceil(radius / SIDE))))
+            radius *= 2
+        self._levels = np.stack([*levels, np.full_like(levels[0], np.inf)])
+        self._radii = RADII[0] * 2.0 ** np.arange(len(levels))
+
+    def rise(self, q: Floats, radius: Floats) -> Floats:
+        """By how much f at leaf coordinates (2, M) differs at most (M,) from f within radii (M,)."""
+        squared = radius * radius
+        length = np.sqrt(q[0] * q[0] + q[1] * q[1])
+        level = self._radii.searchsorted(radius) if radius.max() > RADII[0] else 0
+        seen = q * (RADIUS / SIDE / np.maximum(length, RADIUS)) + CELLS / 2
+        # beyond all numbers nothing is known
+        wild = ~(length < np.inf)
+        x, y = np.where(wild, 0.0, seen).astype(np.intp).clip(0, CELLS - 1)
+        slack = self._levels[level, y, x]
+        root = np.sqrt(squared + NODE**2)
+        rise: Floats = STEEP * root + slack + np.where(length + radius > RADIUS, self.far * root, 0.0)
+        return np.where(wild | (rise != rise), np.inf, rise)
+
+
+def around(values: Floats, rings: int) -> Floats:
+    """The largest of each cell and those in so many rings about it."""
+    for _ in range(rings):
+        edge = np.pad(values, 1)
+        rows = np.maximum(np.maximum(edge[:-2], edge[1:-1]), edge[2:])
+        values = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
+    return values

@@ -1,0 +1,364 @@
+"""The paper's renderers: a ConvLSTM over whole images, and a GRU by which each pixel reads the scene.
+
+Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 5.
+Fourier features after Tancik et al. 2020; gated recurrent unit after Cho et al. 2014.
+
+Letters: B scenes, N objects, P points, D = d_g + d_m numbers of an object, H = `hidden`, L = `octaves`.
+
+A pixel has a state. In a read, a GRU looks at each object from that state; the answers are pooled over the
+objects by their maximum, so that a read does not depend on their number or order; a second GRU makes the
+next state of the pooled answer. After the last read a linear layer gives the colour. Boolean operators
+depend on the order, so each object comes with its token and its place in the stream, which the paper's
+unions do not need.
+
+Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 4,
+and Table 3 of its supplement (filters of each resolution, progressive growing).
+
+Letters: B scenes, N objects, D = d_g + d_m numbers of an object, F filters of a level, R = resolution.
+
+An object's vectors pass through deconvolutions from 1 x 1 to R x R; the boolean token is joined to the
+feature map there; a convolutional LSTM (Shi et al. 2015) takes the maps one after the other; three 1 x 1
+convolutions turn its last hidden map into colours.
+
+`streaming` draws the whole canvas at once, at the one size it was trained for. `reading` answers samples,
+four a pixel as the language defines.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import interpolate, one_hot
+
+from scenelang.compiler.groups import OPERATOR
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.image import from_samples
+from scenelang.drawing.neural.draw import Drawing
+from scenelang.language.words import TOKENS
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingConfig:
+    """Sizes of the network.
+
+    Args:
+        vector: numbers D of an object.
+        hidden: entries H of both states.
+        reads: how often a pixel reads the scene.
+        octaves: frequencies L of the Fourier features, π to 2^(L - 1) π per world unit.
+    """
+
+    vector: int = 64
+    hidden: int = 128
+    reads: int = 8
+    octaves: int = 6
+
+
+def fourier_features(points: Tensor, octaves: int) -> Tensor:
+    """Points (…, 2) in world units to (…, 2 + 4 L): themselves, sines and cosines."""
+    octave = torch.arange(octaves, dtype=points.dtype, device=points.device)
+    angles = points[..., None] * (math.pi * 2.0**octave)  # (…, 2, L)
+    return torch.cat([points, angles.sin().flatten(-2), angles.cos().flatten(-2)], -1)
+
+
+class Reading(nn.Module):
+    """Parameters and forward pass of the reading renderer."""
+
+    def __init__(self, config: ReadingConfig) -> None:
+        super().__init__()
+        self.config = config
+        place = 2 + 4 * config.octaves
+        self.start = nn.Parameter(torch.zeros(config.hidden))
+        # The first GRU's input is linear in position and object, so the two are multiplied apart: a
+        # pixel's part once, an object's part once, instead of both for every pair.
+        self.look_place = nn.Linear(place, 3 * config.hidden)
+        self.look_object = nn.Linear(config.vector + len(TOKENS) + 1, 3 * config.hidden, bias=False)
+        self.look_state = nn.Linear(config.hidden, 3 * config.hidden)
+        self.next = nn.GRUCell(config.hidden, config.hidden)
+        self.head = nn.Linear(config.hidden, 3)
+
+    def forward(self, vectors: Tensor, tokens: Tensor, points: Tensor, count: Tensor | None = None) -> Tensor:
+        """Colours (B, P, 3) at points.
+
+        Args:
+            vectors: (B, N, D).
+            tokens: (B, N), int64.
+            points: (B, P, 2), world units.
+            count: (B,) objects in use; the others are not pooled.
+        """
+        b, n, _ = vectors.shape
+        order = torch.arange(n, device=vectors.device, dtype=vectors.dtype) / 4
+        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)
+        objects = torch.cat([vectors, marks, order.expand(b, n)[..., None]], -1)  # (B, N, D + 5)
+        seen = self.look_object(objects)  # (B, N, 3 H)
+        where = self.look_place(fourier_features(points, self.config.octaves))  # (B, P, 3 H)
+        unused = None
+        if count is not None:
+            unused = torch.arange(n, device=vectors.device) >= count[:, None]  # (B, N)
+        state = self.start.expand(b, points.shape[1], -1)  # (B, P, H)
+        for _ in range(self.config.reads):
+            state = self._read(state, where, seen, unused)
+        colour: Tensor = self.head(state)
+        return colour
+
+    def _read(self, state: Tensor, where: Tensor, seen: Tensor, unused: Tensor | None) -> Tensor:
+        """One read: every object from the state, the maximum over objects, the next state."""
+        from_state = self.look_state(state)  # (B, P, 3 H)
+        pooled = torch.full_like(state, -math.inf)
+        rs, zs, ns = from_state.chunk(3, -1)
+        for i in range(seen.shape[1]):
+            ri, zi, ni = (where + seen[:, i, None]).chunk(3, -1)
+            reset, keep = (ri + rs).sigmoid(), (zi + zs).sigmoid()
+            answer = torch.lerp((ni + reset * ns).tanh(), state, keep)  # (B, P, H)
+            if unused is not None:
+                answer = answer.masked_fill(unused[:, i, None, None], -math.inf)
+            pooled = torch.maximum(pooled, answer)
+        b, p, h = state.shape
+        after: Tensor = self.next(pooled.reshape(b * p, h), state.reshape(b * p, h))
+        return after.view(b, p, h)
+
+
+SMALLEST = 4  # pixels along a side at which growing starts
+# Table 3: filters at each resolution, 1 x 1 up to 512 x 512
+FILTERS = {2: 256, 4: 256, 8: 256, 16: 256, 32: 256, 64: 128, 128: 64, 256: 32, 512: 32}
+
+
+@dataclass(frozen=True, slots=True)
+class StreamingConfig:
+    """Sizes of the network.
+
+    Args:
+        vector: numbers D of an object.
+        resolution: pixels along a side, a power of two from 4 to 512.
+        width: share of the filters of Table 3; 1 is the paper's network.
+        most: filters of a level at most.
+    """
+
+    vector: int = 64
+    resolution: int = 32
+    width: float = 1.0
+    most: int = 256
+
+    def __post_init__(self) -> None:
+        if self.resolution not in FILTERS or self.resolution < SMALLEST:
+            raise ValueError(f"resolution {self.resolution} is not a power of two from {SMALLEST} to 512")
+        if not 0 < self.width <= 1:
+            raise ValueError(f"width {self.width} is not a share of the paper's")
+
+    def filters(self, resolution: int) -> int:
+        """Filters F of a level."""
+        return min(self.most, max(4, round(FILTERS[resolution] * self.width)))
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Resolutions of the deconvolutions' outputs, 2, 4, …, R."""
+        return tuple(2 ** (i + 1) for i in range(int(math.log2(self.resolution))))
+
+
+class ConvLSTM(nn.Module):
+    """A convolutional LSTM cell without peepholes: four 5 x 5 convolutions in one.
+
+    Args:
+        inputs: channels of an object's map, tokens among them.
+        filters: channels F of state and output.
+    """
+
+    def __init__(self, inputs: int, filters: int) -> None:
+        super().__init__()
+        self.filters = filters
+        self.gates = nn.Conv2d(inputs + filters, 4 * filters, 5, 1, 2)
+        with torch.no_grad():  # an open forget gate, so that early objects are not lost at the start
+            assert self.gates.bias is not None
+            self.gates.bias[filters : 2 * filters] = 1.0
+
+    def forward(self, x: Tensor, state: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        """One object: (B, inputs, R, R) and (hidden, cell), each (B, F, R, R), to the next pair."""
+        hidden, cell = state
+        gates = self.gates(torch.cat([x, hidden], 1)).to(cell.dtype)  # sums stay exact where maps are halves
+        i, f, o, g = gates.chunk(4, 1)  # each (B, F, R, R)
+        cell = f.sigmoid() * cell + i.sigmoid() * g.tanh()
+        return (o.sigmoid() * cell.tanh()).to(x.dtype), cell
+
+
+class Level(nn.Module):
+    """What belongs to one resolution: the LSTM cell and the pixel generator."""
+
+    def __init__(self, filters: int) -> None:
+        super().__init__()
+        self.cell = ConvLSTM(filters + len(TOKENS), filters)
+        self.pixels = nn.Sequential(
+            nn.Conv2d(filters, filters, 1),
+            nn.ReLU(),
+            nn.Conv2d(filters, filters, 1),
+            nn.ReLU(),
+            nn.Conv2d(filters, 3, 1),
+        )
+        last = self.pixels[-1]
+        assert isinstance(last, nn.Conv2d)
+        assert last.bias is not None
+        nn.init.ones_(last.bias)  # pictures are over white
+
+    def states(self, maps: Tensor, marks: Tensor, count: Tensor | None = None) -> list[Tensor]:
+        """Hidden maps (B, F, R, R) after each object of a stream.
+
+        Args:
+            maps: of the objects (B, N, F, R, R).
+            marks: tokens as one of four (B, N, 4).
+            count: as `Streaming.forward` takes it.
+        """
+        hidden = torch.zeros_like(maps[:, 0])
+        cell = torch.zeros_like(hidden, dtype=marks.dtype)
+        found = []
+        for i in range(maps.shape[1]):
+            mark = marks[:, i, :, None, None].to(maps.dtype).expand(-1, -1, *maps.shape[3:])
+            after = self.cell(torch.cat([maps[:, i], mark], 1), (hidden, cell))
+            if count is None:
+                hidden, cell = after
+            else:
+                used = (i < count)[:, None, None, None]
+                hidden, cell = (torch.where(used, a, b) for a, b in zip(after, (hidden, cell), strict=True))
+            found.append(hidden)
+        return found
+
+
+class Streaming(nn.Module):
+    """Parameters and forward pass of the streaming renderer.
+
+    Args:
+        grown: build the levels of growing too, from 4 x 4; else the last alone.
+    """
+
+    def __init__(self, config: StreamingConfig, *, grown: bool = False) -> None:
+        super().__init__()
+        self.config = config
+        sizes = [config.vector, *(config.filters(r) for r in config.levels)]
+        self.deconvolutions = nn.ModuleList(
+            nn.ConvTranspose2d(a, b, 4, 2, 1) for a, b in itertools.pairwise(sizes)
+        )
+        first = SMALLEST if grown else config.resolution
+        self.stages = nn.ModuleDict({str(r): Level(config.filters(r)) for r in config.levels if r >= first})
+
+    @torch.no_grad()
+    def enlarge(self, resolution: int) -> bool:
+        """Let a level of growing begin as the one below it, enlarged, instead of as noise.
+
+        The new deconvolution becomes a bilinear enlargement of each channel, and the new cell and pixel
+        generator copies of the old ones, if both levels have as many filters. Gives whether they have.
+        """
+        f, at = self.config.filters(resolution), int(math.log2(resolution)) - 1
+        if self.config.filters(resolution // 2) != f:
+            return False
+        deconvolution = self.deconvolutions[at]
+        assert isinstance(deconvolution, nn.ConvTranspose2d)
+        assert deconvolution.bias is not None
+        tent = torch.tensor([0.25, 0.75, 0.75, 0.25], device=deconvolution.weight.device)
+        same = torch.eye(f, device=tent.device)
+        deconvolution.weight.copy_(same[:, :, None, None] * torch.outer(tent, tent))
+        deconvolution.bias.zero_()
+        self.stages[str(resolution)].load_state_dict(self.stages[str(resolution // 2)].state_dict())
+        return True
+
+    def forward(
+        self,
+        vectors: Tensor,
+        tokens: Tensor,
+        count: Tensor | None = None,
+        *,
+        resolution: int | None = None,
+        blend: float = 1.0,
+    ) -> Tensor:
+        """Images (B, 3, R, R) of streams, row 0 at the top.
+
+        Args:
+            vectors: (B, N, D).
+            tokens: (B, N), int64.
+            count: (B,) objects in use; the state stays as it is for the padding after them.
+            resolution: draw at this level of growing instead of the last.
+            blend: share of this level's image; the rest is that of the level below, enlarged.
+        """
+        r = resolution or self.config.resolution
+        steps = int(math.log2(r))
+        b, n, _ = vectors.shape
+        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)  # (B, N, 4)
+        x = vectors.reshape(b * n, -1, 1, 1)
+        below = None
+        for deconvolution in self.deconvolutions[:steps]:
+            below, x = x, torch.relu(deconvolution(x))  # (B N, F, 2^k, 2^k)
+        new = self._level(r, x, marks, count)
+        if blend >= 1.0:
+            return new
+        assert below is not None
+        old = self._level(r // 2, below, marks, count)
+        return blend * new + (1 - blend) * interpolate(old, scale_factor=2, mode="nearest")
+
+    def _level(self, resolution: int, x: Tensor, marks: Tensor, count: Tensor | None) -> Tensor:
+        level = self.stages[str(resolution)]
+        assert isinstance(level, Level)
+        maps = x.view(*marks.shape[:2], *x.shape[1:])  # (B, N, F, R, R)
+        image: Tensor = level.pixels(level.states(maps, marks, count)[-1])
+        return image
+
+
+TILE = 1 << 13  # samples that `reading` answers at a time
+
+
+@torch.no_grad()
+def draw_whole(
+    network: Streaming | Reading, program: Program, *, progress: Callable[[float], None] | None = None
+) -> Drawing:
+    """Draw a Program's objects in stream order.
+
+    Raises:
+        ProgramError: the canvas or the background is one that the network was not trained for.
+    """
+    if program.background is None or min(program.background) < 1.0:
+        raise ProgramError("this model draws on white only")
+    if (program.tokens > OPERATOR).any():
+        raise ProgramError("this model draws no groups")
+    width, height = program.canvas
+    if not len(program):
+        return Drawing(from_samples(np.ones((height, width, 3), np.float32), None), 0, 0, 0)
+    device = next(network.parameters()).device
+    v = torch.from_numpy(program.vectors.copy())[None].to(device)
+    t = torch.from_numpy(program.tokens.astype(np.int64))[None].to(device)
+    if isinstance(network, Streaming):
+        side = network.config.resolution
+        if program.canvas != (side, side):
+            raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
+        found = network(v, t)[0].permute(1, 2, 0)
+        pairs = len(program) * side * side
+    else:
+        found = _sampled(network, v, t, width, height, progress)
+        pairs = len(program) * 4 * width * height
+    if progress is not None:
+        progress(1.0)
+    picture = found.clamp(0.0, 1.0).cpu().numpy()
+    return Drawing(from_samples(np.ascontiguousarray(picture), None), pairs, 0, width * height)
+
+
+def _sampled(
+    network: Reading, v: Tensor, t: Tensor, width: int, height: int, progress: Callable[[float], None] | None
+) -> Tensor:
+    """Means (H, W, 3) of the four samples of every pixel."""
+    px = 2 / min(width, height)  # world units
+    quarter = torch.tensor([-0.25, 0.25], dtype=torch.float64)
+    x = ((torch.arange(width, dtype=torch.float64)[:, None] + 0.5 + quarter - width / 2) * px).to(v)
+    y = ((height / 2 - 0.5 - torch.arange(height, dtype=torch.float64)[:, None] + quarter) * px).to(v)
+    rows = max(1, TILE // (4 * width))
+    parts = []
+    for top in range(0, height, rows):
+        band = y[top : top + rows]  # (rows, 2)
+        across, down = x[None, :, None, :], band[:, None, :, None]
+        grid = torch.stack([across + 0 * down, down + 0 * across], -1)  # (rows, W, 2, 2, 2)
+        shape = grid.shape[:2]
+        colours = network(v, t, grid.reshape(1, -1, 2))[0]
+        parts.append(colours.view(*shape, 4, 3).mean(2))
+        if progress is not None:
+            progress(min(1.0, (top + rows) / height))
+    return torch.cat(parts)

@@ -1,0 +1,650 @@
+"""Bounds, proved pixel by pixel, of how far a picture of the plane may differ from the exact one.
+
+They are of the chain as written, so that they cover what the passes make of it.
+
+The formulas are those of `drawing.exact.field`. The state is monotonic in both distances, so the ends of its
+interval come of theirs.
+
+`python -m lab.errors` proves it. Within `RADIUS` a cell of leaf coordinates says between which
+numbers learned less exact distance lies. Farther points are seen at the rim: a leaf lies in the unit disc,
+so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine of the
+largest angle between the ways from the origin and from a point of the disc.
+
+A region's distance to an object is the exact one at its centre, enclosed, give or take how far the region
+reaches in the leaf's own coordinates, as exact distances change by no more. Intervals through the exact fold
+say what it shows. Where that is one colour, all of its samples do. Elsewhere objects that are certain to
+change nothing are dropped, and the region's quarters are asked, down to single samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from math import hypot, inf, sqrt
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.chain import split_levels
+from scenelang.compiler.emit import tokens_of
+from scenelang.compiler.graph import Fold, Graph, Leaf, Look, Node
+from scenelang.compiler.groups import (
+    INTERSECT,
+    SMOOTH,
+    SUBTRACT,
+    UNION,
+    anchored,
+    felt,
+    read_groups,
+    widths_of,
+)
+from scenelang.compiler.lifting import lift_many
+from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
+from scenelang.compiler.spaces import ALIKE, PLANE
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
+from scenelang.drawing.arrays import NUMPY, Layers
+from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance
+from scenelang.drawing.image import PROVED, Image, Proof, from_samples
+from scenelang.drawing.neural.files import load_arrays, read_proof
+from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.neural.meetings import (
+    Index,
+    Mask,
+    Meetings,
+    Nesting,
+    Pairs,
+    Turn,
+    flat_nesting,
+    meetings_of,
+    nesting,
+    raster,
+)
+from scenelang.drawing.neural.network import RADIUS, FramedNetwork
+from scenelang.language.words import TOKENS
+
+TAME = 1e-9  # leaf units: what is allowed for in any case
+EPS = 32 * 2.0**-52  # of a number: what one step may lose of it
+
+
+class Written(NamedTuple):
+    """An object as written.
+
+    Args:
+        look: before it was folded.
+        steps: into the world, nearest the leaf first.
+    """
+
+    look: Look
+    steps: tuple[Step, ...]
+
+    def misplaced(self, reach: float, far: float) -> float:
+        """Leaf units by which points within a reach of the leaf, and ``far`` from the world's, may be off."""
+        return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
+
+    def discoloured(self, reach: float, far: float) -> float:
+        """Of a channel, by how much the colours of a texture may be off there."""
+        if self.look.element is None:
+            return 0.0
+        reach = min(reach, _seen(self.steps, far))
+        off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
+        off *= max(self.look.element.sizes)
+        for kind, *numbers in self.look.colours:
+            if kind == "hue":
+                off = 6 * (off + EPS * abs(numbers[0]))
+            else:  # shares clamp nothing and tear no colours apart
+                off *= 1 + 2 * max(0.0, max(numbers) - 1.0, -min(numbers))
+        return off
+
+
+def written(root: Fold) -> dict[int, Written]:
+    """All objects of a lowered graph, by number."""
+    found: dict[int, Written] = {}
+    todo: list[tuple[Node, tuple[Step, ...]]] = [(root, ())]
+    while todo:
+        node, outer = todo.pop()
+        steps = (*[move.step for move in node.moves], *outer)
+        if isinstance(node, Leaf):
+            found[node.number] = Written(node.look, steps)
+        else:
+            todo += [(link.node, steps) for link in node.links]
+    return found
+
+
+def _seen(steps: Sequence[Step], far: float) -> float:
+    """How long leaf coordinates are at most of points that are no longer than ``far`` in the world."""
+    size = np.full(2, far)
+    for step in reversed(steps):
+        if isinstance(step, Affine):
+            _, back, moved = _sizes(step)
+            size = back @ (size + moved)
+        else:
+            size[:] = np.hypot(*size)
+    return float(np.hypot(*size))
+
+
+def _misplaced(steps: Sequence[Step], far: float) -> float:
+    """How far float64 may put points, no longer than ``far`` in the leaf, from where they are there.
+
+    Everything is by coordinates, without signs: `size` of points behind the steps so far, `ways` how far they
+    move in the leaf as they move there, `forth` the reverse.
+    """
+    size, ways, forth, lost, run = np.full(2, far), np.eye(2), np.eye(2), np.full(2, EPS * far), IDENTITY
+    for step in steps:
+        if isinstance(step, Affine):
+            own, back, moved = _sizes(step)
+            size, ways, forth, run = own @ size + moved, ways @ back, own @ forth, compose(step.rows, run)
+            lost += EPS * (ways @ (own @ (back @ (size + moved)) + size + moved))
+        elif isinstance(step, Warp):
+            size[:] = np.hypot(*size)
+            ways = ways @ np.full((2, 2), 1.0 + size[0] * (abs(step.twirl) + hypot(*step.bend)))
+            if (unlike := _unlike(run)) is None:
+                run, unlike = IDENTITY, 0.0
+            lost += (EPS + unlike) * (ways @ size)
+    lost += EPS * (forth @ ways).max() * far  # of the composed map's inverse and its scale
+    return float(lost.max()) if np.isfinite(lost).all() else inf
+
+
+def _unlike(rows: Rows) -> float | None:
+    """What is lost of a point where a warp moves past a map that counts as similar, None where none does."""
+    a, b, _, x, c, d, _, y = rows[:8]
+    turned, mirrored = max(abs(a - d), abs(b + c)), max(abs(a + d), abs(b - c))
+    off = max(min(turned, mirrored), abs(x), abs(y)) / (sqrt(abs(a * d - b * c)) or 1.0)
+    return 4 * off if off < 2 * ALIKE else None
+
+
+def _sizes(step: Affine) -> tuple[Any, Any, Any]:
+    """A map of the plane, its inverse (2, 2) and its shift (2,), without signs."""
+    a, b, _, x, c, d, _, y = map(abs, step.rows[:8])
+    det = abs(step.rows[0] * step.rows[5] - step.rows[1] * step.rows[4])
+    return np.array([[a, b], [c, d]]), np.array([[d, b], [c, a]]) / det, np.array([x, y])
+
+
+Floats = npt.NDArray[np.float64]
+NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
+
+
+class Enclosure(NamedTuple):
+    """Numbers from ``low`` to ``high``."""
+
+    low: Floats
+    high: Floats
+
+
+class Enclosed(NamedTuple):
+    """What is certain of regions.
+
+    Args:
+        shown: channels (K, B).
+        left: (P,) objects that may change what is shown.
+    """
+
+    shown: Enclosure
+    left: Mask
+
+
+class Joins(NamedTuple):
+    """Ways in which P operands join.
+
+    Args:
+        tokens: operators.
+        widths: of their blends, 0 for sharp edges.
+        free: whether no blend follows: what is outside, and how deep inside the rest, is all one.
+    """
+
+    tokens: Index
+    widths: Floats
+    free: Mask
+
+    def some(self, which: slice | Index) -> Joins:
+        """Select some of them."""
+        return Joins(self.tokens[which], self.widths[which], self.free[which])
+
+
+def enclosed(
+    meetings: Meetings,
+    distance: Enclosure,
+    colour: Enclosure,
+    joins: Joins,
+    behind: Floats,
+    nest: Nesting | None = None,
+    groups: Joins | None = None,
+) -> Enclosed:
+    """Fold the enclosed distances of the objects that regions meet.
+
+    Args:
+        distance: world distances of the pairs (P,), wherever in the region.
+        colour: of the pairs (3, P).
+        joins: of the pairs.
+        behind: (K,) what is shown where nothing is: a background, or four zeros.
+        nest: of a stream with groups.
+        groups: how these join.
+    """
+    count, pairs = len(meetings.columns), len(joins.tokens)
+    shut, opened = np.empty((2, pairs), bool)
+    if nest is None:
+        nest = flat_nesting(meetings)
+    state = _State.empty(count * nest.levels)
+
+    def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
+        part = turn.part
+        own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
+        return state.join(places, *own, joins.some(part), turn.fresh)
+
+    def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
+        assert groups is not None
+        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(ended), bool))
+        state.clear(top)
+        return joined
+
+    nest.fold(count, shut, opened, pair, group)
+    (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)
+    if len(behind) > 3:
+        first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
+    back = behind[:, None]
+    shown = Enclosure(
+        np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
+        np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
+    )
+    return Enclosed(shown, ~shut)
+
+
+class _State(NamedTuple):
+    """Distances (B,) and colours (3, B) of a fold."""
+
+    distance: Enclosure
+    colour: Enclosure
+
+    @classmethod
+    def empty(cls, count: int) -> _State:
+        return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
+
+    def at(self, columns: Index | slice) -> tuple[Enclosure, Enclosure]:
+        """Return distances and colours in some columns."""
+        return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
+
+    def clear(self, columns: Index | slice) -> None:
+        """Empty it in some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = NOTHING, 0.0
+
+    def join(
+        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins, fresh: Mask
+    ) -> tuple[Mask, Mask]:
+        """Take in n operands, ``fresh`` ones as they are; which change nothing, which leave nothing else."""
+        (d, e), (token, k, free) = distance, how
+        a, b = self.distance.low[columns].copy(), self.distance.high[columns].copy()
+        union = token == UNION
+        # the object's share of the colour; of a union all or none
+        some = union & ((e < np.maximum(a, 0.0)) | (free & (a >= 0.0)))
+        most = union & (some | ((d < np.maximum(b, 0.0)) & ~(free & (d >= 0.0))))
+        shares: tuple[Floats, Floats] = some.astype(float), most.astype(float)
+        ends = np.minimum(a, d), np.minimum(b, e)
+        closed, wide = d >= np.where(free, 0.0, np.maximum(b, 0.0)), e < np.where(free, 0.0, a)
+        if (which := token == SMOOTH).any():
+            blend = _blend(a, e, k)[0], _blend(b, d, k)[0]
+            shares = _chosen(which, blend, shares)
+            ends = _chosen(which, (_blend(a, d, k)[1], _blend(b, e, k)[1]), ends)
+            closed, wide = _chosen(which, (blend[1] <= 0, blend[0] >= 1), (closed, wide))
+        for operator, (near, far) in ((SUBTRACT, (-e, -d)), (INTERSECT, (d, e))):
+            if (which := token == operator).any():
+                rounds = which & (k > 0)
+                ends = _chosen(which, (np.maximum(a, near), np.maximum(b, far)), ends)
+                closed = np.where(which, (far <= a) | (free & (far < 0.0)), closed)
+                if rounds.any():  # a smooth union turned inside out
+                    blends = -_blend(-a, -near, k)[1], -_blend(-b, -far, k)[1]
+                    ends = _chosen(rounds, blends, ends)
+                    closed = np.where(rounds, far + k <= a, closed)
+                wide &= ~which
+        if fresh.any():
+            ends, shares = _chosen(fresh, (d, e), ends), _chosen(fresh, (1.0, 1.0), shares)
+            closed, wide = closed & ~fresh, wide | fresh
+        self.distance.low[columns], self.distance.high[columns] = ends
+        for side, choose, own in zip(self.colour, (np.minimum, np.maximum), colour, strict=True):
+            now = side[:, columns]
+            more = own - now
+            side[:, columns] = now + choose(shares[0] * more, shares[1] * more)
+        return closed, wide
+
+
+def _chosen(which: Mask, new: tuple[Any, Any], old: tuple[Any, Any]) -> tuple[Any, Any]:
+    return np.where(which, new[0], old[0]), np.where(which, new[1], old[1])
+
+
+def blended(meetings: Meetings, rounds: Mask) -> Mask:
+    """After which pairs (P,) a blend follows in their region."""
+    found, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
+    for part in reversed(meetings.slots()):
+        n = part.stop - part.start
+        found[part] = seen[:n]
+        seen[:n] |= rounds[part]
+    return found
+
+
+def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
+    """The share of the object's colour, and the state behind a smooth union."""
+    k = np.where(k > 0, k, 1.0)  # of others, which do not ask
+    with np.errstate(over="ignore"):
+        h = np.clip(0.5 + 0.5 * (big - d) / k, 0.0, 1.0)
+    return h, big * (1 - h) + d * h - k * h * (1 - h)
+
+
+CELLS = 128  # along a side of [-RADIUS, RADIUS]
+PROVER = "shapes2d"
+"""The model whose distances are proved. It has every leaf of the plane; they tell of any model's pictures."""
+_SLOWEST = (1 - RADIUS**-2) ** 0.5
+_CHUNK = 2048  # points that go through a decoder at once
+
+
+class Errors:
+    """Learned less exact distance of a leaf.
+
+    Args:
+        layers: of the decoder, in float64.
+        low, high: bounds (CELLS, CELLS), leaf units, rows from the least y up.
+    """
+
+    def __init__(self, layers: Layers, low: npt.NDArray[Any], high: npt.NDArray[Any]) -> None:
+        self._layers = layers
+        self._low, self._high = (np.asarray(side, np.float64) for side in (low, high))
+
+    def exact(self, q: Floats) -> Enclosure:
+        """The exact distance (M,) at leaf coordinates (2, M), leaf units, by the learned one."""
+        length = np.sqrt(q[0] * q[0] + q[1] * q[1])
+        beyond = np.maximum(length - RADIUS, 0.0)
+        seen = q * (RADIUS / np.maximum(length, RADIUS))
+        parts = [seen[:, at : at + _CHUNK] for at in range(0, seen.shape[1], _CHUNK)]
+        learned = np.concatenate([NUMPY.perceptron(part, self._layers)[0] for part in parts])
+        x, y = ((seen + RADIUS) * (CELLS / (2 * RADIUS))).astype(np.intp).clip(0, CELLS - 1)
+        return Enclosure(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
+
+
+def errors_path(name: str) -> Path:
+    """Where the file of a shipped model lies."""
+    return model_folder(name) / "errors.safetensors"
+
+
+@lru_cache(maxsize=4)
+def load_errors(name: str = PROVER) -> dict[str, Errors]:
+    """By geometry; none where the file is missing or of other weights.
+
+    Raises:
+        ModelError: it is damaged.
+    """
+    network, digest = load_arrays(name)
+    assert isinstance(network, FramedNetwork)
+    names = load_manifest(name).geometries
+    shape = len(names), CELLS, CELLS
+    arrays = read_proof(errors_path(name), {"weights": digest}, {"low": shape, "high": shape})
+    if arrays is None:
+        return {}
+    rows = zip(names, arrays["low"], arrays["high"], strict=True)
+    return {name: Errors(layers_of(network, at), *ends) for at, (name, *ends) in enumerate(rows)}
+
+
+def layers_of(network: FramedNetwork, geometry: int) -> Layers:
+    """The decoder of a geometry in float64, so that every machine computes the same distances."""
+    one = np.append(network.codes[geometry].astype(np.float64), 1.0)
+    parts = [[part.astype(np.float64) for part in found] for found in (network.decoder_w, network.decoder_b)]
+    return [(np.tensordot(one, w, 1).T, one @ b) for w, b in zip(*parts, strict=True)]
+
+
+class Stream:
+    """N objects.
+
+    Args:
+        lowered: the scene as written.
+        graph: its stream of leaves.
+        manifest: of the model that it was compiled for.
+        known: of geometries, by their names.
+
+    Attributes:
+        frames: ways from the world to the leaves, in float64.
+        groups: of the stream.
+        joins, group_joins: how objects and groups join; a blend that is free of others is not known here.
+        rounds: (N,) which objects join by a blend, or begin a group that does.
+        reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
+            same, or both folds are so far outside of everything that the blends to come, each of which brings
+            them nearer by its width at most, leave them outside.
+        rounding: (N,) leaf units by which float64 may misplace points within reach, or the fold's distance.
+        unknown: geometries of which nothing is known but that they lie in the unit disc.
+    """
+
+    def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
+        rows = graph.rows()
+        self._leaves = [row.leaf for row in rows]
+        levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
+        self.frames = Frames(lift_many(levels, [(0.0,) * 4] * len(levels)))
+        self.groups = groups = read_groups(tokens_of(rows))
+        raw = np.array([TOKENS[row.op] for row in rows], np.intp)
+        widths = widths_of(raw, np.array([row.k for row in rows]))
+        seen = felt(groups, widths)
+        reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
+        objects, far = written(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
+        leaves = [objects[leaf.number] for leaf in self._leaves]
+        own = list(zip(leaves, reach.tolist(), strict=True))
+        self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])
+        self.rounding += EPS * widths.sum() / self.frames.scale
+        self.reach = reach + self.rounding
+        free = ~seen.inside & (seen.blends == 0)
+        self.rounds = widths > 0
+        self.joins = Joins(groups.tokens, np.where(groups.first, 0.0, widths), free)
+        first = groups.rows
+        # what follows a group follows its first row, and the group's own blend does
+        self.group_joins = Joins(groups.joins, widths[first], free[first])
+        names = [leaf.geometry for leaf in self._leaves]
+        self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
+        self.unknown = tuple(sorted(set(names) - self._known.keys()))
+        self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
+        self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
+        self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
+        self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
+
+    def crowd(self, canvas: tuple[int, int]) -> float:
+        """How many objects a place on the canvas is in reach of, in the mean."""
+        every, half = np.isinf(self.reach), np.array(canvas)[:, None] / min(canvas)
+        low, high = self.frames.boxes(np.where(every, 0.0, self.reach))
+        sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
+        return float((sides[0] * sides[1]).sum())
+
+    def distance(self, which: Index, q: Floats, exactly: bool) -> Enclosure:
+        """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
+
+        Args:
+            exactly: by the language's formulas, not by learned distances.
+        """
+        low, high = np.full(len(which), -NOTHING), np.full(len(which), NOTHING)
+        finite = np.isfinite(q).all(0)
+        for name, own in self._shapes.items():
+            some = np.flatnonzero(own[which] & finite)
+            if not len(some):
+                continue
+            p = q[:, some]
+            if name in self.unknown:
+                length = np.hypot(*p)
+                found = Enclosure(length - 1, length + 1)
+            elif exactly:
+                found = Enclosure(*[leaf_distance(name, p)] * 2)
+            else:
+                found = self._known[name].exact(p)
+            low[some], high[some] = found
+        return Enclosure(low, high)
+
+    def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
+        """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
+        low, high = self._plain[:, which], self._plain[:, which]
+        for at in np.unique(which[self._painted[which]]).tolist():
+            some, look = which == at, self._leaves[at].look
+            low[:, some], high[:, some] = 0.0, 1.0
+            if sampled:
+                seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
+                low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
+        return Enclosure(low, high)
+
+
+SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
+FLAT = 5e-4  # of a channel: a region that is known so well is not cut
+
+
+class Band:
+    """Some rows of pixels.
+
+    Args:
+        canvas: width and height, pixels.
+        behind: (K,) what is shown where nothing is.
+
+    Attributes:
+        shown: by pixels (rows, width, K).
+    """
+
+    def __init__(self, stream: Stream, canvas: tuple[int, int], rows: range, behind: Floats) -> None:
+        self._stream, self._behind, self._reach = stream, behind, stream.reach
+        width, height = canvas
+        self._grid = grid = raster(
+            (2 * width, 2 * height), range(2 * rows.start, 2 * rows.stop), largest=SIDES[0]
+        )
+        self._every = np.empty((2, grid.high // 2, grid.wide // 2, len(behind)))
+        self._every[:] = behind
+        self.shown = Enclosure(*self._every[:, : len(rows), :width])
+        pairs = grid.reached(stream.frames, self._reach)
+        for side in SIDES[:-1]:
+            columns, shown, pairs = self._looked(pairs, side)
+            known = (shown.high - shown.low).max(0) <= FLAT
+            self._write(columns[known], Enclosure(shown.low[:, known], shown.high[:, known]), side)
+            done = np.zeros(grid.wide * grid.high // side**2, bool)
+            done[columns[known]] = True
+            pairs = pairs.take(~done[pairs.block])
+            if side > 2:
+                pairs = pairs.split(grid.wide // side, 2)
+        self._pixels = pairs  # those that are told by their samples
+        self._sampled(exactly=False)
+
+    def draw(self, wanted: Mask) -> None:
+        """Ask for pixels (rows, width) by exact distances, among those that are told by their samples."""
+        every = np.zeros(self._every.shape[1:3], bool)
+        every[: wanted.shape[0], : wanted.shape[1]] = wanted
+        self._pixels = self._pixels.take(every.ravel()[self._pixels.block])
+        self._sampled(exactly=True)
+
+    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Enclosure, Pairs]:
+        """Regions, what they show (K, B), and the pairs that have to be asked again."""
+        stream, grid = self._stream, self._grid
+        place, half = np.stack(grid.place(pairs.block, side)), (side - 1) / 2
+        centre = np.array([[grid.left], [grid.top]]) + (place + half) * [[grid.px], [-grid.px]]
+        world = np.full(len(pairs), half * 2**0.5 * grid.px)
+        q, radius = stream.frames.blocks(pairs.object, centre, world)
+        radius = radius + stream.rounding[pairs.object]
+        some = np.flatnonzero(~(np.hypot(*q) - radius > self._reach[pairs.object]))
+        pairs = pairs.take(some)
+        meetings, source = meetings_of(pairs)
+        thing, some = meetings.pairs.object, some[source]
+        q, radius, scale = q[:, some], radius[some], stream.frames.scale[thing]
+        exact, colour = stream.distance(thing, q, exactly), stream.colour(thing, q, side == 1)
+        # what is not a number bounds nothing
+        low = np.fmax((exact.low - radius) * scale, -NOTHING)
+        world_distance = Enclosure(low, np.fmin((exact.high + radius) * scale, NOTHING))
+        joins, nest = stream.joins.some(thing), None
+        if stream.groups.deepest:
+            nest = nesting(meetings, stream.groups)
+        else:
+            joins = joins._replace(free=~blended(meetings, stream.rounds[thing]))
+        told = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
+        left = np.empty(len(pairs), bool)
+        left[source] = told.left
+        return meetings.columns, told.shown, pairs.take(left)
+
+    def _write(self, region: Index, shown: Enclosure, side: int) -> None:
+        x, y = self._grid.place(region, side)
+        for every, values in zip(self._every, shown, strict=True):
+            shape = self._grid.high // side, side // 2, -1, side // 2, len(self._behind)
+            every.reshape(shape)[y // side, :, x // side] = values.T[:, None, None]
+
+    def _sampled(self, *, exactly: bool) -> None:
+        """Ask for the samples of pixels that they have to tell, and take their means."""
+        wide = self._grid.wide // 2
+        columns, shown, _ = self._looked(self._pixels.split(wide, 2), 1, exactly)
+        x, y = self._grid.place(columns, 1)
+        for every, values in zip(self._every, shown, strict=True):
+            flat = every.reshape(-1, len(self._behind))
+            flat[self._pixels.block] = self._behind
+            np.add.at(flat, y // 2 * wide + x // 2, (values.T - self._behind) / 4)
+
+
+BAND = 1 << 17  # pixels at a time, at least a row of the largest regions
+CROWD = 32  # objects in reach of a place, above which fewer pixels are asked at a time
+ROUNDING = 2e-7  # of a channel: what is lost where pictures are kept in float32
+
+
+class ProofError(Exception):
+    """A picture of a kind of which nothing is proved."""
+
+
+def prove_image(
+    lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
+) -> tuple[Image, Proof]:
+    """Prove by how much each pixel of a picture, whoever drew it, differs from the exact one at most.
+
+    Args:
+        lowered: the scene as written.
+        graph: its stream of leaves.
+        manifest: of the model that it was compiled for.
+        image: (H, W, 3), or (H, W, 4) where the background is none.
+        redraw: draw again what is not proved right to `PROVED`: by what is known of it, and where that is not
+            enough by the exact distances.
+
+    Returns:
+        The picture and its proof.
+
+    Raises:
+        ProofError: the model is not of the plane, or learned more than distances; a file is missing.
+        ModelError: a file is damaged.
+    """
+    stream = Stream(lowered, graph, manifest, known_errors(manifest))
+    (width, height), behind = graph.canvas, np.zeros(4)
+    if graph.background is not None:
+        behind = np.asarray(graph.background, np.float64)
+    if image.shape != (height, width, len(behind)):
+        raise ProofError(f"a picture of {image.shape}, where the scene has {(height, width, len(behind))}")
+    picture = np.array(image, np.float64)
+    if clear := graph.background is None:
+        picture[..., :3] *= picture[..., 3:]
+    bound, redrawn = np.empty((height, width), np.float32), 0
+    rows = -(-max(1, int(BAND / width / (1 + stream.crowd(graph.canvas) / CROWD))) // SIDES[0]) * SIDES[0]
+    for top in range(0, height, rows):
+        part = range(top, min(top + rows, height))
+        band, drawn = Band(stream, graph.canvas, part, behind), picture[part.start : part.stop]
+        found = _off(drawn, band.shown)
+        if redraw and (bad := found > PROVED).any():
+            band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))
+            middle = (band.shown.low + band.shown.high) / 2
+            bad &= _off(middle, band.shown) <= PROVED  # what stays open stays as it was drawn
+            drawn[bad] = middle[bad]
+            found = _off(drawn, band.shown)
+            redrawn += int(bad.sum())
+        bound[part.start : part.stop] = found
+    if redrawn:
+        credit = image.credit
+        image = from_samples(picture[..., :3], picture[..., 3] if clear else None)
+        image.credit = credit
+    return image, Proof(bound, redrawn, stream.unknown)
+
+
+def _off(drawn: Floats, shown: Enclosure) -> Floats:
+    """How far pixels (H, W, K) may lie from what is shown, by their worst channels."""
+    far = np.maximum(shown.high - drawn, drawn - shown.low)
+    worst = far[..., 0]
+    for channel in range(1, far.shape[-1]):
+        worst = np.maximum(worst, far[..., channel])
+    return worst + ROUNDING
+
+
+def known_errors(manifest: Manifest) -> dict[str, Errors]:
+    """What is proved of the distances of geometries; raises as `prove_image`."""
+    if manifest.dimension != 2:
+        raise ProofError("pictures of solids are not proved, those of the plane are")
+    if manifest.lifting != "exact":
+        raise ProofError(f"pictures of `{manifest.name}` are not proved, as it learned where points lie too")
+    if not (known := load_errors()):
+        raise ProofError(f"no proof comes with these weights of `{PROVER}`")
+    return known

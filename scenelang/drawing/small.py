@@ -1,0 +1,215 @@
+"""Small pictures, drawn by numpy without waiting for torch to be imported.
+
+Numpy on one core draws as fast as torch on one core. Torch has more cores and devices, and takes one to two
+seconds to import; so a single picture is worth it from some amount of work on. That amount is counted from
+the Program and never measured while drawing: the same Program is always drawn by the same library.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal, NamedTuple, Unpack
+
+import numpy as np
+from PIL import Image as Pillow
+
+from scenelang.assets.element import Element, credit_of
+from scenelang.assets.picture import pixels
+from scenelang.assets.zoo import Zoo
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.compiler.weights import ModelError
+from scenelang.drawing.closed import field_of
+from scenelang.drawing.how import Care, Device, RenderError, Samples, keep_memory, threads_for
+from scenelang.drawing.image import Image
+from scenelang.drawing.neural.draw import Drawing, Kept, draw_objects
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
+
+PROBE: Final = 16
+"""Pixels along a side of a picture of as many pixels that solids are drawn in, to count evaluations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What a frame's time depends on.
+
+    Args:
+        objects: rows of the Program.
+        pixels: of the canvas.
+        meetings: pixels within objects' bounds, summed over objects; of solids, evaluations of the network.
+        outline: pixels around those bounds, summed likewise; of solids, evaluations for a pixel times pixels
+            of the canvas's shorter side, as outlines and shadows grow with both.
+    """
+
+    objects: int
+    pixels: int
+    meetings: float
+    outline: float
+
+    def row(self, skip: bool) -> tuple[float, float, float, float, float]:
+        """The terms of the sum; without skipping every object meets every pixel."""
+        meetings = self.meetings if skip else float(self.objects * self.pixels)
+        return 1.0, float(self.objects), float(self.pixels), meetings, self.outline
+
+
+def load_of(program: Program) -> Load:
+    """The load of a compiled scene: in the plane from its bounds, of solids from a very small picture.
+
+    How far rays go near solids, and how many of them meet the light, bounds do not tell.
+
+    Raises:
+        ModelError: the weights of a model of solids are missing.
+    """
+    width, height = program.canvas
+    if program.stage is not None:
+        scale = PROBE / (width * height) ** 0.5
+        small = replace(program, canvas=(max(1, round(width * scale)), max(1, round(height * scale))))
+        drawn = draw_objects(load_arrays(program.model, program.weights).network, small, samples="one")
+        each = drawn.pairs / drawn.met  # of a pixel
+        return Load(len(program), width * height, each * width * height, each * min(width, height))
+    unit = min(width, height) / 2  # pixels of a world unit
+    half = np.array([width, height], np.float64) / 2
+    corners = np.clip(program.bounds.astype(np.float64).reshape(-1, 2, 2) * unit, -half, half)
+    size = corners[:, 1] - corners[:, 0]  # (N, 2)
+    outline = np.minimum(2 * size.sum(1), 2 * half.sum())
+    return Load(len(program), width * height, float(size.prod(1).sum()), float(outline.sum()))
+
+
+MOST_MS: Final = 250.0
+"""Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""
+_NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
+"""Nanoseconds of a frame, an object, a pixel, a meeting and a pixel around bounds (`Load.row`).
+
+`python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
+"""
+_SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
+"""Of that, what other ways to sample take."""
+
+
+class Drawer(NamedTuple):
+    """Which library draws a picture, and the reason in words."""
+
+    library: Literal["numpy", "torch"]
+    why: str
+
+
+def choose_drawer(
+    program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
+) -> Drawer:
+    """Who draws a single picture: a function of the Program, and of where a caller wants it drawn.
+
+    Args:
+        device, samples: as of `How`.
+        exact: whether formulas take the network's place.
+
+    Raises:
+        RenderError: there is no such model.
+    """
+    if exact:
+        return Drawer("numpy", "formulas in the network's place")
+    if device != "auto":
+        return Drawer("torch", f"asked for by device {device}")
+    try:
+        renderer = load_manifest(program.model).renderer
+    except KeyError:
+        raise RenderError(f"unknown model `{program.model}`") from None
+    if renderer == "solid":
+        return Drawer("numpy", "solids are")
+    if renderer != "framed":
+        return Drawer("torch", f"a `{renderer}` network is large work for any picture")
+    ms = work_ms(program, samples)
+    numpy = ms <= MOST_MS
+    bound = "at most" if numpy else "more than"
+    return Drawer("numpy" if numpy else "torch", f"about {ms:,.0f} ms of work, {bound} {MOST_MS:.0f}")
+
+
+def work_ms(program: Program, samples: Samples = "adaptive") -> float:
+    """What drawing a Program takes on one core of the machine that was measured, in milliseconds."""
+    row = load_of(program).row(skip=True)
+    return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
+
+
+def draw_small(
+    program: Program,
+    *,
+    kept: Kept | None = None,
+    progress: Callable[[float], None] | None = None,
+    threads: int | None = None,
+    split: int | None = None,
+    exact: bool = False,
+    **care: Unpack[Care],
+) -> Drawing:
+    """Draw a Program by numpy, on one core, or solids, if they are large, on several.
+
+    Args:
+        program: of any size, for a model with a framed or a solids' network.
+        kept: the picture before this one, of which tiles that show the same are taken over.
+        threads, split: of solids, as for `scenelang.drawing.torch_backend.draw_program`.
+        exact: ask formulas in place of the network.
+        **care: ``samples``, as of `How`.
+
+    Raises:
+        RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
+            are no formulas for it.
+    """
+    keep_memory()
+    try:
+        network = field_of(program, exact)
+        if program.stage is None:
+            threads = split = 1
+        drawing = draw_objects(
+            network,
+            program,
+            threads=threads or threads_for(program.canvas),
+            split=split,
+            kept=kept,
+            progress=progress,
+            **care,
+        )
+    except (ModelError, ProgramError) as error:
+        raise RenderError(str(error)) from None
+    drawing.image.credit = credit_of(program.elements)
+    return drawing
+
+
+WIDEST: Final = 2048  # pixels of a sheet
+_TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
+
+
+def thumbnail(element: Element, side: int = 128, worn: Element | None = None) -> Image:
+    """An element alone on a square canvas (side, side, 3), one of space lit and turned a little.
+
+    A texture fills the canvas.
+
+    Args:
+        worn: colours of space that a geometry wears; without one a ball shows such.
+    """
+    if element.form == "picture":
+        colours = np.frombuffer(pixels(element), np.uint8).reshape(*element.sizes, 3)
+        small = Pillow.fromarray(colours).resize((side, side))
+        return (np.asarray(small, np.float32) / np.float32(255)).view(Image)
+    worn = element if element.material else worn
+    zoo = Elements.of("zoo", "zoo.safetensors", Zoo.of([element, *([worn] if worn else ())]))
+    solid = element.dimension == 3
+    moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)
+    look = Material("diffuse" if solid else "flat", (Color("#c96" if solid else "#222"),))
+    look = look if worn is None else Material(f"zoo.{worn.name}")
+    shown = Object("sphere" if element.material else f"zoo.{element.name}", moves, look)
+    return draw_small(compile_scene(Scene(elements=(zoo,), nodes=(shown,), canvas=(side, side)))).image
+
+
+def sheet(elements: Sequence[Element]) -> Image:
+    """Elements in rows of about as many, in order, on white; geometries wear the colours of their name."""
+    worn = {element.name: element for element in elements if element.form == "colours"}
+    elements = [element for element in elements if element.name not in worn or not element.material]
+    columns = math.ceil(math.sqrt(len(elements)))
+    rows, side = math.ceil(len(elements) / columns), min(256, WIDEST // columns)
+    picture = np.ones((rows * side, columns * side, 3), np.float32)
+    for at, element in enumerate(elements):
+        y, x = side * (at // columns), side * (at % columns)
+        picture[y : y + side, x : x + side] = thumbnail(element, side, worn.get(element.name))
+    return picture.view(Image)

@@ -1,0 +1,743 @@
+"""The solids' field: distances, gradients and colours of objects at points, folded along the stream.
+
+Points meet a part of the objects, so of groups too; what is not met has no effect. A group that begins where
+nothing has been met of what it stands in, and that what it is joined by would show, goes on in that state.
+
+Each object's frame (`frames.py`) carries points into its own space. There pairs of points and objects meet
+the network together, where the point is in the object's ball (`passes.py`); then the cell takes a point's
+objects in, one by one. Where groups of the stream are open it has a state for each (`stacks.py`), and what
+a group comes to is taken in as an object is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.assets.element import Element
+from scenelang.compiler.groups import (
+    OPERATOR,
+    SMOOTH,
+    SUBTRACT,
+    UNION,
+    Floats,
+    Groups,
+    read_groups,
+    widths_of,
+)
+from scenelang.compiler.lifting import Parts
+from scenelang.compiler.program import Paint
+from scenelang.drawing.arrays import Array, Arrays, Smooth
+from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.passes import (
+    BEGIN,
+    END,
+    INF,
+    OBJECT,
+    SLACK,
+    WAY,
+    Passes,
+    SolidFrame,
+    find_passes,
+    read_solids,
+)
+
+TAGS = np.array([[0.618034], [0.754878], [0.569840]])  # parts of whole numbers times these lie apart
+
+
+class Objects:
+    """A program's objects with their weights: their distances and colours, each alone.
+
+    Args:
+        network: trained parameters, on any device.
+        vectors: (N, 64) float32, geometry and material vectors.
+        tokens: (N,) as of a Program.
+        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
+        paints: likewise, None where a row has the colour of its vector.
+
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
+    """
+
+    def __init__(
+        self,
+        network: SolidNetwork,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        brought: Sequence[Element | None] | None = None,
+        paints: Sequence[Paint | None] | None = None,
+    ) -> None:
+        self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
+        none = [None] * len(vectors)
+        parts = network.layout.unpack(vectors)
+        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
+        with self.xp.inference():
+            self.solids = read_solids(network, vectors, self.tree, widths)
+            self._tables(parts)
+            self._cells(widths)
+            self._textures(parts.texture, paints or none)
+            self._decoders(parts.code, brought or none)
+            self._alone()
+        kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
+        self.draws = all(solid.draws for solid in self.solids)
+        """Whether all objects draw."""
+        self.adding = self._adding()
+        self.media = bool(kinds.any())
+        """Whether some object is a medium."""
+        self.mixed = self.media and not kinds.all()
+        """Whether not all are."""
+        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
+        """Whether media have different colours."""
+
+    def _adding(self) -> Array | None:
+        """Which objects (N,) of groups do not draw but take nothing away, 1 or 0; None without groups."""
+        groups = self.tree
+        if not groups.deepest:
+            return None
+        there, drawn = groups.path >= 0, np.array([solid.draws for solid in self.solids])
+        cuts = (there & (groups.joins[groups.path] == SUBTRACT)).sum(1) + (groups.tokens == SUBTRACT)
+        adding = there.any(1) & ~drawn & (cuts % 2 == 0)
+        return self.xp.array(adding.astype(np.float32), self.network.codes)
+
+    def _tables(self, parts: Parts) -> None:
+        """What pairs of points and objects look up: arrays (…, N)."""
+        xp, network = self.xp, self.network
+        frames, count = [solid.frame for solid in self.solids], len(self.solids)
+
+        def table(values: object, *shape: int) -> Array:
+            return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
+
+        self.scale, self.amount, self.frequency = (
+            table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
+        )
+        self.linear = xp.stack([f.outer.linear for f in frames], -1) if frames else table([], 3, 3)
+        self.shift = xp.stack([f.outer.shift for f in frames], -1) if frames else table([], 3)
+        self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
+        self.far = any(solid.radius > RADIUS for solid in self.solids)
+        self.bumpy = any(frame.amount for frame in frames)
+        look = network.look(xp.array(parts.material.copy(), network.codes)).T
+        colour = table(parts.rgb.T, 3) * look[:3]
+        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
+        """Of each object colour and medium (R, N); where some have textures, a plain colour between these."""
+
+    def _cells(self, widths: Floats) -> None:
+        """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
+        xp, network, groups = self.xp, self.network, self.tree
+        operators = np.concatenate([groups.tokens, groups.joins])
+        widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
+        smooth = xp.array((operators == SMOOTH).astype(np.float32), network.codes) > 0
+        self.smooth = smooth if SMOOTH in operators else None
+        keys = list(zip(operators.tolist(), widths.tolist(), strict=True))
+        self.alike = len(set(keys)) <= 1
+        known = {
+            (token, width): network.cut(token, width)
+            if token >= SUBTRACT and width
+            else network.cell(token, width or BLEND)
+            for token, width in dict.fromkeys(keys)
+        }
+        cells = [known[key] for key in (keys[:1] if self.alike else keys)] or [network.cell(UNION, BLEND)]
+        self.cells = [
+            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
+            for each in zip(*cells, strict=True)
+        ]
+
+    def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
+        """What objects wear in place of a colour.
+
+        In place of a texture's colours theirs is a plain one, unlike any other's, that tells where one
+        object ends and how the light falls.
+        """
+        xp, like = self.xp, self.network.codes
+        worn = {
+            i: Texture(xp, paint, frames[i], like, light=True)
+            for i, paint in enumerate(paints)
+            if paint is not None and self.solids[i].draws  # the others leave colours as they are
+        }
+        self.textures = list(worn.items())
+        """Those that draw, with their numbers."""
+        detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
+        self.detail = xp.array(np.array(detail, np.float32), like)
+        """Texels that a way of a world unit may cross; 0 without a texture."""
+        if worn:
+            tags = (0.4 + 0.6 * (TAGS * (np.arange(len(paints)) + 1) % 1.0)).astype(np.float32)
+            plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
+            self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
+
+    def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
+        """What tells distances, and which of them is each object's."""
+        xp, network = self.xp, self.network
+        keys = [
+            code.tobytes() if element is None else element
+            for code, element in zip(codes, brought, strict=True)
+        ]
+        # codes first, whose numbers are those of their segments
+        ordered = sorted(dict.fromkeys(keys), key=lambda key: isinstance(key, Element))
+        number = {key: at for at, key in enumerate(ordered)}
+        learned = [
+            xp.array(np.frombuffer(key, np.float32).copy(), network.codes)
+            for key in ordered
+            if isinstance(key, bytes)
+        ]
+        self.decoders: list[Smooth | GridShape] = [
+            *map(network.decoder, learned),
+            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
+        ]
+        self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
+        boxes = [
+            element_box(key) if isinstance(key, Element) else network.box(decoder)  # type: ignore[arg-type]
+            for key, decoder in zip(ordered, self.decoders, strict=True)
+        ]
+        self.solids = [
+            solid.within(xp, boxes[number[key]], network.codes)
+            for key, solid in zip(keys, self.solids, strict=True)
+        ]
+        plain = [
+            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
+            for element, s in zip(brought, self.solids, strict=True)
+        ]
+        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
+        """1 where `segments.py` may answer."""
+        self.answered = bool(self.asked.sum() > 0)
+        """Whether that is so of any."""
+        known = len(network.segment_w) and self.answered
+        self.segments = [network.segment(code) for code in learned] if known else []
+
+    def _alone(self) -> None:
+        """What holds where an object is the first that is met, or the only one."""
+        xp, like, solids = self.xp, self.network.codes, self.solids
+        reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
+        cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
+        self.first = self.network.alone(xp.array(reach, like), cell)
+        """What distances (N,) of objects that are met first are multiplied with; 0: the cell has to say."""
+        drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
+        self.open = bool(((self.first > 0) | (drawn == 0)).all())
+        """Whether that is so of no object that draws."""
+        self.factor = self.first * self.scale
+        """World units for a leaf unit of objects that are met alone."""
+        self.special = [
+            i
+            for i, s in enumerate(solids)
+            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount)
+        ]
+        """Objects to which more than a map leads, or that are displaced."""
+        self.groups = len(self.decoders) + len(self.special)
+        """Of objects that are met alone: those of each decoder, and each special one."""
+        group = 1 * self.decoder
+        for at, i in enumerate(self.special):
+            group[i] = len(self.decoders) + at
+        self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
+        """Of each object that draws its group, else -1."""
+
+    def worn(self, objects: Array, p: Array) -> Array:
+        """Colours (3, P) of objects, whatever else is at points p (3, P)."""
+        xp = self.xp
+        colours = xp.take(self.looks[:3], objects)
+        for i, texture in self.textures:
+            index = xp.where(objects == i)
+            if len(index):
+                frame = self.solids[i].frame
+                own = frame.outer(xp, xp.take(p, index))
+                xp.put(colours, index, texture.at(frame.local(xp, own)))
+        return colours
+
+    def normals(self, objects: Array, p: Array) -> Array:
+        """Gradients (3, P) of objects' own distances at points p (3, P)."""
+        gradient = self._distances(*self._local(self._behind(objects, p), objects), objects, True)[1]
+        assert gradient is not None
+        return gradient
+
+    def _behind(self, objects: Array, p: Array) -> Array:
+        """World points (3, P) behind the objects' maps."""
+        xp = self.xp
+        return (xp.take(self.linear, objects) * p).sum(1) + xp.take(self.shift, objects)
+
+    def _looks(self, q: Array, objects: Array) -> Array:
+        """Registers (R, P) of objects with their textures' colours at leaf coordinates (3, P)."""
+        xp = self.xp
+        looks = xp.take(self.looks, objects)
+        for i, texture in self.textures:
+            index = xp.where(objects == i)
+            if len(index):
+                xp.put(looks[:3], index, texture.at(xp.take(q, index)))
+        return looks
+
+    def _local(self, at: Array, objects: Array) -> tuple[Array, list[tuple[SolidFrame, Array, Array]]]:
+        """Leaf coordinates (3, P) of points (3, P) behind the objects' maps.
+
+        Of objects with more than a map, their frames, indices and points too.
+        """
+        xp, q = self.xp, at
+        own = []
+        for i, frame in self.turned:
+            index = xp.where(objects == i)
+            if len(index):
+                own.append((frame, index, xp.take(at, index)))
+        if own:
+            q = 1 * at
+            for frame, index, p in own:
+                xp.put(q, index, frame.local(xp, p))
+        return q, own
+
+    def _distances(
+        self, q: Array, own: list[tuple[SolidFrame, Array, Array]], objects: Array, gradient: bool
+    ) -> tuple[Array, Array | None]:
+        """World distances (P,) at leaf coordinates, as `_local` has them; gradients (3, P) if asked."""
+        xp = self.xp
+        length = rim = None
+        place = q
+        if self.far:
+            length = xp.sqrt((q * q).sum(0))
+            rim = RADIUS / length.clip(RADIUS)
+            place = q * rim
+        found = self._decoded(place, objects, gradient)
+        d, g = found[0], found[1:]
+        if length is not None and rim is not None:
+            d = d + (length - RADIUS).clip(0.0)
+            if gradient:
+                n = q / length.clip(1e-9)
+                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
+        if self.bumpy:
+            f, amount = xp.take(self.frequency, objects), xp.take(self.amount, objects)
+            s = xp.sin(f * q)
+            d = d + amount * (s[0] * s[1] * s[2])
+            if gradient:
+                c = xp.cos(f * q)
+                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
+                g = g + (amount * f) * more
+        scale = xp.take(self.scale, objects)
+        if not gradient:
+            return d * scale, None
+        for frame, index, p in own:
+            xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
+        return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
+
+    def decoded(self, at: Array, bounds: Sequence[int]) -> Array:
+        """Leaf distances (P,) at points (3, P) behind objects' maps, group by group, with bounds between."""
+        ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
+        ask += [partial(self._special, i) for i in self.special]
+        pieces = zip(ask, pairwise(bounds), strict=True)
+        parts = [told(at[:, a:b])[0] for told, (a, b) in pieces if a < b]
+        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
+
+    def _special(self, i: int, at: Array) -> Array:
+        """Leaf distances (1, P) of an object at points (3, P) behind its map."""
+        xp, frame = self.xp, self.solids[i].frame
+        q = frame.local(xp, at)
+        place, beyond = q, 0.0
+        if self.solids[i].radius > RADIUS:
+            length = xp.sqrt((q * q).sum(0))
+            place, beyond = q * (RADIUS / length.clip(RADIUS)), (length - RADIUS).clip(0.0)
+        d = self._field(place, self.decoders[int(self.decoder[i])], False) + beyond
+        if not frame.amount:
+            return d
+        s = xp.sin(frame.frequency * q)
+        return d + frame.amount * (s[0] * s[1] * s[2])
+
+    def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
+        """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
+        xp = self.xp
+        if len(self.decoders) == 1:
+            return self._field(q, self.decoders[0], gradient)
+        found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
+        for i, layers in enumerate(self.decoders):
+            index = xp.where(which == i)
+            if len(index):
+                xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
+        return found
+
+    def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
+        if isinstance(decoder, GridShape):
+            return decoder.field(q, gradient)
+        return self.network.field(q, decoder, gradient)
+
+
+class Closing(NamedTuple):
+    """States of groups that end, k of them.
+
+    Args:
+        inner: their entries (k,): the point's number and, for each state below it, the number of points.
+        outer: those of the states that take them in.
+        which: their numbers behind those of the objects.
+    """
+
+    inner: Array
+    outer: Array
+    which: Array
+
+
+class Stacks:
+    """The groups that are open at each object, as bits: the outermost is 1, one in that 2, and so on."""
+
+    def __init__(self, xp: Arrays, groups: Groups, like: Array) -> None:
+        def placed(values: np.ndarray) -> Array:
+            return xp.array(np.ascontiguousarray(values), like)
+
+        self._xp, self._groups, self._count = xp, groups.deepest, len(groups.tokens)
+        bits = 1 << np.arange(groups.deepest)
+        there = groups.path >= 0
+        self._path = placed(groups.path.T)  # (D, N)
+        self._open = placed(there @ bits)
+        self._cuts = placed((there & (groups.joins[groups.path] >= SUBTRACT)) @ bits)
+        self._ways = placed(np.unique(groups.path, axis=0, return_inverse=True)[1].reshape(-1))
+        self._states = placed(np.array([bin(i).count("1") for i in range(2 << groups.deepest)]))
+
+    def followed(
+        self, places: list[Array | None], rays: Array, objects: Array, every: Array
+    ) -> tuple[list[Array | None], list[list[Closing]], int]:
+        """Follow points through their objects.
+
+        Args:
+            places: as of `Pairs`, without states.
+            rays: numbers of their points (P,), place by place.
+            objects: numbers (P,).
+            every: numbers of all points (M,).
+
+        Returns:
+            Places with states, groups that end before each and behind the last, and how many states points
+            have at most.
+        """
+        xp, count = self._xp, len(every)
+        ways, begun = xp.take(self._ways, objects), 0 * every
+        met = count if places[0] is None else len(places[0])
+        xp.put(begun, rays[:met], ways[:met])
+        if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
+            return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
+        found: list[Array | None] = []
+        closings: list[list[Closing]] = []
+        stacks, paths = 0 * every, xp.take(self._path, 0 * every)
+        start, deepest = 0, 1
+        for place in places:
+            points = every if place is None else place
+            which = objects[start : start + len(points)]
+            stack, path, last = xp.take(stacks, points), xp.take(self._path, which), xp.take(paths, points)
+            opened = xp.take(self._open, which)
+            common, same = 0 * stack, points == points
+            for depth in range(self._groups):
+                same = same & (path[depth] == last[depth]) & (path[depth] >= 0)
+                common = common + same * (1 << depth)
+            # what begins in what is not empty, or cuts it, has a state of its own
+            begun = opened & ~common & (xp.take(self._cuts, which) | (common + 1) * (start > 0))
+            closing, stack = self._closed(points, stack, common, last, count)
+            stack = stack | begun
+            states = xp.take(self._states, stack)
+            deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
+            closings.append(closing)
+            found.append(place if place is None and not start else points + count * states)
+            xp.put(stacks, points, stack)
+            xp.put(paths, points, path)
+            start += len(points)
+        closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
+        if deepest > 1 and found[0] is None:
+            found[0] = every
+        return found, closings, deepest
+
+    def _closed(
+        self, points: Array, stack: Array, common: Array, path: Array, count: int
+    ) -> tuple[list[Closing], Array]:
+        """End the groups of stacks (k,) but for what they have in common with what follows."""
+        xp, found = self._xp, list[Closing]()
+        ending = stack & ~common
+        for depth in reversed(range(self._groups)):
+            bit = 1 << depth
+            some = xp.where((ending & bit) > 0)
+            if len(some):
+                inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
+                found.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                stack = stack - (ending & bit)
+        return found, stack
+
+
+NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
+
+
+class Meeting(NamedTuple):
+    """What the field answers at points (M,).
+
+    Args:
+        distance: D.
+        register: colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing.
+        gradient: of D (3, M), if asked for.
+        change: a bound on D and on how far another object's material may begin, if asked for.
+        owner: number of the object whose material holds, from 1, if asked for.
+        met: pairs of points and objects that met.
+    """
+
+    distance: Array
+    register: Array
+    gradient: Array = None
+    change: Array = None
+    owner: Array = None
+    met: int = 0
+
+
+class Pairs(NamedTuple):
+    """Points of M rays and the objects that they meet: P pairs.
+
+    Args:
+        places: the points (k,) that meet an object, those that meet a second, and so on; None where all do.
+            Of points in groups they are those of their states, as `Closing` has them.
+        rays: (P,), place by place.
+        objects: their numbers (P,).
+        at: where the rays begin behind the objects' maps (3, P).
+        way: how that changes along the rays (3, P).
+        closings: of the groups that end before each place, and behind the last.
+        depth: how many states a point has.
+    """
+
+    places: list[Array | None]
+    rays: Array
+    objects: Array
+    at: Array
+    way: Array
+    closings: list[list[Closing]]
+    depth: int = 1
+
+
+class Operand(NamedTuple):
+    """What states take in (k,): an object or a group, as of `Meeting`; `look` is a register (R, k or 1)."""
+
+    distance: Array
+    look: Array
+    gradient: Array
+    change: Array
+    owner: Array
+
+
+@dataclass(slots=True)
+class States:
+    """What states carry: distances and registers, and what else is asked for, as of `Meeting`.
+
+    Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
+    """
+
+    memory: Array
+    slope: Array
+    bound: Array
+    owner: Array
+
+    def parts(self) -> tuple[Array, ...]:
+        """All of it, None where it is not asked for."""
+        return self.memory, self.slope, self.bound, self.owner
+
+    def at(self, xp: Arrays, index: Array) -> States:
+        """Some of the entries."""
+        return States(*(part if part is None else xp.take(part, index) for part in self.parts()))
+
+
+class SolidField(Objects):
+    """A program's objects, ready to be met by points of rays."""
+
+    @cached_property
+    def _stacks(self) -> Stacks:
+        return Stacks(self.xp, self.tree, self.network.codes)
+
+    def passes(self, origin: Array, way: Array, limit: Array, tight: bool = True) -> tuple[Array, Passes]:
+        """As `find_passes`, of unit directions way (3, M)."""
+        origins = (self.linear * origin[:, None]).sum(1) + self.shift
+        return find_passes(self.xp, self.solids, origin, origins, way, limit, tight)
+
+    def meet(
+        self,
+        passes: Passes,
+        t: Array,
+        wanted: Wanted,
+        gradient: bool = False,
+        change: bool = False,
+        owners: bool = False,
+        p: Array | None = None,
+    ) -> Meeting:
+        """Let points of rays meet the objects.
+
+        Args:
+            passes: of the rays.
+            t: how far along each the point is (M,).
+            wanted: what of the register to answer beside the distance.
+            gradient, change, owners: what else; with owners the register says nothing.
+            p: the points themselves (3, M), where they are a little off the rays.
+        """
+        return self.answer(self.pairs(passes, t), t, wanted, gradient, change, owners, p)
+
+    def pairs(self, passes: Passes, t: Array) -> Pairs:
+        """Pairs of points at t (M,) and the objects in whose balls these are."""
+        xp, count = self.xp, len(t)
+        inside = self.inside(passes, t)
+        total = inside.sum(0)
+        before = total - inside.cumsum(0)  # a point's first object is in the last slot
+        every, most = xp.where(t == t), int(total.max()) if count else 0
+        flats, places = [], list[Array | None]()
+        if count and int(total.min()):
+            slots = xp.whole(inside * (before == 0) * xp.where(inside[:, 0] == inside[:, 0])[:, None])
+            flats, places = [slots.sum(0) * count + every], [None]
+        for turn in range(len(places), most):
+            flats.append(xp.where((inside & (before == turn)).reshape(-1)))
+            places.append(flats[-1] % count)
+        flat = xp.concat([every[:0], *flats], 0)
+        rays = xp.concat([every[:0], *(every if place is None else place for place in places)], 0)
+        pairs = xp.take(passes.slots[: WAY.stop].reshape(WAY.stop, -1), flat)
+        objects = xp.whole(pairs[OBJECT])
+        if not self.draws:
+            objects = xp.select(objects < 0, -1 - objects, objects)
+        found = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
+        if most < 2 or not self.tree.deepest:
+            return found
+        places, closings, depth = self._stacks.followed(places, rays, objects, every)
+        return found._replace(places=places, closings=closings, depth=depth)
+
+    def answer(
+        self,
+        pairs: Pairs,
+        t: Array,
+        wanted: Wanted,
+        gradient: bool = False,
+        change: bool = False,
+        owners: bool = False,
+        p: Array | None = None,
+    ) -> Meeting:
+        """As `meet`, of pairs whose rays have come to t (M,)."""
+        xp, count = self.xp, len(t)
+        places, rays, objects, at, way, closings, depth = pairs
+        size = depth * count
+        if p is None:
+            at = way * xp.take(t, rays) + at
+        else:
+            at = self._behind(objects, xp.take(p, rays))
+        q, own_points = self._local(at, objects)
+        d, own = self._distances(q, own_points, objects, gradient)
+        looks = self._looks(q, objects) if wanted == Wanted.ALL and self.textures else None
+        states = States(
+            memory=xp.full(((1, 2, 1 + len(self.looks))[wanted], size), 0.0, t),
+            slope=xp.full((3, size), 0.0, t) if gradient else None,
+            bound=xp.full((size,), EMPTY, t) if change else None,
+            owner=xp.full((size,), 0.0, t) if owners else None,
+        )
+        states.memory[0] = EMPTY
+        stop = 0
+        for index, ending in zip(places, closings, strict=False):
+            for closing in ending:
+                self._close(states, closing, wanted)
+            start, stop = stop, stop + (count if index is None else len(index))
+            pair = slice(start, stop)
+            which, near, look = objects[pair], d[pair], self.looks
+            if wanted:
+                look = xp.take(look, which) if looks is None else looks[:, pair]
+            slope = own if own is None else own[:, pair]
+            if not start and self.open and not owners:  # nothing has been met
+                after = xp.take(self.first, which) * near[None]
+                if wanted:
+                    after = xp.concat([after, look[1 - len(states.memory) :]], 0)
+                states.memory = _update(xp, states.memory, index, after)
+                if states.bound is not None:
+                    gap = xp.select(look[-1] > 0.5, abs(near), 0 * near + EMPTY)
+                    states.bound = _update(xp, states.bound, index, gap)
+                if states.slope is not None:
+                    states.slope = _update(xp, states.slope, index, xp.take(self.first, which) * slope)
+                continue
+            number = which + 1 + 0 * near if owners else None
+            self._join(states, index, Operand(near, look, slope, None, number), which, wanted)
+        for closing in closings[-1]:
+            self._close(states, closing, wanted)
+        memory, slope, bound, owner = (_first(part, count) for part in states.parts())
+        if bound is not None:
+            bound = xp.minimum(bound, abs(memory[0]))
+        return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
+
+    def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
+        """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
+        xp, (inner, index, which) = self.xp, closing
+        found = states.at(xp, inner)
+        d, look = found.memory[0].clip(-EMPTY, NOTHING), found.memory[1:]
+        xp.put(states.memory[:1], inner, 0 * found.memory[:1] + EMPTY)
+        if states.bound is not None:
+            xp.put(states.bound, inner, 0 * d + EMPTY)
+        operand = Operand(d, look, found.slope, found.bound, found.owner)
+        self._join(states, index, operand, which, wanted)
+
+    def _join(
+        self, states: States, index: Array | None, operand: Operand, which: Array, wanted: Wanted
+    ) -> None:
+        """Let states at an index take in operands by the cells of rows, or groups, `which`."""
+        xp, cell = self.xp, self.cells[wanted]
+        near, look = operand.distance, operand.look
+        if not self.alike:
+            cell = Cell(*(xp.take(weights, which) for weights in cell))
+        before = _part(xp, states.memory, index)
+        if states.owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
+            before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1
+        after, take = self.network.join(near, before, look, cell, wanted)
+        if states.owner is not None:
+            held = xp.select(after[-1] > 0.5, operand.owner, _part(xp, states.owner, index))
+            states.owner = _update(xp, states.owner, index, held)
+        if states.bound is not None:
+            gap = xp.minimum(_part(xp, states.bound, index), self._gap(near, before, look, which))
+            if operand.change is not None:
+                gap = xp.minimum(gap, operand.change)
+            states.bound = _update(xp, states.bound, index, gap)
+        if states.slope is not None:
+            by_own, by_past = self.network.partials(near, before[0], take, cell)
+            past = _part(xp, states.slope, index)
+            states.slope = _update(xp, states.slope, index, by_own * operand.gradient + by_past * past)
+        states.memory = _update(xp, states.memory, index, after)
+
+    def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
+        """How far (k,) objects with distances d (k,) leave the kind of material as it is."""
+        xp, gap = self.xp, abs(d)
+        if self.smooth is not None:
+            blend = xp.minimum(gap, abs(before[0] - d) / 2)
+            gap = xp.select(xp.take(self.smooth, which), blend, gap)
+        # objects of the kind that is there change nothing of it
+        return xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
+
+    def inside(self, passes: Passes, t: Array) -> Array:
+        """Which balls (K, M) points at t (M,) are in, of objects that change something there."""
+        inside = (passes.slots[BEGIN] <= t) & (t <= passes.slots[END])
+        if not self.draws:  # the others change only what is there
+            touched = inside[0] & ~inside[0]
+            for slot in reversed(range(len(inside))):
+                inside[slot] &= touched | (passes.slots[OBJECT, slot] >= 0)
+                touched = touched | inside[slot]
+        return inside
+
+    def colours(self, passes: Passes, t: Array, p: Array) -> Array:
+        """Colours (3, M) at points p in objects, as `meet` answers, sooner where it is one object alone."""
+        xp, inside = self.xp, self.inside(passes, t)
+        alone = inside.sum(0) == 1
+        one, several = xp.where(alone), xp.where(~alone)
+        found = xp.full((3, len(t)), 0.0, t)
+        if len(several):
+            there = passes.at(xp, several), xp.take(t, several), Wanted.ALL
+            xp.put(found, several, self.meet(*there, p=xp.take(p, several)).register[:3])
+        if len(one):
+            objects = xp.whole(xp.take((passes.slots[OBJECT] * inside).sum(0), one))
+            xp.put(found, one, self.worn(objects, xp.take(p, one)))
+        return found
+
+    def textured(self, passes: Passes) -> Array:
+        """Texels (M,) that rays may cross in a world unit, 0 where they pass no object with a texture."""
+        slots, xp = passes.slots, self.xp
+        objects = xp.whole(slots[OBJECT].clip(0))
+        detail = xp.take(self.detail, objects.reshape(-1)).reshape(objects.shape)
+        return (detail * (slots[OBJECT] >= 0) * (slots[BEGIN] < INF)).sum(0)
+
+
+def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:
+    """Entries (…, k) of an array (…, M), or all."""
+    return whole if index is None else xp.take(whole, index)
+
+
+def _first(whole: Array, count: int) -> Array:
+    """The first entries (…, M) of an array, or None."""
+    return whole if whole is None else whole[..., :count]
+
+
+def _update(xp: Arrays, whole: Array, index: Array | None, values: Array) -> Array:
+    """An array (…, M) with new values (…, k) at some places, or at every one."""
+    if index is None:
+        return values
+    xp.put(whole, index, values)
+    return whole

@@ -1,0 +1,461 @@
+"""Rays through the solids' field: the first surface, and the ways through media before it.
+
+The field bounds how far a surface or another kind of material is, and steps go as far (Hart 1996), plus up to
+a gap where the last two bounds let expect the next surface beyond: just behind that. What is thinner may be
+passed. Up to where it meets other objects, what a ray has to ask is prepared once; most rays meet one object
+alone and ask its decoder, with no cell between. Rays that are done leave the batch.
+
+A network has learned how long the half of a ray is in a leaf. It answers for rays that pass only media under
+affine maps, joined by unions and beyond the reach of blends, whose balls are apart; the others are marched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, field
+from operator import add
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.solid.field import Pairs, SolidField
+from scenelang.drawing.solid.network import Wanted, folded
+from scenelang.drawing.solid.passes import BEGIN, END, INF, OBJECT, RATE, WAY, Passes, placed
+
+TOUCH = 1e-5  # world units: so near counts as met
+STEPS = 800  # of all rays at most
+NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
+# rows of what a ray carries along: where it is and was, how far the surface was there; the objects that it
+# meets are the same up to a place, until which that falls at a pace; where it leaves the last; which group
+T, PAST, FREE, UNTIL, PACE, LAST, GROUP = range(7)
+# of rays that meet one object alone: where its map takes the ray's origin, how that changes, the scale
+FROM, ALONG, SCALE, STATE = slice(7, 10), slice(10, 13), 13, 14
+# where there are media: whether the object is one; whether the ray is in one, since where, how long before
+DENSE, WITHIN, SINCE, LENGTH, MISTY = range(14, 19)
+FULL = 0.7  # of rays that are asked at least so many are under way,
+FEW = 8  # but for these
+SMALL = 2000  # rays are too few for two batches
+WAIT = 4  # times as many are under way as wait to join them at most
+
+
+Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, length before it, each (P,)
+
+
+@dataclass(slots=True)
+class Trail:
+    """What M rays met.
+
+    Args:
+        hit: (M,) how far the first opaque surface is, inf where there is none.
+        length: (M,) world units in media before that or before the ray's end.
+        soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
+        place: (M,) of rays in `passes`, -1 where they pass none.
+        passes: the balls that those pass.
+        pieces: of the ways in media.
+        near, steps, met, lost: as of `Work`.
+    """
+
+    hit: Array
+    length: Array
+    soft: Array
+    place: Array
+    passes: Passes
+    pieces: list[Piece] = field(default_factory=list)
+    near: int = 0
+    steps: int = 0
+    met: int = 0
+    lost: int = 0
+
+    def at(self, xp: Arrays, index: Array) -> Passes:
+        """The balls that some of the rays pass."""
+        return self.passes.at(xp, xp.take(self.place, index))
+
+
+@dataclass(slots=True)
+class _Batch:
+    """Rays that are asked together.
+
+    Args:
+        place: numbers of their balls (n,).
+        rows: what they carry along (…, n).
+        alive: which are still under way (n,), as many as are `left`.
+        waiting: others that come in, with numbers of their balls, as many as `more` says.
+        bounds: of those that meet one object alone where each group begins, and the end.
+        pairs: of the others.
+    """
+
+    place: Array
+    rows: Array
+    alive: Array
+    left: int = 0
+    more: int = 0
+    waiting: list[tuple[Array, Array]] = field(default_factory=list)
+    bounds: list[int] = field(default_factory=list)
+    pairs: Pairs | None = None
+
+
+class Rays:
+    """Rays under way: those that meet one object alone, side by side by its group, and the others."""
+
+    def __init__(self, solids: SolidField, trail: Trail, ids: Array, passes: Passes, gap: float) -> None:
+        self.solids, self.xp, self.trail, self.gap = solids, solids.xp, trail, gap
+        self.ids, self.passes = ids, passes
+        self.never = self.xp.full((), INF, passes.slots)
+        self.wanted = Wanted.KIND if solids.mixed else Wanted.DISTANCE
+        self.struck: list[tuple[Array, Array, Array]] = []
+        self.ended: list[tuple[Array, Array]] = []  # in media, where something opaque is
+        rows = self.xp.full((MISTY if solids.media else STATE, len(ids)), 0.0, passes.slots)
+        rows[T] = rows[UNTIL] = -1.0  # before everything
+        rows[LAST] = self.xp.largest(passes.slots[END])[0]
+        self.between: list[tuple[Array, Array]] = []  # rays on their way from some objects to others
+        every = self.xp.where(rows[T] < 0)
+        self.batches = [_Batch(every[:0], rows[:, :0], every[:0] < 0) for _ in range(2)]
+        self._go_on(every, rows, passes)
+
+    def run(self, halvings: int, most: int = STEPS) -> None:
+        """Follow the rays to their ends, or for as many steps; what they have not met by then, they miss."""
+        xp = self.xp
+        for _ in range(most):
+            under_way = sum(batch.left + batch.more for batch in self.batches)
+            if _enough(sum(len(place) for place, _ in self.between), under_way):
+                places, rows = zip(*self.between, strict=True)
+                place, self.between = xp.concat(places, 0), []
+                self._go_on(place, xp.concat(rows, 1), self.passes.at(xp, place))
+            if under_way < SMALL:
+                self._join()
+            batch = max(self.batches, key=lambda batch: batch.left + batch.more)
+            if _enough(batch.more, batch.left) or batch.left < FULL * len(batch.alive) - FEW:
+                self._regroup(batch)
+            if batch.left:
+                self._step(batch)
+            elif not self.between:
+                break
+        else:
+            self.trail.lost = sum(batch.left + batch.more for batch in self.batches)
+        if self.struck:
+            places, rows, frees = zip(*self.struck, strict=True)
+            hit = self._root(xp.concat(rows, 1), xp.concat(frees, 0))
+            xp.put(self.trail.hit, xp.take(self.ids, xp.concat(places, 0)), hit)
+        if self.ended:
+            self._finish(halvings)
+
+    def _join(self) -> None:
+        """Let few rays that meet one object alone go along with as many or more that meet several."""
+        xp, (alone, others) = self.xp, self.batches
+        if 0 < alone.left + alone.more <= others.left + others.more:
+            index = xp.where(alone.alive)
+            others.waiting += [(xp.take(alone.place, index), xp.take(alone.rows, index)), *alone.waiting]
+            others.more += alone.left + alone.more
+            none = index[:0]
+            self.batches[0] = _Batch(none, alone.rows[:, :0], none < 0)
+
+    def _drawn(self, slots: Array, places: Array) -> Array:
+        """Places (K, k) of the objects that draw, inf for the others."""
+        if self.solids.draws:
+            return places
+        return self.xp.select(slots[OBJECT] < 0, self.never, places)
+
+    def _go_on(self, place: Array, rows: Array, passes: Passes) -> None:
+        """Rays come to where they meet other objects, or none; up to `UNTIL` they are sure to come."""
+        xp, solids = self.xp, self.solids
+        t, following = 1 * rows[T], rows[UNTIL]
+        begin, end = passes.slots[BEGIN], passes.slots[END]
+        at = xp.select(begin > t, begin, following)
+        if solids.media:  # the way through a medium ends with its ball
+            within = rows[WITHIN] > 0
+            at = xp.select(within & (end > t), xp.minimum(at, end), at)
+        rows[T] = xp.least(self._drawn(passes.slots, xp.select(at <= end, at, self.never)))
+        if solids.adding is not None:  # what a group leaves may begin where it meets more
+            objects = xp.whole(passes.slots[OBJECT])
+            objects = xp.select(objects < 0, -1 - objects, objects)
+            adds = xp.take(solids.adding, objects.reshape(-1)).reshape(begin.shape)
+            more = xp.select((adds > 0) & (begin > t), begin, self.never)
+            rows[T] = xp.minimum(rows[T], xp.least(more))
+        going = rows[T] < INF
+        if solids.media:
+            if not solids.draws:  # in a medium steps end where something may cut it
+                cuts = within & going & (passes.slots[OBJECT] < 0) & (begin > t)
+                rows[T] = xp.minimum(rows[T], xp.least(xp.select(cuts, begin, self.never)))
+            ended = xp.where(within & ~going)
+            if len(ended):
+                row = xp.take(rows, ended)
+                self._close(xp.take(self.ids, xp.take(place, ended)), row, xp.take(t, ended))
+        jumps = rows[T] > following
+        rows[PAST] = xp.select(jumps, rows[T] * NUDGE, t)
+        rows[FREE] = rows[FREE] * ~jumps
+        self._enter(passes, rows)
+        alone = rows[GROUP] < solids.groups
+        for batch, mask in zip(self.batches, (alone, ~alone), strict=True):
+            index = xp.where(mask & going)
+            if len(index):
+                index = xp.take(index, xp.order(xp.take(rows[GROUP], index)))
+                batch.waiting.append((xp.take(place, index), xp.take(rows, index)))
+                batch.more += len(index)
+
+    def _enter(self, passes: Passes, rows: Array) -> None:
+        """Note what rays meet from where they are on, up to where that changes."""
+        xp, solids, slots, t = self.xp, self.solids, passes.slots, rows[T]
+        begin, end = slots[BEGIN], slots[END]
+        rows[UNTIL] = xp.least(xp.select(begin > t, begin, xp.select(end < t, self.never, end)))
+        inside = xp.narrow(solids.inside(passes, t))
+        rows[PACE] = 1 / xp.largest(inside * slots[RATE])[0].clip(1e-3)
+        objects = xp.whole((inside * slots[OBJECT]).sum(0)).clip(0, len(solids.solids) - 1)
+        group = xp.take(solids.group, objects)
+        alone = (inside.sum(0) == 1) & (group >= 0)
+        rows[GROUP] = xp.select(alone, group, 0 * t + solids.groups)
+        rows[FROM], rows[ALONG] = xp.take(passes.origins, objects), (inside * slots[WAY]).sum(1)
+        rows[SCALE] = xp.take(solids.factor, objects)
+        if solids.media:
+            rows[DENSE] = xp.take(solids.looks[-1], objects)
+
+    def _regroup(self, batch: _Batch) -> None:
+        """Take out of a batch the rays that are done, and take in those that wait."""
+        xp, index = self.xp, self.xp.where(batch.alive)
+        places, parts = zip((batch.place, batch.rows), *batch.waiting, strict=True)
+        if len(index) == 0 and len(batch.waiting) == 1:
+            batch.place, batch.rows = batch.waiting[0]
+        else:
+            place, rows = xp.concat(places, 0), xp.concat(parts, 1)
+            if batch.waiting:
+                index = xp.concat([index, xp.where(place >= 0)[len(batch.place) :]], 0)
+                index = xp.take(index, xp.order(xp.take(rows[GROUP], index)))
+            batch.place, batch.rows = xp.take(place, index), xp.take(rows, index)
+        batch.waiting, batch.more = [], 0
+        batch.alive, batch.left = batch.place >= 0, len(batch.place)
+        if batch is not self.batches[0]:
+            batch.pairs = self.solids.pairs(self.passes.at(xp, batch.place), batch.rows[T])
+        else:
+            groups = np.asarray(xp.to_numpy(batch.rows[GROUP]))
+            batch.bounds = np.searchsorted(groups, np.arange(self.solids.groups + 1)).tolist()
+
+    def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
+        """Which points at t (n,) are inside media, which meet what is opaque, and how far that stays so."""
+        solids, rows = self.solids, batch.rows
+        self.trail.steps += len(t)
+        if batch.pairs is None:
+            self.trail.met += len(t)
+            d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
+            free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
+        else:
+            found = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
+            self.trail.met += found.met
+            d, free, dense = found.distance, abs(found.distance), None
+            if solids.mixed:
+                dense = found.register[0] > 0.5
+                free = self.xp.select((d < 0) & dense, found.change, free)
+        within = (d < 0) & batch.alive
+        if not solids.media:
+            return within & False, (d < TOUCH) & batch.alive, free
+        if dense is None:
+            return within, within & False, free
+        return within & dense, within & ~dense, free
+
+    def _step(self, batch: _Batch) -> None:
+        """Ask the field where rays are, note what they met, and move them on."""
+        xp, rows, alive = self.xp, batch.rows, batch.alive
+        t = 1 * rows[T]
+        within, done, free = self._ask(batch, t)
+        struck = self._pass_media(batch, within, done, free) if self.solids.media else xp.where(done)
+        if len(struck):
+            self.struck.append(
+                (xp.take(batch.place, struck), xp.take(rows[:UNTIL], struck), xp.take(free, struck))
+            )
+        safe = free * rows[PACE]
+        hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
+        following = t + xp.minimum(xp.maximum(hope, safe), safe + self.gap)
+        alive = alive & ~done
+        over = (following > rows[UNTIL]) & alive
+        lasting = rows[UNTIL] < rows[LAST]
+        if self.solids.media:
+            lasting = lasting | within
+            rows[WITHIN] = within
+        rows[PAST], rows[FREE], rows[T] = t, free, following
+        crossing = xp.where(over & lasting)
+        if len(crossing):
+            row = xp.take(rows, crossing)
+            row[UNTIL], row[T] = row[T], row[PAST]
+            self.between.append((xp.take(batch.place, crossing), row))
+        batch.alive = alive & ~over
+        batch.left = int(batch.alive.sum())
+
+    def _pass_media(self, batch: _Batch, within: Array, done: Array, free: Array) -> Array:
+        """Note where rays entered and left media; which (k,) struck something opaque from outside."""
+        xp, rows, before = self.xp, batch.rows, batch.rows[WITHIN] > 0
+        changed = xp.where(batch.alive & ((within != before) | done))
+        if not len(changed):
+            return changed
+        within, done, before = (xp.take(mask, changed) for mask in (within, done, before))
+        enter, leave, into = (
+            xp.take(changed, xp.where(mask))
+            for mask in (within & ~before, before & ~within & ~done, before & done)
+        )
+        if len(enter):
+            xp.put(rows[SINCE], enter, self._root(xp.take(rows[:UNTIL], enter), xp.take(free, enter)))
+        if len(leave):
+            row = xp.take(rows, leave)
+            length = self._close(
+                xp.take(self.ids, xp.take(batch.place, leave)), row, self._root(row, xp.take(free, leave))
+            )
+            xp.put(rows[LENGTH], leave, length)
+        if len(into):
+            self.ended.append((xp.take(batch.place, into), xp.take(rows, into)))
+        return xp.take(changed, xp.where(done & ~before))
+
+    def _finish(self, halvings: int) -> None:
+        """Find where media give way to something opaque: there the distance need not be 0."""
+        xp = self.xp
+        places, rows = zip(*self.ended, strict=True)
+        place, row = xp.concat(places, 0), xp.concat(rows, 1)
+        passes, ray = self.passes.at(xp, place), xp.take(self.ids, place)
+        low, high = row[PAST], row[T]
+        for _ in range(halvings):
+            half = (low + high) / 2
+            found = self.solids.meet(passes, half, self.wanted)
+            self.trail.met += found.met
+            still = (found.distance < 0) & (found.register[0] > 0.5)
+            low, high = xp.select(still, half, low), xp.select(still, high, half)
+        xp.put(self.trail.hit, ray, high)
+        xp.put(self.trail.soft, ray, high * 0 + 1)
+        self._close(ray, row, high)
+
+    def _root(self, rows: Array, free: Array) -> Array:
+        """Where between their last two points some rays met a surface, as far as both bounds tell."""
+        t, past, before = rows[T], rows[PAST], rows[FREE]
+        found = past + (t - past) * (before / (before + free).clip(1e-9))
+        return self.xp.maximum(found, t - self.gap)
+
+    def _close(self, ray: Array, rows: Array, end: Array) -> Array:
+        """End the ways through media of rays (k,) with such rows (STATE, k); lengths (k,) in media so far."""
+        xp, begin, before = self.xp, rows[SINCE], rows[LENGTH]
+        end = xp.maximum(end, begin)
+        self.trail.pieces.append((ray, begin, end, before))
+        total = before + end - begin
+        xp.put(self.trail.length, ray, total)
+        return total
+
+
+def _enough(waiting: int, under_way: int) -> bool:
+    """Whether so many rays should join those under way."""
+    return waiting > under_way / WAIT + FEW if under_way else waiting > 0
+
+
+def known(solids: SolidField, passes: Passes) -> Array:
+    """Which of M rays (M,) the network answers for."""
+    xp, begin, end = solids.xp, passes.slots[BEGIN], passes.slots[END]
+    objects = xp.whole(passes.slots[OBJECT]).clip(0)
+    asked = xp.take(solids.asked, objects.reshape(-1)).reshape(objects.shape)
+    # where the light is in a ball, both halves of the ray would have to be asked for
+    held = (asked > 0) & (begin > 0) & (passes.slots[OBJECT] >= 0)
+    fits = (held | (begin == INF)).sum(0) == len(begin)
+    for slot in range(1, len(begin)):
+        fits = fits & (((begin[slot] < end[:slot]) & (begin[:slot] < end[slot])).sum(0) == 0)
+    return fits
+
+
+def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
+    """World units that rays (M,) are in media, and how many objects they were asked of.
+
+    Args:
+        solids: the field.
+        passes: the balls of rays that are `known`.
+    """
+    xp, slots = solids.xp, passes.slots
+    flat = xp.where((slots[BEGIN] < INF).reshape(-1))
+    pairs = xp.take(slots.reshape(len(slots), -1), flat)
+    objects, way, end = xp.whole(pairs[OBJECT]), pairs[WAY], pairs[END]
+    speed = xp.sqrt((way * way).sum(0))
+    q = xp.take(passes.origins, objects) + way * end
+    found, which = 0 * end, xp.take(solids.decoder, objects)
+    for i, layers in enumerate(solids.segments):
+        some = xp.where(which == i)
+        if len(some):
+            x = folded(xp, xp.take(q, some), xp.take(way, some) / -xp.take(speed, some))
+            xp.put(found, some, solids.network.field(x, layers, False)[0])
+    found = xp.minimum(found.clip(0.0) / speed, end - pairs[BEGIN])
+    each = 0 * slots[OBJECT].reshape(-1)
+    xp.put(each, flat, found)
+    return each.reshape(slots.shape[1:]).sum(0), len(flat)
+
+
+HALVINGS = 16  # of the interval in which a medium gives way to a solid
+
+
+class Pace(NamedTuple):
+    """What is saved where solids are drawn, and what it costs.
+
+    Args:
+        gap: world units by which steps may go beyond what is certain; what is thinner may be passed.
+        nodes: points on a ray's way through a medium at which the light is asked for.
+        contrast: pixels that differ more from their neighbours, in sRGB, are sampled four times.
+    """
+
+    gap: float = 0.009
+    nodes: int = 3
+    contrast: float = 0.04
+
+
+CAREFUL = Pace()
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What drawing took.
+
+    Args:
+        rays: from the eye.
+        lights: rays from the light.
+        near: rays of both kinds that came near an object; the others took no step.
+        steps: points of space on them at which the field was asked.
+        met: (object, point) pairs that went through the network.
+        refined: pixels that were sampled four times.
+        lost: rays that took all the steps there are without coming to an end.
+    """
+
+    rays: int = 0
+    lights: int = 0
+    near: int = 0
+    steps: int = 0
+    met: int = 0
+    refined: int = 0
+    lost: int = 0
+
+    def __add__(self, other: Work) -> Work:
+        return Work(*map(add, astuple(self), astuple(other)))
+
+
+def march(
+    solids: SolidField,
+    origin: Array,
+    way: Array,
+    limit: Array,
+    halvings: int = HALVINGS,
+    gap: float = CAREFUL.gap,
+    whole: bool = False,
+    steps: int = STEPS,
+) -> Trail:
+    """Follow rays.
+
+    Args:
+        solids: the field.
+        origin: of all rays (3,).
+        way: unit directions (3, M).
+        limit: how far to go (M,).
+        halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
+        gap: as of `Pace`.
+        whole: whether nobody asks where media begin and end, so that `segments.py` may answer.
+        steps: of all rays at most.
+    """
+    xp = solids.xp
+    hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
+    ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
+    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
+    if whole and solids.segments and len(ids):
+        sure = known(solids, passes)
+        some, rest = xp.where(sure), xp.where(~sure)
+        if len(some):
+            answers, trail.met = lengths(solids, passes.at(xp, some))
+            xp.put(length, xp.take(ids, some), answers)
+        ids, passes = xp.take(ids, rest), passes.at(xp, rest)
+    if len(ids):
+        Rays(solids, trail, ids, passes, gap).run(halvings, steps)
+    return trail

@@ -1,0 +1,331 @@
+"""The solids' network, from top to bottom, for parameters of either library, and boxes around its leaves.
+
+Letters: N objects, M points, C = `code`, G = `width`, S = `segment`, L = `paint_lines`, K = `kind_lines`.
+Distances are in world units, leaf coordinates in leaf units, points lie last, as in `network.py`, whose two
+learned parts are these too:
+
+1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code.
+   Light shows normals, so its units are smooth: SiLU (Elfwing et al. 2018).
+2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
+   by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
+
+A third answers for whole segments (`segments.py`): how long the half of a ray is in a leaf.
+
+The first two say how their answers change with what they are asked, written by hand: a surface's normal is
+the gradient of the distance behind the last object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import lru_cache
+from itertools import product
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from scenelang.assets.element import Element
+from scenelang.assets.pyramid import unpacked
+from scenelang.compiler.groups import SMOOTH, SUBTRACT
+from scenelang.compiler.lifting import SOLID_LAYOUT, Layout
+from scenelang.drawing.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
+from scenelang.drawing.neural.network import TOKENS
+
+LEVELS = 7  # of halvings of the cube's cells
+STEEPEST = 1.1  # change of a distance over a way of 1 at most; the march trusts in 1
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)), np.float32).T[:, None]  # (3, 1, 8)
+
+
+@lru_cache(maxsize=64)
+def decoder_box(shapes: tuple[tuple[int, ...], ...], numbers: bytes) -> np.ndarray:
+    """The box (2, 3) of a decoder with weights and biases of such shapes, one after the other."""
+    ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)])
+    flat = np.frombuffer(numbers, np.float32)
+    parts = [flat[a:b].reshape(shape) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)]
+    layers = Smooth(zip(parts[::2], parts[1::2], strict=True))
+    return surrounding(lambda q: NUMPY.smooth(q, layers)[0])
+
+
+@lru_cache(maxsize=8)
+def element_box(element: Element) -> np.ndarray:
+    """The box (2, 3) of the cells of an element's grid with something inside."""
+    inside = unpacked(element) <= 0
+    sides, box = len(inside) - 1, []
+    for axis in range(3):
+        filled = np.flatnonzero(inside.any(tuple(other for other in range(3) if other != axis)))
+        box.append([filled[0] - 1, filled[-1] + 1] if len(filled) else [0, sides])
+    return np.asarray(np.array(box, np.float32).T.clip(0, sides) * (2 / sides) - 1)
+
+
+def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """The least and the greatest coordinates (2, 3) of what lies in [-1, 1]^3, at most 0.03 too far out.
+
+    Cells are halved where something may lie in them that is not in the box of points that are known to be
+    inside.
+
+    Args:
+        distance: of points (3, M), (M,); it changes by at most `STEEPEST` over a way of 1.
+    """
+    centre, half = np.zeros((3, 1), np.float32), 1.0
+    low, high = np.full((3, 1), np.inf, np.float32), np.full((3, 1), -np.inf, np.float32)
+    for _ in range(LEVELS):
+        half /= 2
+        centre = (centre[:, :, None] + half * CORNERS).reshape(3, -1)
+        found = distance(centre)
+        inside = centre[:, found <= 0]
+        low = np.minimum(low, inside.min(1, keepdims=True, initial=np.inf))
+        high = np.maximum(high, inside.max(1, keepdims=True, initial=-np.inf))
+        wider = ((centre - half < low) | (centre + half > high)).any(0)
+        centre = centre[:, wider & (found <= STEEPEST * half * 3**0.5)]
+    low = np.minimum(low, (centre - half).min(1, keepdims=True, initial=np.inf))
+    high = np.maximum(high, (centre + half).max(1, keepdims=True, initial=-np.inf))
+    return np.concatenate([low, high], 1).T
+
+
+EMPTY = 100.0  # world units: the distance where nothing has been met
+RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
+BLEND = 0.15  # world units: the width of the blends that the cell is trained on
+SEGMENT = 5  # numbers that tell a ray in a leaf, see `folded`
+
+
+@dataclass(frozen=True, slots=True)
+class SolidConfig:
+    """Sizes of the network.
+
+    Args:
+        code, material_code: entries of the codes.
+        width: hidden units of the decoder's two layers.
+        paint_lines, kind_lines: lines of which the highest opens the gate of colour and that of medium.
+        segment: hidden units of the two layers that answer for whole segments; 0: there are none.
+    """
+
+    code: int = 4
+    material_code: int = 2
+    width: int = 8
+    paint_lines: int = 2
+    kind_lines: int = 2
+    segment: int = 0
+
+
+class Cell(NamedTuple):
+    """Weights of the cell for a token and a width of blends, or (…, M) for those of each point."""
+
+    own: Array  # (1 + L + K, 1): levels of the gates from the object's distance
+    past: Array  # (1 + L + K, 1): and from the distance so far
+    bias: Array  # (1 + L + K, 1)
+    candidate: Array  # (1, 1): what an open gate makes of the object's distance
+    bump: Array  # (1, 1): by how much a half-open gate lowers the distance, times four
+
+
+class Wanted(IntEnum):
+    """What is asked of the cell."""
+
+    DISTANCE = 0
+    KIND = 1  # and whether it is a medium
+    ALL = 2  # and the colour
+
+
+class SolidNetwork:
+    """The formulas of the network, over parameters of either library."""
+
+    config: SolidConfig
+    layout: Layout = SOLID_LAYOUT
+    xp: ClassVar[Arrays]
+    codes: Any  # (geometries, C)
+    material_codes: Any  # (materials, material_code)
+    albedo: Any  # (material_code + 1, 4): colour and medium
+    decoder_w: Any  # (C + 1, 3, G), (C + 1, G, G), (C + 1, G, 1)
+    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, 1)
+    segment_w: Any  # (C + 1, 5, S), (C + 1, S, S), (C + 1, S, 1), or none
+    segment_b: Any  # (C + 1, S), (C + 1, S), (C + 1, 1), or none
+    cell_lines: Any  # (TOKENS, 2, 1 + L + K)
+    cell_gain: Any  # (TOKENS, 1 + L + K): a logarithm
+    cell_bias: Any  # (TOKENS, 1 + L + K)
+    candidate: Any  # (TOKENS,)
+    bump: Any  # (TOKENS,)
+
+    def decoder(self, code: Array) -> Smooth:
+        """The decoder of a code (C,): each weight is linear in (code, 1)."""
+        return self._layers(code, self.decoder_w, self.decoder_b)
+
+    def segment(self, code: Array) -> Smooth:
+        """What answers for whole segments of a code (C,), likewise; nothing where the network has none."""
+        return self._layers(code, self.segment_w, self.segment_b)
+
+    def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
+        one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
+        return Smooth(
+            (self.xp.packed((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1)), one @ b)
+            for w, b in zip(weights, biases, strict=True)
+        )
+
+    def cell(self, token: int, width: float) -> tuple[Cell, ...]:
+        """The cell of a token for blends of a width, with the gates of each of `Wanted`.
+
+        The fold of s d and s D is s D', so that the cell's own width is that of any other.
+        """
+        paint, scale = self.config.paint_lines, BLEND / width
+        gain = self.xp.exp(self.cell_gain[token])[:, None]
+        own, past = (line[:, None] * (gain * scale) for line in self.cell_lines[token])
+        bias, bump = self.cell_bias[token][:, None], self.bump[token] / (gain[:1] * scale)
+        kept = [[0], [0, *range(1 + paint, len(bias))], [*range(len(bias))]]
+        candidate = self.candidate[token].reshape(1, 1)
+        return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
+
+    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
+        """As `cell`, of a cut with an edge that is rounded over a width: a blend turned inside out.
+
+        What is left by `subtract` is -smooth(-D, d), by `intersect` -smooth(-D, -d).
+        """
+        blend, concat = self.cell(SMOOTH, width)[Wanted.DISTANCE], self.xp.concat
+        side = -1.0 if token == SUBTRACT else 1.0
+        edge = Cell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
+        return tuple(
+            edge._replace(
+                own=concat([edge.own, sharp.own[1:]], 0),
+                past=concat([edge.past, sharp.past[1:]], 0),
+                bias=concat([edge.bias, sharp.bias[1:]], 0),
+            )
+            for sharp in self.cell(token, BLEND)
+        )
+
+    def look(self, material_code: Array) -> Array:
+        """Colour and medium (…, 4) of material codes (…, material_code)."""
+        return material_code @ self.albedo[:-1] + self.albedo[-1]
+
+    def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
+        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M).
+
+        Of rays (5, M), as `folded` tells them, and a segment's layers: their lengths (1, M).
+        """
+        if not gradient:
+            return self.xp.smooth(q, layers)
+        parts = [q[:, i : i + SMOOTH_BLOCK] for i in range(0, q.shape[1], SMOOTH_BLOCK)]
+        return self.xp.concat([self._slopes(part, layers) for part in parts or [q]], 1)
+
+    def box(self, layers: Smooth) -> np.ndarray:
+        """The least and the greatest leaf coordinates (2, 3) of what a decoder shows."""
+        parts = [np.asarray(self.xp.to_numpy(part)) for layer in layers for part in layer]
+        return decoder_box(tuple(part.shape for part in parts), b"".join(part.tobytes() for part in parts))
+
+    def _slopes(self, q: Array, layers: Smooth) -> Array:
+        """Distances and gradients (4, M), which go back through the layers."""
+        xp, kept = self.xp, []
+        for w, b in layers[:-1]:
+            a = xp.dense(q, w, b)
+            s = xp.sigmoid(a)
+            q = a * s
+            kept.append(s * (1 + a - q))  # the derivative of a s
+        w, b = layers[-1]
+        value, g = xp.dense(q, w, b), w.T
+        for slope, (w, _) in zip(reversed(kept), reversed(layers[:-1]), strict=True):
+            g = w.T @ (slope * g)
+        return xp.concat([value, g], 0)
+
+    def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
+        """One object: the cell.
+
+        Args:
+            d: the object's distance (M,).
+            memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
+                (1 + R, M) with colours before it.
+            look: the object's own register (R, 1), or (R, M).
+            cell: of the object's token.
+            wanted: what the memory holds.
+
+        Returns:
+            The memory behind the object, and how far the distance's gate is open (M,).
+        """
+        xp, state = self.xp, memory[:1]
+        gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
+        take = gates[:1]
+        keep = 1 - take
+        new = take * (d * cell.candidate - keep * cell.bump) + keep * state
+        take = take[0]
+        if wanted == Wanted.DISTANCE:
+            return new, take
+        if wanted == Wanted.KIND:
+            kind = xp.largest(gates[1:])
+            return xp.concat([new, memory[1:] + kind * (look[-1:] - memory[1:])], 0), take
+        n = 1 + self.config.paint_lines
+        paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
+        gate = xp.concat([paint] * (len(memory) - 2) + [kind], 0)
+        return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
+
+    def alone(self, reach: Array, cell: Cell) -> Array:
+        """What distances (N,) of up to a reach (N,) are multiplied with where nothing has been met.
+
+        0 where a gate may not be open there.
+
+        Args:
+            reach: world units.
+            cell: of the objects' tokens, as for `Wanted.ALL`.
+        """
+        least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
+        gates = (least[:1], least[1:n], least[n:])
+        return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
+
+    def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
+        """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
+        candidate, bump = cell.candidate[0], cell.bump[0]
+        rate = d * candidate - state - (1 - 2 * take) * bump
+        rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)
+        return take * candidate + rate * cell.own[0], 1 - take + rate * cell.past[0]
+
+
+class SolidArrays(SolidNetwork):
+    """A trained network as numpy arrays, by the names of `solid_shapes`."""
+
+    xp = NUMPY
+
+    def __init__(self, config: SolidConfig, arrays: Mapping[str, np.ndarray]) -> None:
+        self.config = config
+        self.segment_w: list[np.ndarray] = []
+        self.segment_b: list[np.ndarray] = []
+        for name, value in arrays.items():
+            group, _, index = name.partition(".")
+            setattr(self, group, [*getattr(self, group, ()), value] if index else value)
+
+
+def solid_shapes(c: SolidConfig, geometries: int, materials: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of a network's parameters in a file, by name."""
+    rows = 1 + c.paint_lines + c.kind_lines
+    return {
+        "codes": (geometries, c.code),
+        "material_codes": (materials, c.material_code),
+        "albedo": (c.material_code + 1, 4),
+        **_layer_shapes("decoder", c.code, 3, c.width),
+        "cell_lines": (TOKENS, 2, rows),
+        "cell_gain": (TOKENS, rows),
+        "cell_bias": (TOKENS, rows),
+        "candidate": (TOKENS,),
+        "bump": (TOKENS,),
+        **(_layer_shapes("segment", c.code, SEGMENT, c.segment) if c.segment else {}),
+    }
+
+
+def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tuple[int, ...]]:
+    sizes = [inputs, width, width, 1]
+    weights = {f"{name}_w.{i}": (code + 1, *sizes[i : i + 2]) for i in range(3)}
+    return {**weights, **{f"{name}_b.{i}": (code + 1, sizes[i + 1]) for i in range(3)}}
+
+
+def folded(xp: Arrays, q: Array, way: Array) -> Array:
+    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and the mirrors, which change no leaf.
+
+    Args:
+        xp: functions of the arrays' library.
+        q: points (3, M).
+        way: unit directions (3, M).
+
+    Returns:
+        Distances of the points from the axis and from the plane across it; how fast the ray goes away from
+        the axis, about it, and away from the plane.
+    """
+    rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
+    a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)
+    up = xp.select(q[1] < 0, 0 * rho - 1, 0 * rho + 1)
+    parts = (rho, up * q[1], a * way[0] + c * way[2], abs(a * way[2] - c * way[0]), up * way[1])
+    return xp.stack(parts, 0)

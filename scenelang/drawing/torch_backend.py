@@ -1,0 +1,163 @@
+"""Programs drawn by torch: the device, the models that are loaded, and the process's threads and memory.
+
+Tiles are drawn in a pool of threads with one torch thread each; torch's own threads wait for each other
+after every small product, and beside another busy process took up to thirty times as long.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Unpack
+
+from scenelang.assets.element import credit_of
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.compiler.weights import replaced
+from scenelang.drawing.how import Care, RenderError, keep_memory, threads_for
+from scenelang.drawing.how import usable_cores as usable_cores
+from scenelang.drawing.neural.draw import Drawing, Kept, draw_objects
+from scenelang.drawing.neural.load import Model, ModelError, Network, load_model, place_of
+from scenelang.drawing.neural.paper import draw_whole
+from scenelang.drawing.neural.torch_networks import Framed, Solids
+
+try:
+    import torch
+except ModuleNotFoundError as error:
+    raise RenderError("this is drawn by torch, which is not installed; pip install torch") from error
+
+_loading = threading.Lock()
+_drawing = threading.Lock()
+
+
+def choose_device(device: str) -> str:
+    """The torch device that ``auto``, ``cpu`` or ``cuda`` means here.
+
+    Raises:
+        RenderError: CUDA is asked for and there is none.
+        ValueError: an unknown name.
+    """
+    if device not in ("auto", "cpu", "cuda"):
+        raise ValueError(f"unknown device `{device}`; there are `auto`, `cpu` and `cuda`")
+    if device == "cpu":
+        return "cpu"
+    if torch.cuda.is_available():
+        return "cuda"
+    if device == "cuda":
+        built = "sees no device" if torch.version.cuda else "is built without it"
+        raise RenderError(f"CUDA is asked for, but this torch {built}")
+    return "cpu"
+
+
+@lru_cache(maxsize=8)
+def _load(name: str, device: str, weights: str) -> Model:
+    keep_memory()
+    return load_model(name, device, weights=weights)
+
+
+def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
+    """A shipped model, loaded once for each process and device.
+
+    Args:
+        name: of the model.
+        device: of torch.
+        weights: SHA-256 of those that a Program was compiled for, hex: where others replaced them since, they
+            are loaded.
+
+    Raises:
+        RenderError: there is no such model, or its weights are missing or damaged.
+    """
+    try:
+        with _loading:
+            return _load(name, device, replaced(weights))
+    except KeyError:
+        raise RenderError(f"unknown model `{name}`") from None
+    except ModelError as error:
+        raise RenderError(str(error)) from None
+
+
+@contextmanager
+def _one_torch_thread() -> Iterator[None]:
+    """Torch computes each operation on one core meanwhile.
+
+    The setting is partly the process's and partly a thread's, and worker threads take it over when they
+    start; so it is set around the pool, not inside it, and put back.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _by_kernel(network: Network, program: Program, care: Care) -> Drawing | None:
+    """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
+    if not isinstance(network, Framed) or place_of(network).type != "cuda":
+        return None
+    try:
+        from scenelang.drawing.neural.device import draw_on_device, ready
+    except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
+        return None
+    return draw_on_device(network, program, **care) if ready() else None
+
+
+def draw_program(
+    program: Program,
+    model: Model,
+    *,
+    threads: int | None = None,
+    split: int | None = None,
+    kept: Kept | None = None,
+    skip: bool = True,
+    progress: Callable[[float], None] | None = None,
+    **care: Unpack[Care],
+) -> Drawing:
+    """Draw a Program.
+
+    One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
+
+    Args:
+        threads: tiles drawn at the same time; by default as `threads_for` says.
+        split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
+        kept: the picture before this one, of which tiles that show the same are taken over.
+        skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
+        progress: called with the share done, in [0, 1], from any thread.
+        **care: ``samples``, as of `How`, with framed and solids' renderers.
+
+    Raises:
+        RenderError: the Program was compiled for another model or other weights, its vectors are not
+            those of a compiled scene, or the model does not draw in this way.
+    """
+    name, network = model.manifest.name, model.network
+    if program.model != name:
+        raise RenderError(f"a program for model `{program.model}`, not `{name}`")
+    threads = threads_for(program.canvas) if threads is None else threads
+    if place_of(network).type != "cpu":
+        threads, split = 1, 1  # the device is busy with one tile
+    with _drawing, _one_torch_thread():
+        try:
+            program.check_weights(model.digest)
+            if isinstance(network, Framed | Solids):
+                drawing = _by_kernel(network, program, care) if skip else None
+                if drawing is not None and progress is not None:
+                    progress(1.0)
+                drawing = drawing or draw_objects(
+                    network,
+                    program,
+                    threads=threads,
+                    split=split,
+                    kept=kept,
+                    skip=skip,
+                    progress=progress,
+                    **care,
+                )
+                drawing.image.credit = credit_of(program.elements)
+                return drawing
+            if (samples := care.get("samples", "adaptive")) != "adaptive":
+                raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
+            torch.set_num_threads(threads)
+            return draw_whole(network, program, progress=progress)
+        except ProgramError as error:
+            raise RenderError(str(error)) from None

@@ -1,0 +1,637 @@
+"""Completion, semantic tokens, and the words of a document's model.
+
+colours that it writes, with what a picker may write instead.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import math
+import os
+import re
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
+from itertools import islice
+from typing import Any, Final
+
+from lsprotocol import types
+
+from scenelang.assets.element import told
+from scenelang.assets.records import Record
+from scenelang.compiler import steps as affine
+from scenelang.compiler.chain import merged
+from scenelang.compiler.graph import Move
+from scenelang.compiler.lower import step_of
+from scenelang.compiler.manifest import available, load_manifest
+from scenelang.compiler.spaces import SPACES, Refusal, Space
+from scenelang.compiler.steps import Affine, Rows, Step, Warp
+from scenelang.editors.context import Cursor, cursor_at, find_callee, word_of
+from scenelang.editors.workspace import Document, Workspace, scenes_below, width
+from scenelang.language import library, tree, words
+from scenelang.language import scene_text as to_nsg
+from scenelang.language.resolve import Names, Symbol, Use
+from scenelang.language.tables import tables
+from scenelang.language.tree import walk
+from scenelang.language.values import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
+from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, TRANSFORMS, UNITS
+
+COLOURED: Final = ("color", "background", "light", "ground")
+"""What has an argument `c` or `color`."""
+
+TYPES: Final = (
+    *("comment", "keyword", "number", "string", "operator"),
+    *("variable", "parameter", "property", "function", "namespace", "class", "method", "macro", "enumMember"),
+)
+MODIFIERS: Final = ("declaration", "readonly", "defaultLibrary")
+LEGEND: Final = types.SemanticTokensLegend(list(TYPES), list(MODIFIERS))
+_COMMENTS: Final = re.compile(r"//[^\n]*|/\*[\s\S]*?(?:\*/|\Z)")
+_ROLES: Final = {
+    "function": ("function", 4),
+    "constant": ("variable", 6),
+    "animated": ("variable", 4),
+    "geometry": ("class", 4),
+    "transform": ("method", 4),
+    "operation": ("method", 4),
+    "setting": ("macro", 4),
+    "material": ("enumMember", 4),
+    "argument": ("parameter", 0),
+    "property": ("property", 0),
+    "model": ("string", 0),
+    "path": ("string", 0),
+}
+_KINDS: Final = {
+    "let": ("variable", 2),
+    "param": ("property", 2),
+    "argument": ("parameter", 0),
+    "loop": ("variable", 0),
+    "fn": ("function", 0),
+    "module": ("class", 0),
+    "import": ("namespace", 0),
+}
+
+
+def semantic_tokens(docs: Workspace, document: Document, place: types.Range | None = None) -> list[int]:
+    """The tokens of a text or of a range, encoded as the protocol wants them."""
+    low, high = 0, len(document.text)
+    if place is not None:
+        low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+    found = [item for item in _tokens(docs, document, low, high) if item[1] > low and item[0] < high]
+    data: list[int] = []
+    line = column = 0
+    for start, end, kind, modifiers in sorted(found):
+        at = document.lines.position(start)
+        length = width(document.text[start:end], document.encoding)
+        data += (at.line - line, at.character - column if at.line == line else at.character)
+        data += (length, TYPES.index(kind), modifiers)
+        line, column = at.line, at.character
+    return data
+
+
+def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tuple[int, int, str, int]]:
+    text, tokens = document.text, document.tokens
+    names = tables().kinds
+    uses = {use.start: use for use in document.names.uses}
+    found: list[tuple[int, int, str, int]] = []
+    before = 0
+    for kind, start, end in zip(tokens.kinds, tokens.starts, tokens.ends, strict=True):
+        if before < start and before < high and start > low:
+            found += _comments(text, before, start)
+        before = end
+        if start == end or end <= low or start >= high:
+            continue
+        use = uses.get(start)
+        name = names[kind]
+        if use is not None and use.end <= end and use.role not in ("path", "model"):
+            found.append((start, end, *_named(docs, document, use)))
+        elif name == "NUMBER" or name == "COLOR":
+            found.append((start, end, "number", 0))
+        elif name == "STRING":
+            found.append((start, end, "string", 0))
+        elif name[0].isalpha() and name != "NAME":
+            found.append((start, end, "keyword", 0))
+        elif name not in ("NAME", "(", ")", "[", "]", "{", "}", ",", ";", "."):
+            found.append((start, end, "operator", 0))
+    return [item for item in found if "\n" not in text[item[0] : item[1]]]
+
+
+def _comments(text: str, start: int, end: int) -> list[tuple[int, int, str, int]]:
+    """Comments between two tokens, line by line, as a token must not span lines."""
+    found = []
+    for match in _COMMENTS.finditer(text, start, end):
+        at = match.start()
+        for part in match[0].splitlines(keepends=True):
+            bare = part.rstrip("\r\n")
+            if bare:
+                found.append((at, at + len(bare), "comment", 0))
+            at += len(part)
+    return found
+
+
+def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
+    symbol: Symbol | None = use.symbol
+    if use.role == "member":
+        target = docs.definition(document, use)
+        symbol = target[1] if target is not None else None
+    if use.role in ("name", "member") and symbol is not None:
+        kind, modifiers = _KINDS[symbol.kind]
+        return kind, modifiers | int(use.defines)
+    return _ROLES.get(use.role, ("variable", 0))
+
+
+def colours(document: Document) -> list[types.ColorInformation]:
+    """Colours that are written out: `#hex`, `rgb(…)`, `hsv(…)` and vectors where a colour is wanted."""
+    found = []
+    for stmt in document.file.statements:
+        wanted: set[int] = set()
+        for node in walk(stmt):
+            if isinstance(node, tree.Call) and node.args and node.name.text in COLOURED:
+                params = (OPERATIONS | SETTINGS)[node.name.text].params
+                for arg, param in zip(node.args, params, strict=False):
+                    if (arg.name.text if arg.name else param) in ("c", "color"):
+                        wanted.add(id(arg.value))
+            rgb = _colour(node, id(node) in wanted)
+            if rgb is not None:
+                place = document.lines.span(node.span)
+                found.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
+    found.sort(key=lambda c: (c.range.start.line, c.range.start.character))
+    return found
+
+
+def _colour(node: object, wanted: bool) -> tuple[float, float, float] | None:
+    if isinstance(node, tree.Color):
+        return node.rgb
+    if isinstance(node, tree.Vector) and wanted:
+        return _clamped([_number(item) for item in node.items])
+    if isinstance(node, tree.CallExpr) and node.name.text in ("rgb", "hsv"):
+        order = ("r", "g", "b") if node.name.text == "rgb" else ("h", "s", "v")
+        given: dict[str, float | None] = {}
+        for index, arg in enumerate(node.args):
+            if index < 3:
+                name = arg.name.text if arg.name is not None else order[index]
+                given[name] = _number(arg.value)
+        parts = [given.get(name) for name in order]
+        rgb = _clamped(parts, first_free=node.name.text == "hsv")
+        if rgb is None or node.name.text == "rgb":
+            return rgb
+        return colorsys.hsv_to_rgb(rgb[0] % 1.0, rgb[1], rgb[2])
+    return None
+
+
+def _number(expr: tree.Expr) -> float | None:
+    """A literal number, an angle in turns."""
+    if isinstance(expr, tree.Unary) and expr.op == "-":
+        inner = _number(expr.operand)
+        return None if inner is None else -inner
+    if not isinstance(expr, tree.Number):
+        return None
+    per_turn = {"": 1.0, "turn": 1.0, "deg": 360.0, "rad": 6.283185307179586}
+    return expr.value / per_turn[expr.unit] if expr.unit in per_turn else None
+
+
+def _clamped(parts: list[float | None], first_free: bool = False) -> tuple[float, float, float] | None:
+    known = [part for part in parts if part is not None]
+    if not len(known) == len(parts) == 3:
+        return None
+    first, second, third = (min(max(part, 0.0), 1.0) for part in known)
+    return known[0] if first_free else first, second, third
+
+
+def presentations(
+    document: Document, color: types.Color, place: types.Range
+) -> list[types.ColorPresentation]:
+    """How a picked colour may be written, the way it is written now first."""
+    red, green, blue = color.red, color.green, color.blue
+    bytes_ = [min(max(round(255 * x), 0), 255) for x in (red, green, blue)]
+    long = "#" + "".join(f"{b:02x}" for b in bytes_)
+    short = "#" + "".join(f"{b:02x}"[0] for b in bytes_) if all(b % 17 == 0 for b in bytes_) else long
+    h, s, v = colorsys.rgb_to_hsv(red, green, blue)
+
+    def listed(values: tuple[float, ...]) -> str:
+        return ", ".join(f"{round(x, 3) + 0.0:g}" for x in values)
+
+    forms = {
+        "#": short,
+        "rgb": f"rgb({listed((red, green, blue))})",
+        "hsv": f"hsv({listed((h, s, v))})",
+        "[": f"[{listed((red, green, blue))}]",
+    }
+    lines = document.lines
+    now = document.text[lines.offset(place.start) : lines.offset(place.end)]
+    order = sorted(forms, key=lambda form: not now.startswith(form))
+    return [types.ColorPresentation(forms[form], types.TextEdit(place, forms[form])) for form in order]
+
+
+_MOST_ITEMS = 8
+
+
+def dimensions_of(document: Document) -> tuple[int, ...]:
+    """The dimension of the model that a document names; both where it names none."""
+    for stmt in document.file.statements:
+        if isinstance(stmt, tree.Model) and isinstance(stmt.name, tree.String):
+            with suppress(KeyError):
+                return (load_manifest(stmt.name.value).dimension,)
+    return (*LEAVES,)
+
+
+def space_of(document: Document) -> Space:
+    """The space of the model which draws a document."""
+    if document.checked is not None and document.checked.manifest is not None:
+        return SPACES[document.checked.manifest.dimension]
+    return SPACES[dimensions_of(document)[0]]
+
+
+def show_value(value: Any) -> str | None:
+    """A value as one would write it; None for one that a mistake has made unknown."""
+    cls = value.__class__
+    if value is POISON:
+        return None
+    if isinstance(value, float):
+        return show(value)
+    if cls is bool:
+        return "true" if value else "false"
+    if cls is str:
+        short: str = value if len(value) <= 60 else value[:57] + "…"
+        return '"' + short.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if cls is Angle:
+        return f"{show(round(math.degrees(value.size), 6))}deg"
+    if cls is Time:
+        return f"{show(value.size)}s"
+    if cls is Vec:
+        items = [show_value(item) or "?" for item in value.items[:_MOST_ITEMS]]
+        more = [f"… {len(value.items)} items"] if len(value.items) > _MOST_ITEMS else []
+        return f"[{', '.join([*items, *more])}]"
+    if cls is RangeValue:
+        ends = [show_value(pack(x, value.unit)) or "?" for x in (value.start, value.stop)]
+        step = "" if value.step is None else f" step {show_value(pack(value.step, value.unit))}"
+        return f"{ends[0]}{'..<' if value.exclusive else '..'}{ends[1]}{step}"
+    if cls is MaterialValue:
+        return to_nsg.material(value.material).rstrip(";")
+    return "none" if value is None else None
+
+
+def show_matrix(rows: Rows, space: Space) -> str:
+    """The 3 × 3 matrix of a map of the plane, or the 4 × 4 one of space."""
+    table = [[rows[at] for at in row] for row in space.shown]
+    table.append([0.0] * space.dimension + [1.0])
+    cells = [[f"{value + 0.0:.4g}" for value in row] for row in table]
+    width = max(len(cell) for row in cells for cell in row)
+    return "\n".join("[ " + "  ".join(cell.rjust(width) for cell in row) + " ]" for row in cells)
+
+
+def show_warp(warp: Warp) -> str:
+    """How a point goes back through a warp, in a formula."""
+    terms = []
+    if warp.twirl:
+        terms.append(f"{show(warp.twirl)} |p|")
+    for factor, name in zip(warp.bend, ("p.x", "p.y"), strict=True):
+        if factor:
+            terms.append(f"{show(factor)} {name}")
+    angle = " + ".join(terms) or "0"
+    return f"p → R({angle}) p"
+
+
+def show_transform(node: Any, space: Space) -> str | None:
+    """The matrix or the formula of a geometry transform; None for what is neither."""
+    if node.kind not in TRANSFORMS:
+        return None
+    return next(_shown(_steps((node,), space), space), None)
+
+
+def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
+    """A chain of transforms after composing its neighbouring affine maps: matrices and formulas in order."""
+    return list(_shown([move.step for move in merged(map(Move, _steps(transforms, space)))], space))
+
+
+def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
+    """How much the affine maps of a chain scale, at least and at most."""
+    low, high = space.stretches(affine.composed(_steps(transforms, space)))
+    return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
+
+
+def _steps(transforms: Iterable[Any], space: Space) -> list[Step]:
+    """The steps of transforms, without those that have none."""
+    found = [step_of(transform, space) for transform in transforms]
+    return [step for step in found if not isinstance(step, Refusal)]
+
+
+def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
+    for step in steps:
+        if isinstance(step, Affine):
+            yield show_matrix(step.rows, space)
+        elif isinstance(step, Warp):
+            yield show_warp(step)
+
+
+Kind = types.CompletionItemKind
+_MOST_PATHS: Final = 200
+_MOST_FILES: Final = 2000
+
+
+class Item(Record):
+    """A proposal.
+
+    Args:
+        text: what is inserted; the label without it.
+        rank: one letter; what is likelier comes first.
+        about: Markdown.
+        snippet: whether ``text`` has placeholders.
+    """
+
+    label: str
+    kind: Kind
+    text: str = ""
+    rank: str = "m"
+    detail: str = ""
+    about: str = ""
+    snippet: bool = False
+
+
+def units(typed: str) -> Iterator[Item]:
+    """Units that a number may be getting."""
+    number = re.match(r"[0-9]*\.?[0-9]*", typed)
+    if number is None or not number[0] or number[0] == ".":
+        return
+    rest = typed[number.end() :]
+    for unit in UNITS:
+        if rest and unit.startswith(rest):
+            yield Item(f"{number[0]}{unit}", Kind.Unit)
+
+
+def strings(docs: Workspace, document: Document, before: tuple[str, ...]) -> Iterator[Item]:
+    """What a string may say: a model's name, a file to import."""
+    if before == ("model",):
+        for manifest in map(load_manifest, available()):
+            yield Item(manifest.name, Kind.Module, about=manifest.summary)
+    elif before == ("import",):
+        yield from (Item(name, Kind.File, rank="a") for name in library.names())
+        folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
+        for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
+            if path != document.path:
+                yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+
+
+_HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
+_SYMBOLS: Final = {
+    "let": Kind.Variable,
+    "param": Kind.Property,
+    "argument": Kind.Variable,
+    "loop": Kind.Variable,
+    "fn": Kind.Function,
+    "module": Kind.Module,
+    "import": Kind.File,
+}
+
+
+def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
+    """What may stand at an offset."""
+    names = document.names
+    holders = ("let", "argument", "loop", "param")
+    values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
+    cursor = cursor_at(document.tokens, offset, values)
+    start, end = cursor.start, cursor.end
+    if cursor.inside == "string":
+        start += 1
+        end = max(end - (end > start and document.text[end - 1] == '"'), start)
+    place = document.lines.range(start, end)
+    items = []
+    seen = set()
+    for item in _Maker(docs, document, cursor, names).items():
+        if item.label in seen:
+            continue
+        seen.add(item.label)
+        filled = item.snippet and snippets
+        text = item.text if item.text and (filled or not item.snippet) else item.label
+        about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None
+        items.append(
+            types.CompletionItem(
+                label=item.label,
+                kind=item.kind,
+                detail=item.detail or None,
+                documentation=about,
+                sort_text=f"{item.rank}{item.label}",
+                filter_text=item.label,
+                insert_text_format=types.InsertTextFormat.Snippet if filled else None,
+                text_edit=types.TextEdit(place, text),
+            )
+        )
+    return types.CompletionList(is_incomplete=False, items=items)
+
+
+class _Maker:
+    """Collects what fits at one cursor."""
+
+    def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
+        self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
+        dimensions = dimensions_of(document)
+        self.geometries = {name for d in dimensions for name in words.LEAVES[d]}
+        self.shadings = {name for d in dimensions for name in words.SHADINGS[d]}
+        self.transforms = set(words.TRANSFORMS) - set(words.SOLID_TRANSFORMS if 3 not in dimensions else ())
+
+    def items(self) -> Iterator[Item]:
+        cursor, before = self.cursor, self.cursor.before
+        last = before[-1] if before else ""
+        if cursor.inside == "comment":
+            return
+        if cursor.inside == "string":
+            yield from strings(self.docs, self.document, before)
+        elif cursor.inside == "number":
+            yield from units(self.document.text[cursor.start : cursor.offset])
+        elif cursor.inside == "colour":
+            return
+        elif last == ".":
+            yield from self._members(before)
+        elif not before:
+            yield from self._statements()
+        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before == ("for", "("):
+            return
+        elif before[:2] == ("for", "(") and len(before) == 3:
+            yield Item("in", Kind.Keyword, "in ")
+        elif before[0] == "import":
+            if len(before) == 2:
+                yield Item("as", Kind.Keyword, "as ")
+        elif last == "material":
+            yield from self._materials(self.shadings)
+        elif before[-2:-1] == ("material",) and last in self.shadings:
+            yield from self._materials(frozenset())
+        elif (len(before) == 1 and last in COMBINE) or (before[0] in COMBINE and last == ")"):
+            yield from self._children("a")
+            yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
+        elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
+            yield Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
+        elif last == ")" and before[0] == "if":
+            return
+        elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
+            return  # the name of a parameter
+        elif not _ends_operand(last):
+            yield from self._expressions()
+        elif ".." in before or "..<" in before:
+            yield Item("step", Kind.Keyword, "step ")
+
+    # ------------------------------------------------------------ statements
+
+    def _keyword(self, word: str, rank: str = "p") -> Item:
+        known = words.KEYWORDS[word]
+        text = known.snippet or f"{word} {{\n\t$0\n}}"
+        return Item(word, Kind.Keyword, text, rank, known.head, known.text, True)
+
+    def _statements(self) -> Iterator[Item]:
+        block = self.cursor.block
+        kind = block.kind
+        if kind == "material":
+            yield from self._calls(words.OPERATIONS, words.OPERATIONS, "a")
+            yield from (self._keyword(word) for word in ("let", "for", "if"))
+            return
+        if kind == "file" and not block.nested:
+            tops = [s for s in self.document.file.statements if isinstance(s, tree.Version | tree.Model)]
+            given = {type(stmt) for stmt in tops}
+            if tree.Version not in given:
+                yield self._keyword("nsg", "c")
+            if tree.Model not in given:
+                yield self._keyword("model", "q")
+            yield from (self._keyword(word, "q") for word in ("param", "import"))
+            yield from self._calls(words.SETTINGS, words.SETTINGS, "q")
+        if kind == "object":
+            yield from self._calls(words.TRANSFORMS, self.transforms, "a")
+            yield self._keyword("material", "b")
+            yield from self._material_values("b")
+            yield from (self._keyword(word) for word in ("let", "for", "if"))
+            return
+        yield from self._children("a")
+        if kind == "chain":
+            for word in COMBINE:
+                yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
+        yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
+        if kind in ("group", "chain"):
+            yield from self._calls(words.TRANSFORMS, self.transforms, "n")
+            yield self._keyword("material", "n")
+            yield from self._material_values("n")
+
+    def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[Item]:
+        for name in sorted(offered):
+            yield _item(known[name], Kind.Method, rank)
+
+    def _children(self, rank: str) -> Iterator[Item]:
+        for name in sorted(self.geometries):
+            text = f"{name} {{ ${{1:scale(0.5);}} }}"
+            yield Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES[name], True)
+        for symbol in self.names.visible(self.cursor.offset):
+            if symbol.kind == "module":
+                yield self._symbol(symbol, statement=True)
+            elif symbol.kind == "import":
+                yield self._symbol(symbol)
+
+    def _material_values(self, rank: str) -> Iterator[Item]:
+        may_be = tree.MaterialExpr | tree.NameRef | tree.Member
+        for symbol in self.names.visible(self.cursor.offset):
+            fits = symbol.kind != "let" or isinstance(getattr(symbol.node, "value", None), may_be)
+            if fits and symbol.kind in ("let", "argument", "loop"):
+                yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+
+    def _materials(self, constant: Collection[str]) -> Iterator[Item]:
+        """Materials, and files that may hold others."""
+        for name in sorted({*constant, *words.TEXTURES}):
+            text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
+            yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
+        for symbol in self.names.visible(self.cursor.offset):
+            stmt = symbol.node
+            zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None
+            if zoo is not None and zoo.materials:
+                yield self._symbol(symbol)
+
+    # ------------------------------------------------------------ expressions
+
+    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> Item:
+        text, snippet = "", False
+        if symbol.kind in ("fn", "module"):
+            required = [p.name for p in symbol.params if not getattr(p.node, "default", None)]
+            holes = ", ".join(f"${{{at}:{name}}}" for at, name in enumerate(required, 1))
+            text, snippet = f"{symbol.name}({holes}){';' if statement else ''}", True
+        elif symbol.kind == "import":
+            text = symbol.name
+        rank = "b" if symbol.scope.parent is not None else "d"
+        word = word_of(symbol)
+        return Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, word.head, word.text, snippet)
+
+    def _expressions(self) -> Iterator[Item]:
+        callee = find_callee(self.docs, self.document, self.cursor)
+        if callee is not None and self.cursor.call is not None:
+            yield from self._arguments(callee)
+        for symbol in self.names.visible(self.cursor.offset):
+            if symbol.kind != "module":
+                yield self._symbol(symbol)
+        yield from (_item(word, Kind.Function, "k") for word in words.FUNCTIONS.values())
+        for word in (words.CONSTANTS | words.ANIMATED).values():
+            yield Item(word.name, Kind.Constant, "", "l", about=word.text)
+        for name in ("true", "false"):
+            yield Item(name, Kind.Keyword, "", "n")
+        yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
+
+    def _arguments(self, callee: words.Word) -> Iterator[Item]:
+        """Names of arguments that are left, and values that the one at hand takes."""
+        call = self.cursor.call
+        assert call is not None
+        positional = callee is not words.TRANSFORMS["shear"]
+        name = call.named
+        if name is None:
+            start = self.cursor.before[-1] in ("(", ",")
+            left = callee.params[call.index :] if positional else callee.params
+            for param in left if start else ():
+                if param not in call.given:
+                    about = callee.notes.get(param, "")
+                    yield Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
+            if call.index < len(callee.params) and positional:
+                name = callee.params[call.index]
+        yield from self._values(callee.name, name)
+
+    def _values(self, callee: str, param: str | None) -> Iterator[Item]:
+        if param == "axis":
+            for axis in ("X", "Y", "Z"):
+                yield Item(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
+        elif param == "loop":
+            for value in ("true", "false"):
+                yield Item(value, Kind.EnumMember, "", "0")
+        elif param in ("angle", "fov"):
+            for value, unit in (("30", "deg"), ("0.25", "turn"), ("0.5", "rad")):
+                text = f"${{1:{value}}}{unit}"
+                yield Item(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
+        elif param in ("c", "color") and callee in COLOURED:
+            yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
+            for name in ("rgb", "hsv"):
+                yield Item(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
+        if (callee, param) in (("background", "c"), ("ground", "y")):
+            yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
+
+    def _members(self, before: tuple[str, ...]) -> Iterator[Item]:
+        alias = before[-2] if len(before) > 1 else ""
+        symbol = self.names.scope_at(self.cursor.offset).find(alias)
+        if symbol is None or symbol.kind != "import" or not isinstance(symbol.node, tree.Import):
+            if before[-3:-2] != (".",) and re.fullmatch(r"[\w\])]+", alias):
+                for name in "xyzrgb":
+                    yield Item(name, Kind.Field)
+            return
+        zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
+        for name, group in zoo.groups.items() if zoo is not None and not worn else ():
+            yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
+        for found in zoo.elements if zoo is not None else ():
+            if found.material == worn:
+                yield Item(
+                    found.name, Kind.Class, f"{found.name} {{ $0 }}", "a", found.kind, found.told(), True
+                )
+        library = self.docs.imported(self.document, symbol.node.path.value)
+        if library is None:
+            return
+        statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
+        for known in library.names.exported():
+            if not statement or known.kind in ("module", "let"):
+                yield self._symbol(known, statement=statement)
+
+
+def _item(word: words.Word, kind: Kind, rank: str) -> Item:
+    return Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
+
+
+def _ends_operand(text: str) -> bool:
+    """Whether an expression can end with a token, so that an operator and not an operand comes next."""
+    return text in (")", "]", "}", "true", "false") or (
+        (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
+    )

@@ -1,0 +1,337 @@
+"""Where a place is, which names are in sight of it, and what a call there calls.
+
+A `Cursor` is of tokens alone, which are there however broken the text is.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left, bisect_right
+from typing import Any, Final, Literal
+
+from lsprotocol import types
+
+from scenelang.assets.records import Record
+from scenelang.editors.workspace import Document, Workspace, width
+from scenelang.language import tree
+from scenelang.language.lexer import Tokens
+from scenelang.language.resolve import Names, Symbol
+from scenelang.language.tables import tables
+from scenelang.language.tree import children
+from scenelang.language.words import COMBINE, NODES, Word, word_for_call
+
+
+def path_to(file: tree.File, offset: int) -> list[Any]:
+    """The nodes that hold an offset, outermost first; empty between statements."""
+    index = bisect_right(file.statements, offset, key=lambda stmt: stmt.span.start) - 1
+    if index < 0 or offset > file.statements[index].span.end:
+        return []
+    path: list[Any] = [file.statements[index]]
+    while True:
+        inner = [n for n in children(path[-1]) if n.span.start <= offset <= n.span.end]
+        if not inner:
+            return path
+        # Where two touch at the offset, the one that begins there is meant.
+        path.append(max(inner, key=lambda n: (n.span.start, -n.span.end)))
+
+
+BlockKind = Literal["file", "group", "chain", "object", "material"]
+_HOLDERS: Final = {*NODES, "module"}
+_COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
+
+
+class Call(Record):
+    """A call whose parentheses the cursor is in.
+
+    Args:
+        name: what is called, perhaps dotted.
+        start: where the name begins.
+        index: which positional argument the cursor is in, from 0.
+        named: the name of the argument it is in, if that has one.
+        given: names of arguments given so far, the cursor's own left out.
+    """
+
+    name: str
+    start: int
+    index: int
+    named: str | None
+    given: frozenset[str]
+
+
+class Block(Record):
+    """A block around the cursor.
+
+    Args:
+        kind: what it may hold.
+        head: the word that heads its statement.
+        nested: whether a `for` or `if` stands in between.
+    """
+
+    kind: BlockKind
+    head: str
+    nested: bool = False
+
+
+class Cursor(Record):
+    """What is around an offset.
+
+    Args:
+        start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
+        inside: ``comment``, ``string``, ``number``, ``colour`` or ``code``.
+        before: the tokens of the statement before that word, as text.
+    """
+
+    offset: int
+    start: int
+    end: int
+    inside: Literal["comment", "string", "number", "colour", "code"]
+    before: tuple[str, ...]
+    call: Call | None
+    block: Block
+
+
+class _Reader:
+    """Tokens read backwards."""
+
+    def __init__(self, tokens: Tokens) -> None:
+        self.kinds, self.starts, self.ends = tokens.kinds, tokens.starts, tokens.ends
+        self.source_text = tokens.source.text
+        self.names = tables().kinds
+
+    def text(self, index: int) -> str:
+        return self.source_text[self.starts[index] : self.ends[index]]
+
+    def kind(self, index: int) -> str:
+        return self.names[self.kinds[index]]
+
+    def head(self, index: int) -> int:
+        """Index of the first token of the statement that holds the token before ``index``."""
+        at = index
+        while at and self.kind(at - 1) not in (";", "{", "}"):
+            at -= 1
+        return at
+
+    def opening(self, index: int) -> int | None:
+        """Index of the `{` that is open before a token."""
+        depth = 0
+        for at in range(index - 1, -1, -1):
+            kind = self.kind(at)
+            if kind == "}":
+                depth += 1
+            elif kind == "{":
+                if depth == 0:
+                    return at
+                depth -= 1
+        return None
+
+
+def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
+    """What is around an offset; ``values`` are names in sight that may be materials."""
+    read = _Reader(tokens)
+    count = len(read.kinds) - 1
+    index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor
+    start = end = offset
+    inside: Literal["comment", "string", "number", "colour", "code"] = "code"
+    if index and read.ends[index - 1] >= offset:
+        token = index - 1
+        kind, text = read.kind(token), read.text(token)
+        if kind == "STRING":
+            closed = len(text) > 1 and text.endswith('"') and read.ends[token] == offset
+            inside = "code" if closed else "string"
+        elif kind == "NUMBER":
+            inside = "number"
+        elif kind == "COLOR":
+            inside = "colour"
+        if inside != "code" or text[:1].isalpha() or text[:1] == "_":
+            start, end, index = read.starts[token], read.ends[token], token
+    elif _in_comment(read, index, offset):
+        inside = "comment"
+    head = read.head(index)
+    before = tuple(read.text(at) for at in range(head, index))
+    return Cursor(offset, start, end, inside, before, _call(read, head, index), _block(read, index, values))
+
+
+def _in_comment(read: _Reader, index: int, offset: int) -> bool:
+    gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
+    found = list(_COMMENTS.finditer(gap))
+    if not found or found[-1].end() < len(gap):
+        return False
+    comment = found[-1][0]
+    return not (comment.endswith("\n") if comment[1] == "/" else comment[2:].endswith("*/"))
+
+
+def _call(read: _Reader, head: int, index: int) -> Call | None:
+    """The innermost call whose parentheses are open before a token."""
+    depth = commas = 0
+    given: set[str] = set()
+    named: str | None = None
+    fresh = True  # still in the argument that the cursor is in
+    for at in range(index - 1, head - 1, -1):
+        kind = read.kind(at)
+        if kind in (")", "]"):
+            depth += 1
+        elif kind in ("(", "["):
+            if depth:
+                depth -= 1
+                continue
+            if kind == "[":
+                commas, fresh, named = 0, True, None
+                given.clear()
+                continue
+            name, start = _callee(read, head, at)
+            return Call(name, start, commas, named, frozenset(given)) if name else None
+        elif depth == 0 and kind == ",":
+            commas += 1
+            fresh = False
+        elif depth == 0 and kind == "=" and at > head and read.kind(at - 1) in ("NAME", "step", "as"):
+            if fresh:
+                named = read.text(at - 1)
+            else:
+                given.add(read.text(at - 1))
+    return None
+
+
+def _callee(read: _Reader, head: int, opening: int) -> tuple[str, int]:
+    """The name before a `(`, and where it begins; empty for a parenthesis of another kind."""
+    at = opening - 1
+    if at < head or read.kind(at) not in ("NAME", "step", "as", "smooth", "subtract", "intersect"):
+        return "", 0
+    if at > head and read.kind(at - 1) in ("fn", "module"):
+        return "", 0
+    name, start = read.text(at), read.starts[at]
+    while at - 2 >= head and read.kind(at - 1) == "." and read.kind(at - 2) == "NAME":
+        at -= 2
+        name, start = f"{read.text(at)}.{name}", read.starts[at]
+    return name, start
+
+
+def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
+    nested = False
+    while True:
+        brace = read.opening(index)
+        if brace is None:
+            return Block("file", "", nested)
+        head = read.head(brace)
+        words = [read.text(at) for at in range(head, brace)]
+        while words[1:] and words[0] in COMBINE:
+            rest = words[1:]
+            if rest[0] == "(" and ")" in rest:  # the width of a blend
+                rest = rest[rest.index(")") + 1 :]
+            words = rest or words[:1]
+        first = words[0] if words else ""
+        if first in ("for", "if", "else"):
+            nested, index = True, head
+            continue
+        if first in _HOLDERS:
+            kind: BlockKind = "chain" if first == "chain" else "group"
+            return Block(kind, first, nested)
+        if "material" in words[-2:] or "material" in words[-4:-1] or (first in values and len(words) == 1):
+            return Block("material", first, nested)
+        return Block("object", first, nested)
+
+
+_LINE: Final = re.compile(r"^[ \t]*//(.*)$")
+_MAX_SHOWN: Final = 200
+
+
+def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | None:
+    """What the call around the cursor calls; None where there is none or it is unknown."""
+    call = cursor.call
+    if call is None:
+        return None
+    found = find_symbol(docs, document, document.names, call.name, call.start)
+    return word_of(found) if found is not None else word_for_call(call.name, cursor.block.kind == "material")
+
+
+def find_symbol(docs: Workspace, document: Document, names: Names, name: str, offset: int) -> Symbol | None:
+    """The fn or module that a plain or dotted name stands for at an offset; ``names`` are in sight there."""
+    alias, _, rest = name.partition(".")
+    symbol = names.scope_at(offset).find(alias)
+    if symbol is None:
+        return None
+    if rest and symbol.kind == "import" and isinstance(symbol.node, tree.Import):
+        library = docs.imported(document, symbol.node.path.value)
+        symbol = library.names.top.symbols.get(rest) if library is not None else None
+        if symbol is None or not symbol.is_exported:
+            return None
+    return symbol if symbol.kind in ("fn", "module") else None
+
+
+def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
+    """How what is being called is called, and which argument the cursor is in."""
+    cursor = cursor_at(document.tokens, offset)
+    callee = find_callee(docs, document, cursor)
+    if callee is None or cursor.call is None or cursor.inside == "comment":
+        return None
+    active: int | None = cursor.call.index
+    if cursor.call.named is not None:
+        named = cursor.call.named
+        active = callee.params.index(named) if named in callee.params else None
+    elif callee.variadic:
+        active = min(cursor.call.index, len(callee.params) - 1)
+    parameters = []
+    at = callee.head.find("(") + 1
+    for param in callee.params:
+        match = re.compile(rf"\b{re.escape(param)}\b").search(callee.head, at)
+        about = types.MarkupContent(types.MarkupKind.Markdown, callee.notes.get(param, ""))
+        label: str | tuple[int, int] = param
+        if match is not None:
+            # Offsets into a label count UTF-16, whatever positions count.
+            start, end = (width(callee.head[:at], "utf-16") for at in match.span())
+            label = start, end
+            at = match.end()
+        parameters.append(types.ParameterInformation(label, about if about.value else None))
+    text = types.MarkupContent(types.MarkupKind.Markdown, callee.text) if callee.text else None
+    if active is not None and active >= len(parameters):
+        active = None
+    signature = types.SignatureInformation(callee.head, text, parameters, active)
+    return types.SignatureHelp([signature], 0, active)
+
+
+def word_of(symbol: Symbol) -> Word:
+    """A definition as a word: its first line, the comment above it, its parameters."""
+    node = symbol.node
+    if isinstance(node, tree.Module):
+        head = f"module {_called(symbol)}"
+    elif isinstance(node, tree.Fn):
+        head = f"fn {_called(symbol)} = {_short(node.body.span.text)}"
+    elif isinstance(node, tree.For):
+        head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
+    elif isinstance(node, tree.Parameter):
+        head = f"(parameter) {_short(node.span.text)}"
+    else:
+        head = _short(node.span.text)
+    return Word(symbol.name, head, comment_above(symbol), tuple(p.name for p in symbol.params))
+
+
+def _called(symbol: Symbol) -> str:
+    params = ", ".join(_short(p.node.span.text) for p in symbol.params)
+    return f"{symbol.name}({params})"
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 1] + "…"
+
+
+def comment_above(symbol: Symbol) -> str:
+    """The lines of comment right above a definition, or behind it on its line."""
+    if isinstance(symbol.node, tree.Parameter | tree.For):
+        return ""
+    # The node's own text: it may be of an older version than the document's.
+    span = symbol.node.span
+    text = span.source.text
+    found: list[str] = []
+    start = text.rfind("\n", 0, span.start) + 1
+    while start:
+        above = text.rfind("\n", 0, start - 1) + 1
+        match = _LINE.match(text[above : start - 1].rstrip("\r"))
+        if match is None:
+            break
+        found.insert(0, match[1].strip())
+        start = above
+    end = text.find("\n", span.end)
+    behind = _LINE.match(text[span.end : end if end >= 0 else len(text)].rstrip("\r"))
+    if behind and not isinstance(symbol.node, tree.Module):
+        found.append(behind[1].strip())
+    return "\n".join(found)

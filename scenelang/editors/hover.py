@@ -1,0 +1,314 @@
+"""Hover and inlay hints: what a word means, and what it came to when the scene was evaluated."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+from lsprotocol import types
+
+from scenelang.assets import element as groups
+from scenelang.assets.element import Element
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.editors import completion
+from scenelang.editors.completion import space_of
+from scenelang.editors.context import find_symbol, path_to, word_of
+from scenelang.editors.server import Settings
+from scenelang.editors.workspace import Document, Seen, Workspace
+from scenelang.language import scene_text as to_nsg
+from scenelang.language import tree, words
+from scenelang.language.resolve import Symbol, Use
+from scenelang.language.tree import walk
+from scenelang.language.words import word_for_call
+
+_TABLES: Final = {
+    "function": words.FUNCTIONS,
+    "constant": words.CONSTANTS,
+    "animated": words.ANIMATED,
+    "setting": words.SETTINGS,
+}
+
+
+def hover(
+    docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
+) -> types.Hover | None:
+    """What there is to say about an offset.
+
+    Args:
+        picture: of an element, in Markdown.
+    """
+    use = document.names.at(offset)
+    if use is not None:
+        text = _elements(docs, document, use, picture) or _use(docs, document, use)
+        return _answer(document, use.start, use.end, text) if text else None
+    path = path_to(document.file, offset)
+    for node in reversed(path):
+        keyword = _keyword(node, offset)
+        if keyword is not None:
+            start, end, word = keyword
+            return _answer(document, start, end, _word(words.KEYWORDS[word]) + _node_facts(document, node))
+    return None
+
+
+def _answer(document: Document, start: int, end: int, text: str) -> types.Hover:
+    content = types.MarkupContent(types.MarkupKind.Markdown, text)
+    return types.Hover(content, document.lines.range(start, end))
+
+
+def _code(text: str) -> str:
+    return f"```nsg\n{text}\n```"
+
+
+def _word(word: words.Word) -> str:
+    about = [f"- `{name}`: {line}" for name, line in word.notes.items()]
+    return "\n\n".join([_code(word.head), word.text, *(["\n".join(about)] if about else [])])
+
+
+def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
+    """The keyword that heads a node, if the cursor is on it."""
+    start = node.span.start
+    head = re.match(r"[a-z]+", node.span.text)
+    word = head[0] if head is not None else ""
+    heads = word in words.RESERVED
+    return (start, start + len(word), word) if heads and offset <= start + len(word) else None
+
+
+# ---------------------------------------------------------------- names
+
+
+def _use(docs: Workspace, document: Document, use: Use) -> str | None:
+    found = docs.definition(document, use)
+    if found is not None:
+        return _definition(document, *found)
+    text = use.text
+    match use.role:
+        case "function" | "constant" | "animated" | "setting":
+            return _word(_TABLES[use.role][text]) if text in _TABLES[use.role] else None
+        case "transform" | "operation":
+            table = words.OPERATIONS if use.role == "operation" else words.TRANSFORMS
+            return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
+        case "geometry":
+            about = _offered(text, text, words.GEOMETRIES)
+            node = next((n for n in _calls(document, use) if n.name.text == text), None)
+            return about and about + _node_facts(document, node)
+        case "material":
+            textures = dict.fromkeys(words.TEXTURES, "A texture, in flat and in solid scenes.")
+            return _offered(f"material {text}", text, words.MATERIALS | textures)
+        case "model":
+            try:
+                return _model(load_manifest(text))
+            except KeyError:
+                return None
+        case "argument":
+            return _argument(use)
+        case "path":
+            library = docs.imported(document, text)
+            return f"`{library.path}`" if library is not None else "no such file"
+        case _:
+            return None
+
+
+def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
+    """The geometry or the material of an imported file that has a name, as it is shown and told of."""
+    worn, symbol = use.role == "material", use.symbol
+    if not (worn or use.role == "member") or symbol is None or not isinstance(symbol.node, tree.Import):
+        return None
+    zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
+    if zoo is None:
+        return ""
+    found = [element for element in zoo.elements if element.name == name and element.material == worn]
+    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
+    if name in zoo.groups and not worn:
+        told.append(f"```text\n{name}(): {groups.told(zoo.groups[name])}\n```")
+    return "\n\n".join(told)
+
+
+def _argument(use: Use) -> str | None:
+    word = words.word_for_call(use.callee.text, use.callee.role == "operation") if use.callee else None
+    if word is None or use.text not in word.params:
+        return None
+    about = word.notes.get(use.text)
+    return f"{_code(word.head)}\n\n`{use.text}`: {about}" if about else _code(word.head)
+
+
+def _definition(document: Document, where: Document, symbol: Symbol) -> str:
+    word = word_of(symbol)
+    parts = [_code(word.head), *([word.text] if word.text else [])]
+    seen = seen_at(document, where, symbol.span.start, symbol.span.end)
+    line = describe_values(seen)
+    node = symbol.node
+    value = node.value if isinstance(node, tree.Let) else getattr(node, "default", None)
+    if line and not (value is not None and line == f"= `{value.span.text}`"):  # it stands there
+        parts.append(line)
+    if where is not document and where.path is not None:
+        parts.append(f"in `{where.path.name}`")
+    return "\n\n".join(parts)
+
+
+def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
+    """What a place had in a document's last check; None where it has been edited since."""
+    checked = document.checked
+    if checked is None:
+        return None
+    if where is document:
+        old_start, old_end = document.before(start), document.before(end)
+        if old_start is None or old_end is None:
+            return None
+        start, end = old_start, old_end
+    return checked.seen.get((where.source.name, start, end))
+
+
+def describe_values(seen: Seen | None) -> str:
+    """The values of a name in a line; empty where none is known."""
+    if seen is None:
+        return ""
+    shown = list(dict.fromkeys(text for v in seen.values if (text := completion.show_value(v)) is not None))
+    if not shown:
+        return ""
+    more = ", …" if seen.count > len(seen.values) and len(shown) > 1 else ""
+    return "= " + ", ".join(f"`{text}`" for text in shown) + more
+
+
+# ---------------------------------------------------------------- what the model offers
+
+
+def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
+    """A geometry or a material, and what it is."""
+    if text not in about:
+        return None
+    dimension = words.dimension_of(text)
+    scenes = "" if dimension is None else f"\n\nof {words.SCENES[dimension]} scenes"
+    return f"{_code(f'{head} {{ … }}')}\n\n{about[text]}{scenes}"
+
+
+def _model(manifest: Manifest) -> str:
+    """A model's facts."""
+    ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
+    rows = [
+        ("geometries", ", ".join(manifest.geometries)),
+        ("materials", ", ".join(manifest.materials)),
+        ("measured for", "; ".join(ranges)),
+    ]
+    table = "\n".join(f"| {name} | {text} |" for name, text in rows if text)
+    head = f"{_code(f'model {chr(34)}{manifest.name}{chr(34)};')}\n\n{manifest.summary}"
+    return f"{head}\n\n| {manifest.dimension}D | |\n|---|---|\n{table}"
+
+
+# ---------------------------------------------------------------- transforms and objects
+
+
+def _calls(document: Document, use: Use) -> Iterator[tree.Call]:
+    """The calls around a name, the innermost first."""
+    path = path_to(document.file, use.start)
+    return (node for node in reversed(path) if isinstance(node, tree.Call))
+
+
+def _transform_facts(document: Document, use: Use) -> str:
+    """The matrix or the formula that a transform came to."""
+    node = next(_calls(document, use), None)
+    seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
+    made = seen.values if seen is not None else []
+    parts = []
+    for item in made[:2]:
+        shown = completion.show_transform(item, space_of(document))
+        if shown is not None:
+            parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
+    more = "\n\n…" if len(made) > 2 else ""
+    return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
+
+
+def _node_facts(document: Document, node: Any) -> str:
+    """The composed chain of an object or a group, and how often it was made."""
+    if not isinstance(node, tree.Call | tree.Node):
+        return ""
+    seen = seen_at(document, document, node.span.start, node.span.end)
+    made = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
+    if seen is None or not made:
+        return ""
+    space = space_of(document)
+    item = made[0]
+    steps = completion.show_chain(item.transforms, space)
+    chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
+    times = f" (the first of {seen.count})" if seen.count > 1 else ""
+    composed = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in steps)
+    stretch = completion.show_stretch(item.transforms, space)
+    return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{composed}\n\nscales by {stretch}"
+
+
+_LONGEST: Final = 28
+_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color)
+_CLEAR: Final = frozenset(
+    {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
+)
+
+
+def inlay_hints(
+    docs: Workspace, document: Document, place: types.Range, settings: Settings
+) -> list[types.InlayHint]:
+    """The hints of a range."""
+    low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+    found: list[types.InlayHint] = []
+    for stmt in document.file.statements:
+        if stmt.span.end < low or stmt.span.start > high:
+            continue
+        for node in walk(stmt):
+            if node.span.end < low or node.span.start > high:
+                continue
+            if isinstance(node, tree.Let) and settings.value_hints:
+                hint = _value(document, node)
+                if hint is not None:
+                    found.append(hint)
+            elif isinstance(node, tree.Call | tree.CallExpr) and settings.argument_hints:
+                found += _arguments(docs, document, node)
+    found.sort(key=lambda hint: (hint.position.line, hint.position.character))
+    return found
+
+
+def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
+    """What a let came to, unless it is written there or differs from pass to pass."""
+    if _is_plain(let.value):
+        return None
+    seen = seen_at(document, document, let.name.span.start, let.name.span.end)
+    if seen is None or not seen.values:
+        return None
+    shown = {completion.show_value(value) for value in seen.values}
+    text = shown.pop()
+    if shown or text is None or len(text) > _LONGEST or text == let.value.span.text:
+        return None
+    return types.InlayHint(
+        document.lines.position(let.value.span.end),
+        f" = {text}",
+        padding_left=False,
+        tooltip="the value that this scene gives it",
+    )
+
+
+def _is_plain(expr: tree.Expr) -> bool:
+    if isinstance(expr, tree.Unary):
+        return _is_plain(expr.operand)
+    if isinstance(expr, tree.Vector):
+        return all(_is_plain(item) for item in expr.items)
+    return isinstance(expr, _PLAIN)
+
+
+def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallExpr) -> list[types.InlayHint]:
+    name = call.name.text
+    args = call.args or ()
+    if name in _CLEAR or not args:
+        return []
+    found = find_symbol(docs, document, document.names, name, call.name.span.start)
+    callee = word_of(found) if found is not None else word_for_call(name, False)
+    if callee is None or callee.variadic or len(callee.params) < 2:
+        return []
+    hints = []
+    for arg, param in zip(args, callee.params, strict=False):
+        value = arg.value
+        alike = isinstance(value, tree.NameRef) and value.name.text == param
+        if arg.name is not None or alike or isinstance(value, tree.BadExpr):
+            continue
+        if found is None and len(param) == 1:
+            continue  # x, y, t: shorter than any help
+        place = document.lines.position(arg.span.start)
+        hints.append(types.InlayHint(place, f"{param}:", types.InlayHintKind.Parameter, padding_right=True))
+    return hints

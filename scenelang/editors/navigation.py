@@ -1,0 +1,319 @@
+"""Going about: definition, references, highlights, rename, links; symbols, folding, growing selections."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from typing import Any, Final
+
+from lsprotocol import types
+
+from scenelang.editors.context import path_to
+from scenelang.editors.workspace import Document, Workspace, uri_of
+from scenelang.language import library, tree
+from scenelang.language.resolve import Scope, Symbol, Use
+from scenelang.language.tree import walk
+from scenelang.language.words import LANGUAGE, RESERVED, STAGE
+
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class Refused(Exception):
+    """Why a name cannot be changed."""
+
+
+def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
+    """Where the name at an offset is defined; for an import's path the file."""
+    use = document.names.at(offset)
+    if use is None:
+        return None
+    if use.role == "path":
+        library = docs.imported(document, use.text)
+        return types.Location(library.uri, library.lines.range(0, 0)) if library is not None else None
+    found = docs.definition(document, use)
+    if found is None and use.symbol is not None and use.symbol.kind == "import":
+        found = document, use.symbol  # a file of elements
+    if found is None:
+        return None
+    where, symbol = found
+    return types.Location(where.uri, where.lines.span(symbol.span))
+
+
+def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Document, Use]]:
+    use = document.names.at(offset)
+    found = docs.definition(document, use) if use is not None else None
+    return list(docs.uses(*found)) if found is not None else []
+
+
+def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
+    """Every place that means the same as the name at an offset."""
+    return [
+        types.Location(where.uri, where.lines.range(use.start, use.end))
+        for where, use in _uses(docs, document, offset)
+        if declaration or not use.defines
+    ]
+
+
+def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
+    """The places of this file that mean the same as the name at an offset."""
+    use = document.names.at(offset)
+    if use is None:
+        return []
+    found = docs.definition(document, use)
+
+    def alike(other: Use) -> bool:
+        if found is None:  # a word of the language: the same word elsewhere
+            return other.role == use.role
+        meant = docs.definition(document, other)
+        return meant is not None and meant[1] is found[1]
+
+    same = [other for other in document.names.uses if other.text == use.text and alike(other)]
+    read, write = types.DocumentHighlightKind.Read, types.DocumentHighlightKind.Write
+    place = document.lines.range
+    return [types.DocumentHighlight(place(u.start, u.end), write if u.defines else read) for u in same]
+
+
+# ---------------------------------------------------------------- rename
+
+
+def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
+    """The name at an offset, where it may be changed.
+
+    Raises:
+        Refused: it belongs to the language or to a model.
+    """
+    use = document.names.at(offset)
+    if use is None:
+        return None
+    found = docs.definition(document, use)
+    if found is None:
+        raise Refused(f"`{use.text}` is not defined in a scene file")
+    _check_owner(found[0], use)
+    return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
+
+
+def rename(
+    docs: Workspace, document: Document, offset: int, new: str, versioned: bool
+) -> types.WorkspaceEdit | None:
+    """Change a name wherever it is meant, in all files.
+
+    Args:
+        versioned: whether the client knows edits of a version of a document.
+
+    Raises:
+        Refused: the new name is none, or would mean something else somewhere.
+    """
+    use = document.names.at(offset)
+    found = docs.definition(document, use) if use is not None else None
+    if found is None or use is None:
+        return None
+    where, symbol = found
+    _check_owner(where, use)
+    if new == symbol.name:
+        return None
+    _check_name(new, symbol)
+    places = list(docs.uses(where, symbol))
+    for other, place in places:
+        _check_place(other, place, symbol, new)
+    _check_captures(docs, where, symbol, new)
+    edits: dict[str, list[types.TextEdit]] = {}
+    for other, place in places:
+        edits.setdefault(other.uri, []).append(types.TextEdit(other.lines.range(place.start, place.end), new))
+    if not versioned:
+        return types.WorkspaceEdit(changes=edits)
+    name, versions = types.OptionalVersionedTextDocumentIdentifier, {d.uri: d.version for d, _ in places}
+    return types.WorkspaceEdit(
+        document_changes=[types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
+    )
+
+
+def _check_owner(where: Document, use: Use) -> None:
+    if where.path is not None and library.owns(where.path):
+        raise Refused(f"`{use.text}` belongs to the library that ships")
+
+
+def _check_name(new: str, symbol: Symbol) -> None:
+    if not _NAME.fullmatch(new):
+        raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
+    if new in RESERVED:
+        raise Refused(f"`{new}` is a keyword")
+    if symbol.kind == "module" and new in LANGUAGE:
+        raise Refused(f"`{new}` is a word of the language and names no module")
+
+
+def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
+    """Whether at a place that is renamed the new name stands for something else already."""
+    if place.role in ("member", "argument"):
+        return
+    scope = symbol.scope if place.defines else other.names.scope_at(place.start)
+    inner: Scope | None = scope
+    while inner is not None:
+        taken = inner.symbols.get(new)
+        if taken is not None:
+            line = taken.span.locate()[0][0]
+            raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
+        inner = None if inner is symbol.scope else inner.parent
+
+
+def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
+    """Whether the renamed definition would be meant where the new name means something else now."""
+    scope = symbol.scope
+    if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
+        raise Refused(f"`{symbol.owner.name}` has a parameter `{new}` already")
+    for use in where.names.uses:
+        if use.text != new or use.role in ("member", "argument", "property", "material", "model", "path"):
+            continue
+        if not scope.start <= use.start < scope.end:
+            continue
+        inner = where.names.scope_at(use.start)
+        meant = inner.find(new)
+        if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
+            line = where.lines.position(use.start).line + 1
+            raise Refused(f"`{new}` in line {line} of {where.name} would mean this")
+
+
+# ---------------------------------------------------------------- links
+
+
+def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
+    """Imports that can be followed."""
+    found = []
+    for stmt in document.file.statements:
+        if isinstance(stmt, tree.Import):
+            library = docs.imported(document, stmt.path.value)
+            if library is not None and library.path is not None:
+                place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
+                found.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    return found
+
+
+Kind = types.SymbolKind
+_DEFINES: Final = {
+    tree.Param: Kind.Property,
+    tree.Let: Kind.Variable,
+    tree.Fn: Kind.Function,
+    tree.Module: Kind.Module,
+}
+# Possessive: a string or comment without end is read once, not once for each of its characters.
+_COMMENT: Final = re.compile(
+    r'"(?:[^"\\\n]|\\[^\n])*+"?|/\*(?:[\s\S]*?\*/|[\s\S]*)|(?:^[ \t]*+//[^\n]*+\n?)++', re.MULTILINE
+)
+
+
+def document_symbols(document: Document) -> list[types.DocumentSymbol]:
+    """The file's definitions and objects as a tree."""
+    return list(_symbols(document.file.statements, document))
+
+
+def _symbols(statements: Iterable[tree.Stmt], document: Document) -> Iterator[types.DocumentSymbol]:
+    for stmt in statements:
+        word = ""
+        if isinstance(stmt, tree.Combined):
+            word, stmt = f"{stmt.op} ", stmt.child
+        entry = _entry(stmt)
+        if entry is None:
+            continue
+        name, kind, selection, inner, detail = entry
+        yield types.DocumentSymbol(
+            name=word + name,
+            kind=kind,
+            range=document.lines.span(stmt.span),
+            selection_range=document.lines.span(selection),
+            detail=detail or None,
+            children=list(_symbols(inner, document)),
+        )
+
+
+def _entry(stmt: tree.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[tree.Stmt, ...], str] | None:
+    match stmt:
+        case tree.Param() | tree.Let():
+            value = stmt.default if isinstance(stmt, tree.Param) else stmt.value
+            shown = " ".join(value.span.text.split())[:60]
+            return stmt.name.text, _DEFINES[type(stmt)], stmt.name.span, (), shown
+        case tree.Fn() | tree.Module():
+            inner = stmt.body.statements if isinstance(stmt, tree.Module) else ()
+            params = ", ".join(p.name.text for p in stmt.params)
+            return stmt.name.text, _DEFINES[type(stmt)], stmt.name.span, inner, f"({params})"
+        case tree.Import():
+            return stmt.alias.text, Kind.File, stmt.alias.span, (), stmt.path.value
+        case tree.Node():
+            detail = f"({', '.join(arg.span.text for arg in stmt.args)})" if stmt.args else ""
+            return stmt.kind, Kind.Struct, stmt.keyword, stmt.body.statements, detail
+        case tree.Call() if stmt.name.text in STAGE and stmt.args is not None and stmt.body is None:
+            detail = f"({', '.join(arg.span.text for arg in stmt.args)})"
+            return stmt.name.text, Kind.Field, stmt.name.span, (), detail
+        case tree.For():
+            return f"for {stmt.variable.text}", Kind.Array, stmt.variable.span, stmt.body.statements, ""
+        case tree.If():
+            inner = stmt.then.statements
+            other = stmt.otherwise
+            inner += (other,) if isinstance(other, tree.If) else other.statements if other else ()
+            return "if", Kind.Boolean, stmt.condition.span, inner, ""
+        case tree.Call() if stmt.body is not None or stmt.args is None:
+            within = stmt.body.statements if stmt.body else ()
+            nested = tuple(s for s in within if isinstance(s, tree.Let | tree.For | tree.If))
+            return stmt.name.text, Kind.Object, stmt.name.span, nested, ""
+        case _:
+            return None
+
+
+def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
+    """Definitions at the top of all files whose names have the letters of a query, in order."""
+    query, found = query.lower(), []
+    for document in docs.known():
+        for stmt in document.file.statements:
+            if isinstance(stmt, tree.Param | tree.Let | tree.Fn | tree.Module):
+                letters = iter(stmt.name.text.lower())
+                if not all(letter in letters for letter in query):
+                    continue
+                place = types.Location(document.uri, document.lines.span(stmt.name.span))
+                kind = _DEFINES[type(stmt)]
+                found.append(types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name))
+                if len(found) >= 500:
+                    return found
+    return found
+
+
+# ---------------------------------------------------------------- folding
+
+
+def folding(document: Document) -> list[types.FoldingRange]:
+    """Blocks, brackets, comments and runs of imports that take more than a line."""
+    found: dict[int, types.FoldingRange] = {}
+    lines = document.lines
+
+    def add(start: int, end: int, kind: types.FoldingRangeKind | None = None, tail: int = 0) -> None:
+        first, last = lines.position(start).line, lines.position(end).line - tail
+        if last > first:
+            found.setdefault(first, types.FoldingRange(first, last, kind=kind))
+
+    for stmt in document.file.statements:
+        for node in walk(stmt):
+            if isinstance(node, tree.Block | tree.Vector):
+                closes = document.text[node.span.end - 1 : node.span.end] in ("}", "]")
+                add(node.span.start, node.span.end, None, int(closes))
+    for group, run in groupby(document.file.statements, lambda stmt: isinstance(stmt, tree.Import)):
+        if group:
+            imports = list(run)
+            add(imports[0].span.start, imports[-1].span.end, types.FoldingRangeKind.Imports)
+    for match in _COMMENT.finditer(document.text):
+        if not match[0].startswith('"'):
+            add(match.start(), match.end() - match[0].endswith("\n"), types.FoldingRangeKind.Comment)
+    return [found[line] for line in sorted(found)]
+
+
+def selection(document: Document, offset: int) -> types.SelectionRange:
+    """The nodes around an offset, innermost first, each within the next."""
+    spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.file, offset))]
+    use = document.names.at(offset)
+    if use is not None:
+        spans.append((use.start, use.end))
+    found: types.SelectionRange | None = None
+    last = (-1, -1)
+    for start, end in spans:
+        if (start, end) != last and (last == (-1, -1) or (last[0] <= start and end <= last[1])):
+            found = types.SelectionRange(document.lines.range(start, end), found)
+            last = (start, end)
+    assert found is not None
+    return found

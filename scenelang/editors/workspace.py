@@ -1,0 +1,509 @@
+"""Documents of the client, their imports, positions, and what can be said of them in the background.
+
+The protocol counts lines, ended by LF, CRLF or CR, and columns in code units of an encoding that client and
+server agree on; everything here counts code points of the whole text.
+
+Nothing here touches a `Document`: a check gets what it needs when it begins and gives back one value, so that
+it may run beside the editing.
+
+An open buffer counts for its file, on the disk or not yet. Files that are not open are read when asked for,
+again when they have changed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import threading
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path, PureWindowsPath
+from typing import Any, Final, Literal
+
+from lsprotocol import types
+from pygls.uris import from_fs_path, to_fs_path
+
+from scenelang.assets.tensors import TensorError
+from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
+from scenelang.compiler.check import check_compiles, check_frames
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.manifest import Manifest
+from scenelang.language import library, tree
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, Fix, Label, SourceFile, Span
+from scenelang.language.diagnostics import Edit as Change
+from scenelang.language.evaluation import Source, in_file_order
+from scenelang.language.lexer import Report, Tokens, scan
+from scenelang.language.limits import Halt
+from scenelang.language.parser import parse
+from scenelang.language.resolve import Names, Symbol, Use, find_unused
+from scenelang.language.session import Unreadable, read_source
+
+Encoding = Literal["utf-8", "utf-16", "utf-32"]
+_NEWLINE: Final = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class Edit:
+    """``old[start:old_end]`` became ``new[start:new_end]``; offsets in code points."""
+
+    start: int
+    old_end: int
+    new_end: int
+
+    @property
+    def delta(self) -> int:
+        return self.new_end - self.old_end
+
+
+def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
+    """The shortest single edit from one text, or list of lines, to another."""
+    start = _alike(old, new)
+    end = _alike(old[start:][::-1], new[start:][::-1])
+    return Edit(start, len(old) - end, len(new) - end)
+
+
+def _alike(left: Sequence[str], right: Sequence[str]) -> int:
+    """Number of items with which both sequences begin."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
+
+
+class Lines:
+    """The lines of one text."""
+
+    def __init__(self, text: str, encoding: Encoding = "utf-16") -> None:
+        self.text = text
+        self.encoding = encoding
+        self.starts = [0, *(match.end() for match in _NEWLINE.finditer(text))]
+        self._plain = text.isascii()
+
+    def _end(self, line: int) -> int:
+        """Where a line ends, its newline left out."""
+        if line + 1 == len(self.starts):
+            return len(self.text)
+        end = self.starts[line + 1] - 1
+        return end - (self.text[end] == "\n" and end > self.starts[line] and self.text[end - 1] == "\r")
+
+    def offset(self, position: types.Position) -> int:
+        """The offset of a position; one past the end of its line or of the text is the end of that."""
+        line = position.line
+        if line >= len(self.starts):
+            return len(self.text)
+        start, end = self.starts[max(line, 0)], self._end(max(line, 0))
+        wanted = max(position.character, 0)
+        if self._plain or self.encoding == "utf-32":
+            return min(start + wanted, end)
+        units = 0
+        for at in range(start, end):
+            if units >= wanted:
+                return at
+            units += width(self.text[at], self.encoding)
+            if units > wanted:
+                return at  # inside a character: before it
+        return end
+
+    def position(self, offset: int) -> types.Position:
+        """The position of an offset."""
+        offset = min(max(offset, 0), len(self.text))
+        line = bisect_right(self.starts, offset) - 1
+        start = self.starts[line]
+        if self._plain or self.encoding == "utf-32":
+            return types.Position(line, offset - start)
+        return types.Position(line, width(self.text[start:offset], self.encoding))
+
+    def range(self, start: int, end: int) -> types.Range:
+        """The range between two offsets."""
+        return types.Range(self.position(start), self.position(end))
+
+    def span(self, span: Span) -> types.Range:
+        """The range of a span of this text."""
+        return self.range(span.start, span.end)
+
+
+def width(text: str, encoding: Encoding) -> int:
+    """How many code units a text has."""
+    if encoding == "utf-32" or text.isascii():
+        return len(text)
+    if encoding == "utf-8":
+        return len(text.encode("utf-8", "surrogatepass"))
+    return len(text) + sum(character > "\uffff" for character in text)
+
+
+def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple[str, Edit]:
+    """The text after one change, and what changed."""
+    text = lines.text
+    if not isinstance(change, types.TextDocumentContentChangePartial):
+        return change.text, difference(text, change.text)
+    start, end = sorted((lines.offset(change.range.start), lines.offset(change.range.end)))
+    return text[:start] + change.text + text[end:], Edit(start, end, start + len(change.text))
+
+
+MAX_SEEN: Final = 4  # values and nodes kept of one place
+
+
+class Superseded(Exception):
+    """The text has changed: nobody wants this check any more."""
+
+
+@dataclass(slots=True)
+class Seen:
+    """What one place had while a scene was evaluated.
+
+    Args:
+        values: of the first frame the first few, in order, equal ones once.
+        count: how many there were.
+    """
+
+    values: list[Any] = field(default_factory=list)
+    count: int = 0
+
+
+@dataclass(slots=True)
+class Checked:
+    """What a check found.
+
+    Args:
+        diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
+        wanted: the files that it imports, also those that are not there.
+        seen: by file name, start and end: values of names, nodes of statements.
+        manifest: the model that draws it, where that is known.
+    """
+
+    source: SourceFile
+    diagnostics: list[Diagnostic]
+    wanted: frozenset[Path]
+    seen: dict[tuple[str, int, int], Seen]
+    manifest: Manifest | None = None
+
+
+def check(
+    file: tree.File,
+    path: Path | None,
+    root: Path | None,
+    texts: Mapping[Path, str],
+    model: str | None,
+    parsed: bool,
+    stop: threading.Event,
+) -> Checked:
+    """Evaluate a scene and run the compiler's checks.
+
+    Args:
+        file: the tree.
+        path: its file, if it has one.
+        root: the folder that imports cannot leave; by default the file's.
+        texts: what open files hold.
+        model: draw with this model instead of the scene's.
+        parsed: the text has no syntax mistakes.
+        stop: asks it to give up.
+
+    Raises:
+        Superseded: ``stop`` was set meanwhile.
+    """
+    found, frame = Diagnostics(), 0
+    seen: dict[tuple[str, int, int], Seen] = {}
+
+    def watch(span: Span, value: Any) -> None:
+        if stop.is_set():
+            raise Halt
+        if frame:
+            return
+        place = seen.setdefault((span.source.name, span.start, span.end), Seen())
+        place.count += 1
+        if len(place.values) < MAX_SEEN and not any(value is old for old in place.values):
+            place.values.append(value)
+
+    def after(stage: str, graph: Graph | None = None) -> None:
+        if stop.is_set():
+            raise Superseded
+
+    source = Source(path, tree=file, model=model, root=root, texts=texts)
+    evaluation = source.evaluation(found, replays=True, watch=watch)
+    scene, spans = evaluation.run(0)
+    after("evaluate")
+    manifest = None
+    if parsed:
+        find_unused(file, found)
+        if scene is not None:
+            manifest = check_compiles(scene, spans, found, after=after)
+        frame = 1
+        check_frames(evaluation, found, first=scene, after=after)
+        after("frames")
+    wanted = frozenset(evaluation.wanted)
+    return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)
+
+
+MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
+MAX_TEXT: Final = 2_000_000
+"""Characters of a text that is parsed; its tree, tokens and places take a hundred times as many bytes."""
+
+
+@dataclass(eq=False)
+class Document:
+    """A text with its tree and what is known about it.
+
+    Args:
+        uri: what the client calls it.
+        path: its resolved file; None for a buffer that has none.
+        version: the client's number of this text; None for a file that is not open.
+        checked: the last evaluation that ended, perhaps of an older text.
+        edits: what has been edited since that.
+        semantic: what it found, at the places of now.
+    """
+
+    uri: str
+    path: Path | None
+    source: SourceFile
+    version: int | None = None
+    encoding: Encoding = "utf-16"
+    checked: Checked | None = None
+    edits: list[Edit] = field(default_factory=list)
+    semantic: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return self.path.name if self.path is not None else self.uri
+
+    @property
+    def text(self) -> str:
+        return self.source.text
+
+    @cached_property
+    def lines(self) -> Lines:
+        return Lines(self.text, self.encoding)
+
+    @cached_property
+    def names(self) -> Names:
+        return Names(self.file)
+
+    @property
+    def file(self) -> tree.File:
+        """The tree."""
+        return self._parsed[0]
+
+    @cached_property
+    def tokens(self) -> Tokens:
+        """The tokens as they stand in the text; none of one that is too long."""
+        source = SourceFile(self.source.name, "") if self._is_too_long else self.source
+        return scan(source, Report(source))
+
+    @property
+    def syntax(self) -> tuple[Diagnostic, ...]:
+        """All syntax mistakes, in the order of the text."""
+        return self._parsed[1]
+
+    @property
+    def _is_too_long(self) -> bool:
+        return len(self.text) > MAX_TEXT
+
+    @cached_property
+    def _parsed(self) -> tuple[tree.File, tuple[Diagnostic, ...]]:
+        if self._is_too_long:
+            message = (
+                f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
+            )
+            help = "`scenelang check` does, up to 10 MB"
+            nowhere = Span(self.source, 0, 0)
+            return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
+        found = Diagnostics()
+        return parse(self.source, found), tuple(found)
+
+    def change(self, change: types.TextDocumentContentChangeEvent) -> None:
+        """Take over one change of the client's."""
+        text, edit = applied(self.lines, change)
+        source = SourceFile(self.source.name, text)
+        self.source = source
+        self.edits.append(edit)
+        self.semantic = [moved for d in self.semantic if (moved := _carried(d, edit, source)) is not None]
+        for name in ("_parsed", "lines", "names", "tokens"):
+            self.__dict__.pop(name, None)
+
+    def before(self, offset: int) -> int | None:
+        """Where a place stood in the text that was checked; None where it has been edited since."""
+        for edit in reversed(self.edits):
+            if offset >= edit.new_end:
+                offset -= edit.delta
+            elif offset > edit.start:
+                return None
+        return offset
+
+
+def _carried(diagnostic: Diagnostic, edit: Edit, source: SourceFile) -> Diagnostic | None:
+    """A diagnostic after an edit; None where the edit touches it."""
+
+    def carried(span: Span) -> Span | None:
+        if span.source.name != source.name:
+            return span
+        if span.end < edit.start:
+            return Span(source, span.start, span.end)
+        moved = Span(source, span.start + edit.delta, span.end + edit.delta)
+        return moved if span.start > edit.old_end else None
+
+    d = diagnostic
+    span = carried(d.span) if d.span is not None else None
+    if span is None:
+        return None
+    labels = [Label(at, label.message) for label in d.labels if (at := carried(label.span)) is not None]
+    fix = None
+    if d.fix is not None:
+        edits = [Change(at, e.replacement) for e in d.fix.edits if (at := carried(e.span)) is not None]
+        fix = Fix(d.fix.message, tuple(edits)) if len(edits) == len(d.fix.edits) else None
+    return Diagnostic(d.code, d.message, span, tuple(labels), d.help, fix)
+
+
+class Workspace:
+    """All documents."""
+
+    def __init__(self, encoding: Encoding = "utf-16", folders: list[Path] | None = None) -> None:
+        self.encoding = encoding
+        self.folders = folders or []
+        self.open: dict[str, Document] = {}
+        self._closed: dict[Path, tuple[tuple[int, int], Document]] = {}
+
+    # ------------------------------------------------------------ the client's buffers
+
+    def put(self, uri: str, text: str, version: int | None) -> Document:
+        """Open a buffer, or open it anew."""
+        path = path_of(uri)
+        source = SourceFile(str(path) if path is not None else uri, text)
+        document = Document(uri, _resolved(path), source, version, self.encoding)
+        self.open[uri] = document
+        return document
+
+    def get(self, uri: str) -> Document | None:
+        """An open buffer, or the file that the address means."""
+        return self.open.get(uri) or self.by_path(_resolved(path_of(uri)))
+
+    def by_path(self, path: Path | None) -> Document | None:
+        """The document of a resolved file: its buffer, or what is on the disk."""
+        if path is None:
+            return None
+        for document in self.open.values():
+            if document.path == path:
+                return document
+        try:
+            stat = path.stat()
+            stamp = (stat.st_mtime_ns, stat.st_size)
+            known = self._closed.get(path)
+            if known is not None and known[0] == stamp:
+                return known[1]
+            if not path.is_file():
+                return None
+            source = read_source(path, str(path))
+        except (OSError, Unreadable, ValueError):
+            return None
+        document = Document(uri_of(path), path, source, None, self.encoding)
+        self._closed[path] = (stamp, document)
+        return document
+
+    def texts(self) -> dict[Path, str]:
+        """What open files hold, for imports."""
+        return {d.path: d.text for d in self.open.values() if d.path is not None}
+
+    def known(self) -> Iterator[Document]:
+        """Every document: open ones, then the scenes in the client's folders."""
+        yield from list(self.open.values())
+        seen = {d.path for d in self.open.values()}
+        folders = self.folders or sorted({d.path.parent for d in self.open.values() if d.path is not None})
+        for folder in folders:
+            for path in map(Path.resolve, scenes_below(folder, MAX_FILES * 10)):
+                if path not in seen:
+                    seen.add(path)
+                    document = self.by_path(path)
+                    if document is not None:
+                        yield document
+
+    # ------------------------------------------------------------ names across files
+
+    def imported(self, document: Document, text: str) -> Document | None:
+        """The document that an import's path means."""
+        if library.is_reserved(text):
+            return self.by_path(library.find(text))
+        return self.by_path(self._place(document, text))
+
+    def zoo(self, document: Document, stmt: tree.Import) -> Zoo | None:
+        """The file of elements that an import brings, if it is one."""
+        path = library.find(stmt.path.value) or self._place(document, stmt.path.value)
+        if path is None or path.suffix != SUFFIX:
+            return None
+        try:
+            return load_zoo(path)
+        except (OSError, TensorError):
+            return None
+
+    def _place(self, document: Document, text: str) -> Path | None:
+        """The file that a path in a document means."""
+        folder = document.path.parent if document.path is not None else next(iter(self.folders), None)
+        if folder is None or not text or "\0" in text or os.path.isabs(text) or PureWindowsPath(text).drive:
+            return None
+        return _resolved(folder / text)
+
+    def definition(self, document: Document, use: Use) -> tuple[Document, Symbol] | None:
+        """Where what a use means is defined, over as many files as it takes."""
+        if use.role == "argument":
+            callee = self.definition(document, use.callee) if use.callee is not None else None
+            if callee is None:
+                return None
+            where, symbol = callee
+            return next(((where, p) for p in symbol.params if p.name == use.text), None)
+        if use.symbol is None:
+            return None
+        if use.role not in ("member", "material"):
+            return document, use.symbol
+        stmt = use.symbol.node
+        library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
+        if library is None:
+            return None
+        found = library.names.top.symbols.get(use.text.partition(".")[0])
+        return (library, found) if found is not None and found.is_exported else None
+
+    def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:
+        """Every place that means a definition; its own is among them."""
+        for use in document.names.uses:
+            target = self.definition(document, use) if use.text == symbol.name else None
+            if target is not None and target[1] is symbol:
+                yield document, use
+        if not (symbol.is_exported or (symbol.owner is not None and symbol.owner.is_exported)):
+            return
+        for other in self.known():
+            if other.uri == document.uri or symbol.name not in other.text:
+                continue
+            for use in other.names.uses:
+                if use.text != symbol.name or use.role not in ("member", "argument"):
+                    continue
+                target = self.definition(other, use)
+                if target is not None and target[1] is symbol:
+                    yield other, use
+
+
+def scenes_below(folder: Path, most: int) -> Iterator[Path]:
+    """The scenes in a folder, hidden folders left out; so many files are looked at."""
+    count = 0
+    for where, inner, files in os.walk(folder):
+        inner[:] = sorted(name for name in inner if not name.startswith(".") and name != "node_modules")
+        for name in sorted(files):
+            count += 1
+            if count > most:
+                return
+            if name.endswith(".nsg"):
+                yield Path(where, name)
+
+
+def path_of(uri: str) -> Path | None:
+    """The file of an address; None for buffers that have none."""
+    name = to_fs_path(uri) if uri.startswith("file:") else None
+    return Path(name) if name and "\0" not in name else None
+
+
+def uri_of(path: Path) -> str:
+    """The address of a file."""
+    return str(from_fs_path(str(path)))
+
+
+def _resolved(path: Path | None) -> Path | None:
+    try:
+        return path.resolve() if path is not None else None
+    except (OSError, RuntimeError, ValueError):
+        return None

@@ -1,1 +1,0 @@
-"""What users bring: shapes that are data, in files that scenes import."""

@@ -1,1 +1,0 @@
-"""Which mistakes have one cause and are reported once, and what is advised."""

@@ -1,1 +1,0 @@
-"""Values of expressions, operators, functions, and the arguments of transforms."""

@@ -1,1 +1,0 @@
-"""Elements from what users bring. The rest of the package draws without what this needs."""

@@ -1,1 +1,0 @@
-"""Colours for scene text: a Pygments lexer, and the TextMate grammar that editors use."""

@@ -1,1 +1,0 @@
-"""Scenes, graphs and Programs as data and drawings for other software."""

@@ -1,0 +1,503 @@
+"""From pictures back to scenes: the values of params whose picture comes nearest to a target.
+
+Otherwise sizes and colours make up for the blur, and the nearest picture is not that of the true values.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.assets.records import Record
+from scenelang.compiler.manifest import load_manifest
+from scenelang.drawing.exact.mesh import FitError
+from scenelang.drawing.how import Samples
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import UNCAPPED_DB
+from scenelang.inverse import search
+from scenelang.inverse.problem import LEVELS, Moment, Problem, Together
+from scenelang.inverse.search import (
+    ALIKE,
+    NEAR,
+    STEPS,
+    WHITE,
+    Blur,
+    Found,
+    Given,
+    Matrix,
+    Picture,
+    Point,
+    Space,
+    blurred,
+    descend,
+    space_of,
+    target_of,
+)
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Axis, Source, literals_of, rewritten
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
+
+SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
+MOST_SOLID: Final = 128  # of solids, which take longer
+MOST_TARGETS: Final = 64
+
+
+class Task(Record):
+    """A scene, its params and what it is to look like.
+
+    Args:
+        problems: pictures of sizes from small to large; the last compare what is drawn in the end.
+        space: the params that are searched.
+        first: where they start.
+        kept: the others that have been set, as text of the language.
+    """
+
+    problems: tuple[Together, ...]
+    space: Space
+    first: Point
+    kept: dict[str, str]
+
+
+def task_of(
+    scene: str | os.PathLike[str] | SourceFile,
+    target: Given | Mapping[int, Given],
+    *,
+    params: Iterable[str] = (),
+    start: Mapping[str, Any] = {},
+    fixed: Mapping[str, Any] = {},
+    mask: Given | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    background: tuple[float, float, float] = WHITE,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+) -> Task:
+    """What `scenelang.fit`, whose arguments and errors these are, is to do."""
+    found = Diagnostics()
+    given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
+    source = Source(**given, params=fixed, model=model, root=root).parsed(found)
+    if found.errors:
+        raise SceneError(found)
+    targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
+    if not 0 < len(targets) <= MOST_TARGETS:
+        raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
+    moments = [Moment(source, number) for number in sorted(targets)]
+    evaluation, made = moments[0].evaluated(start)
+    space = space_of(evaluation, params, fixed)
+    for name in start:
+        if name not in space.names:
+            raise FitError(f"a start for `{name}`, which is not among the params to find")
+    first = space.point({})
+    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in moments}
+    goals = [
+        target_of(targets[each.frame], made.canvas, mask=mask, crop=crop, under=background)
+        for each in moments
+    ]
+    smallest = min(min(goal.weights.shape) for goal in goals)
+    short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, smallest)
+    sides = [side for side in SIDES if side < short] + [short]
+
+    def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
+        canvas = _sized(made.canvas, side)
+        return Together(
+            [
+                Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
+                for each, goal in zip(moments, goals, strict=True)
+            ]
+        )
+
+    problems = [
+        compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
+        for at, side in enumerate(sides)
+    ]
+    if not solid:
+        problems.append(compared(short, "adaptive", 1, False))
+    return Task(tuple(problems), space, first, literals_of(evaluation, fixed))
+
+
+def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
+    """Whether a scene is of solids, if it has pictures that can be compared."""
+    program = moment.program(values, canvas)
+    if program is None:
+        raise SceneError(moment.trouble)
+    manifest = load_manifest(program.model)
+    if manifest.renderer not in ("framed", "solid"):
+        raise FitError(
+            f"model `{manifest.name}` draws pictures of one size only, and fitting needs small ones"
+        )
+    return manifest.renderer == "solid"
+
+
+def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
+    factor = side / min(canvas)
+    return max(1, round(canvas[0] * factor)), max(1, round(canvas[1] * factor))
+
+
+WIDEST: Final = 8.0  # standard deviation, pixels
+ENOUGH: Final = 1e-6  # share of the error by which a step has to lower it: most of it may be noise
+
+
+class Lens:
+    """The blur of a target, which is found with the values: one more number of a search.
+
+    Args:
+        problem: of the last size.
+        space: the params.
+        until: nothing is begun after this time, as of `time.monotonic`.
+    """
+
+    def __init__(self, problem: Together, space: Space, until: float) -> None:
+        self.problem, self.space, self.until = problem, space, until
+        self.finer = problem.finer()
+        self._last: tuple[Found, Found, Blur] | None = None
+
+    def followed(self, place: Found) -> tuple[Found, Blur]:
+        """Where a place leads to once pictures are blurred, and how; not at all where that leads nowhere."""
+        if self._last is None or self._last[0] is not place:
+            self._last = place, *self._follow(place, (True, False))
+        return self._last[1:]
+
+    def noise(self, place: Found) -> bool:
+        """Whether what is left is like noise, once the blur is taken into account."""
+        found, blur = self.followed(place)
+        return self.problem.noise(found.point, blur)
+
+    def ended(self, places: Sequence[Found]) -> tuple[list[Found], Blur]:
+        """Places of a search, best first, once more with the blur of the first, if it has one."""
+        first, blur = self.followed(places[0])
+        if not blur.sigma:
+            return list(places), blur
+        near = (one for one in places[1:] if one.cost <= ALIKE * places[0].cost)
+        others = [self._follow(one, (blur.light,))[0] for one in near]
+        return [first, *sorted(others, key=lambda one: one.cost)], blur
+
+    def _follow(self, place: Found, ways: Sequence[bool]) -> tuple[Found, Blur]:
+        pictures = None if place.cost <= NEAR else self.problem.pictures(place.point)
+        sigma = 0.0 if pictures is None else self.problem.blur(pictures)
+        best = place, Blur()
+        if not sigma:
+            return best
+        wide, start = self.space.beside(Axis("blur", 0.0, WIDEST)), np.append(place.point, sigma / WIDEST)
+        for light in ways:
+            if time.monotonic() > self.until:
+                break
+            residuals = partial(self._residuals, light)
+            found = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
+            if found is not None and found.cost < best[0].cost:
+                way = place.way + tuple(u[:-1] for u in found.way)
+                ended = Found(found.point[:-1], found.cost, way)
+                best = ended, Blur(WIDEST * float(found.point[-1]), light)
+        return best
+
+    def _residuals(self, light: bool, u: Point) -> Point | None:
+        """Residuals of params and, as a share of `WIDEST`, the blur."""
+        drawn = self.finer if light else self.problem
+        found, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
+        if found is None:
+            return None
+        times = drawn.canvas[0] // self.problem.canvas[0]
+        return self.problem.residuals([blurred(one, blur, times) for one in found])
+
+
+TIED: Final = 0.9  # correlation from which two numbers explain each other
+LEVEL: Final = 1 / 255
+_UNSEEN: Final = 1e-4  # root mean square change over a whole range that is none
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """One number that was found, or one of a vector.
+
+    Args:
+        label: ``k``, or ``ink.2`` of a vector.
+        low, high: its range, in base units.
+        value: what was found, in base units.
+        felt: how far it has to move for the picture to change by 1/255 (root mean square of all channels), in
+            shares of its range; inf where the picture does not show it, NaN of a choice.
+    """
+
+    label: str
+    low: float
+    high: float
+    value: float
+    felt: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What `scenelang.fit` found.
+
+    Args:
+        text: the scene with what was found as defaults, comments and layout as they were.
+        values: what was found, as text of the language, by param.
+        psnr: how near the picture of ``text`` is to the target, dB, over pixels that count; at most 100.
+        blur: of the target, as far as it tells.
+        blurred_psnr: how near the picture is once it is blurred as much.
+        start_psnr: of the picture before.
+        size: of the pictures that were compared, width and height.
+        done: whether the search came to an end by itself.
+        notes: what stands in the way of a nearer picture or a surer value, in sentences without a full stop.
+        numbers: of continuous params, how much the picture feels them.
+        tied: pairs of their labels and how far they are correlated, from `TIED` on.
+        others: values of other places whose pictures are about as near.
+        frames: pictures that were drawn.
+        before, after, target: pictures (H, W, 3) of that size, of several targets one below the other.
+        way: scenes from the start to what was found, as `scenelang.animate` takes them.
+    """
+
+    text: str = field(repr=False)
+    values: dict[str, str]
+    psnr: float
+    blur: Blur
+    blurred_psnr: float
+    start_psnr: float
+    size: tuple[int, int]
+    done: bool
+    notes: tuple[str, ...]
+    numbers: tuple[Number, ...]
+    tied: tuple[tuple[str, str, float], ...]
+    others: tuple[dict[str, str], ...]
+    frames: int
+    before: Image = field(repr=False)
+    after: Image = field(repr=False)
+    target: Image = field(repr=False)
+    way: tuple[Scene, ...] = field(repr=False)
+
+    def told(self) -> list[str]:
+        """The report, line by line."""
+        felt = {one.label: one.felt for one in self.numbers}
+        lines = [f"PSNR to the target {self.psnr:.1f} dB, before {self.start_psnr:.1f} dB (more is nearer)"]
+        if self.blur.sigma:
+            seen = "out of focus" if self.blur.light else "blurred, in sRGB"
+            lines.append(
+                f"the target is {seen}: after a blur of {self.blur.sigma:.2f} pixels the PSNR is "
+                f"{self.blurred_psnr:.1f} dB"
+            )
+        for name, text in self.values.items():
+            shares = [share for label, share in felt.items() if label.partition(".")[0] == name]
+            said = ""
+            if shares and not any(map(math.isnan, shares)):
+                most = max(shares)
+                said = (
+                    "  not seen" if math.isinf(most) else f"  ± {most:.2%} of its range changes it by 1/255"
+                )
+            lines.append(f"  {name} = {text}{said}")
+        lines += [f"`{a}` and `{b}` explain each other here (correlation {r:.2f})" for a, b, r in self.tied]
+        for other in self.others:
+            said = ", ".join(f"{name} = {text}" for name, text in other.items())
+            lines.append(f"about as near: {said}")
+        return [*lines, *self.notes]
+
+    def sheet(self) -> Image:
+        """Before, after and target side by side."""
+        gap = np.ones((self.target.shape[0], 4, 3), np.float32)
+        parts = [np.asarray(part, np.float32) for part in (self.before, self.after, self.target)]
+        return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
+
+
+def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
+    """What is known of each continuous axis."""
+    found = []
+    for at in np.flatnonzero(space.smooth).tolist():
+        axis = space.axes[at]
+        rate = 0.0 if slopes is None else float(np.linalg.norm(slopes[:, at]))
+        share = math.nan if slopes is None else LEVEL / rate if rate > _UNSEEN else math.inf
+        value = axis.low + float(u[at]) * (axis.high - axis.low)
+        found.append(Number(axis.label, axis.low, axis.high, value, share))
+    return tuple(found)
+
+
+def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of axes of which one makes up for what the other does."""
+    if slopes is None:
+        return ()
+    seen = np.flatnonzero(np.linalg.norm(slopes, axis=0) > _UNSEEN)
+    unit = slopes[:, seen] / np.linalg.norm(slopes[:, seen], axis=0)
+    spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # the same columns may stand twice
+    size = np.sqrt(np.diag(spread))
+    found = []
+    for i in range(len(seen)):
+        for j in range(i):
+            r = float(spread[i, j] / (size[i] * size[j]))
+            if abs(r) >= TIED:
+                found.append((space.axes[seen[j]].label, space.axes[seen[i]].label, r))
+    return tuple(found)
+
+
+def hindrances(
+    space: Space,
+    u: Point,
+    numbers: Sequence[Number],
+    psnr: float,
+    done: bool,
+    worst: tuple[str, Matrix],
+    noise: bool,
+) -> tuple[str, ...]:
+    """Why the picture is no nearer, as far as can be told.
+
+    Args:
+        worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
+        noise: whether these are like noise.
+    """
+    notes = []
+    if not done:
+        notes.append("not converged: the last rounds still found nearer pictures, or time was out")
+    ends = np.flatnonzero(space.smooth & ~space.wraps & (np.minimum(u, 1 - u) < 1e-6)).tolist()
+    notes += [f"`{space.axes[at].label}` is at an end of its range" for at in ends]
+    unseen = [f"`{one.label}`" for one in numbers if math.isinf(one.felt)]
+    if unseen:
+        notes.append(f"the picture does not show {', '.join(unseen)} here, so any value would do")
+    if psnr < GOOD_DB and noise:
+        notes.append("what differs is like noise, of which no values come nearer")
+    elif psnr < GOOD_DB:
+        name, gap = worst
+        rows, columns = (np.arange(length) for length in gap.shape)
+        y, x = (gap.sum(1) @ rows / gap.sum(), gap.sum(0) @ columns / gap.sum())
+        top, left = divmod(int(gap.argmax()), gap.shape[1])
+        notes.append(
+            f"no values that were tried come nearer: the scene differs from the target most at pixel "
+            f"{left}, {top} of {gap.shape[1]} × {gap.shape[0]}{name}, on average around "
+            f"{x:.0f}, {y:.0f}"
+        )
+    return tuple(notes)
+
+
+GOOD_DB: Final = 35.0
+"""From here on nothing is said of where a picture differs."""
+
+
+Progress = Callable[[str, int, int], None]
+NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
+
+
+def fit(
+    scene: str | os.PathLike[str] | SourceFile,
+    target: Given | Mapping[int, Given],
+    *,
+    params: Iterable[str] = (),
+    start: Mapping[str, Any] | None = None,
+    fixed: Mapping[str, Any] | None = None,
+    mask: Given | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+    background: tuple[float, float, float] = WHITE,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    seed: int = 0,
+    budget_s: float = 300.0,
+    progress: Progress = lambda what, done, count: None,
+) -> Fit:
+    """Find the values of params whose picture comes nearest to a target: ``fit("a.nsg", "a.png")``.
+
+    Args:
+        scene: the file, or its text, which then imports from ``root``.
+        target: a picture (.png, .jpg), or an array (H, W, 3 or 4) of sRGB-encoded values in [0, 1]; several
+            by their frames of an animation, as in ``{0: "a.png", 12: "b.png"}``.
+        params: those to find, of the file itself; by default all that have a range. Colours need none.
+        start: values to begin with, as for `scenelang.load`; by default the scene's.
+        fixed: values of other params, which are kept.
+        mask: a picture of the target's size, bright where its pixels count; of each, where there are several.
+        crop: x, y, width and height of the part of each target that shows the scene.
+        background: sRGB-encoded, behind what is transparent in the target and in the scene.
+        model, root, frame: as for `scenelang.load`; the frame is that of a single target.
+        seed: of where to look; the same seed finds the same, unless time was out.
+        budget_s: nothing new is begun after so many seconds.
+        progress: called with what is done, how much of it, and all.
+
+    Returns:
+        What was found, also where it is not near.
+
+    Raises:
+        FitError: there is nothing to find, the target does not fit the scene, or no values give a picture.
+        SceneError: the scene has errors.
+        OSError: a file cannot be read.
+    """
+    until = time.monotonic() + budget_s
+    task = task_of(
+        scene, target, params=params, start=start or {}, fixed=fixed or {}, mask=mask, crop=crop,
+        background=background, model=model, root=root, frame=frame,
+    )  # fmt: skip
+    lens = Lens(task.problems[-1], task.space, until)
+    places, done = search.solve(
+        task.problems,
+        task.space,
+        task.first,
+        seed=seed,
+        until=until,
+        noise=lens.noise,
+        report=progress,
+    )
+    if not places:
+        raise FitError("no values that were tried give a picture")
+    return _fit(task, lens, *lens.ended(places), done)
+
+
+def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) -> Fit:
+    """What there is to say of the places that a search came to, and of the target's blur."""
+    space, problems, first = task.space, task.problems, task.first
+    last, best = problems[-1], places[0].point
+    every = [space.literals(place.point) for place in places]
+    moment = last.parts[0].moment
+    text = rewritten(moment.tree, {**task.kept, **every[0]})
+    after = last.drawn([part.moment.reads(text).program({}, last.canvas) for part in last.parts])
+    before = last.pictures(first)
+    if after is None:
+        raise FitError("the scene with the values that were found has no picture")
+    near = _db(last, after)
+    soft = [blurred(one, blur) for one in after]
+    step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
+    slopes = search.central(last.pixels, space, best, step, space.smooth)
+    numbers = numbers_of(space, best, slopes)
+    others = [
+        literals
+        for place, literals in zip(places[1:], every[1:], strict=True)
+        if place.cost <= max(search.ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+    ]
+    return Fit(
+        text=text,
+        values=every[0],
+        psnr=near,
+        blur=blur,
+        blurred_psnr=_db(last, soft),
+        start_psnr=_db(last, before) if before is not None else -math.inf,
+        size=last.canvas,
+        done=done,
+        notes=hindrances(
+            space, best, numbers, _db(last, soft), done, last.worst(soft), last.noise(best, blur)
+        ),
+        numbers=numbers,
+        tied=ties(space, slopes),
+        others=tuple(others),
+        frames=sum(problem.frames for problem in (*problems, lens.finer)),
+        before=_image(after if before is None else before),
+        after=_image(after),
+        target=_image([part.colours for part in last.parts]),
+        way=tuple(_scenes(moment, space, [first, *places[0].way, best])),
+    )
+
+
+def _scenes(moment: Moment, space: Space, way: Sequence[Point]) -> Iterator[Scene]:
+    """The scenes of places that have one."""
+    for u in way:
+        with suppress(SceneError):
+            yield moment.evaluated(space.values(u))[1]
+
+
+def _db(problem: Together, pictures: Sequence[Picture]) -> float:
+    """PSNR over the pixels that count."""
+    off = problem.residuals(pictures)
+    error = float(off @ off)
+    return UNCAPPED_DB if error <= 0 else min(UNCAPPED_DB, -10 * math.log10(error))
+
+
+def _image(pictures: Sequence[Picture]) -> Image:
+    return np.concatenate(pictures).astype(np.float32).view(Image)

@@ -1,0 +1,232 @@
+"""The smallest grids of distances that are as near as asked.
+
+A grid that is true at its nodes cuts the edges and corners of a shape between them. Moving its nodes by what
+it says at points of the surface, in some rounds (SIRT; Gilbert 1972), halves its error there.
+
+Pyramids of two kinds of coarsest grid grow level by level, the smaller one first. The finest grid of each is
+settled on the surface (`settle.py`), and it is measured as it is drawn: what it says at other points of the
+true surface, and how its normals lie there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.element import MOST_SIDE, Element
+from scenelang.assets.pyramid import Grid, finest, packed, refine, unpacked
+from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.exact.mesh import Points, Shape
+from scenelang.drawing.neural.assets import GridShape
+
+ROUNDS: Final = 8
+Corner = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
+
+
+def corners(points: Points, side: int) -> list[Corner]:
+    """Nodes around points (M, d) of a grid over [-1, 1]^d, and what each counts between them.
+
+    Args:
+        side: nodes along an axis.
+
+    Returns:
+        Indices (M,) of flattened nodes and their weights (M,), for each corner of a cell.
+    """
+    d = points.shape[1]
+    place = (points + 1) * ((side - 1) / 2)
+    cell = np.clip(place.astype(np.int64), 0, side - 2)
+    share = place - cell
+    return [
+        (np.ravel_multi_index(tuple((cell + at).T), (side,) * d), np.where(at, share, 1 - share).prod(1))
+        for at in product((0, 1), repeat=d)
+    ]
+
+
+def settled(grid: Grid, points: Points) -> Grid:
+    """The grid with nodes moved so that what is drawn of it is nearer to 0 at points (M, d)."""
+    around = corners(points, len(grid))
+    shares = sum(np.bincount(node, weight, grid.size) for node, weight in around)
+    grid, asked = grid.copy(), np.ascontiguousarray(points.T, np.float32)
+    for _ in range(ROUNDS):
+        drawn = finest(grid)
+        off = GridShape(NUMPY, drawn.reshape(-1), len(drawn), grid.ndim).distance(asked)
+        move = sum(np.bincount(node, weight * off, grid.size) for node, weight in around)
+        grid -= np.asarray(move / np.maximum(shares, 1e-9), np.float32).reshape(grid.shape)
+    return grid
+
+
+CELLS: Final = (4, 6)  # of the coarsest grids, along an axis
+FEWEST: Final = {2: 25, 3: 13}  # nodes along an axis of what is measured, by dimension
+BAND: Final = 4.5  # cells from the surface within which distances are true; farther ones are expected
+SAMPLES: Final = 20_000  # points of the surface where an element is measured
+SETTLED: Final = {2: 0, 3: 200_000}  # and where it is settled, by dimension
+BLOCK: Final = 100_000  # points that are asked for at a time
+LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit unless a budget is larger
+DEARER: Final = 4.0  # at most, a grid than the one before
+THIN: Final = 0.02  # share of a surface that may be too thin for a grid
+NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by dimension
+
+
+class Rung(NamedTuple):
+    """One pyramid that was tried.
+
+    Args:
+        side: nodes along an axis of its finest grid.
+        error: mean distance off at the surface, in leaf units.
+        worst: what one point of a hundred exceeds.
+        normal_deg: median angle between normals.
+        thin: share of the surface within a cell of which the grid has no inside, or nothing has.
+    """
+
+    side: int
+    bytes: int
+    error: float
+    worst: float
+    normal_deg: float
+    thin: float
+
+
+@dataclass(slots=True)
+class _Pyramid:
+    """A pyramid as far as it has grown."""
+
+    cells: int
+    grid: Grid | None = None
+    before: Grid | None = None
+    true: Grid | None = None
+    steps: list[npt.NDArray[np.int8]] = field(default_factory=list)
+
+    @property
+    def next_side(self) -> int:
+        return (self.cells << len(self.steps)) + 1
+
+    def grow(self, shape: Shape, progress: Callable[[int, float], None]) -> None:
+        side = self.next_side
+        axis = np.linspace(-1, 1, side)
+
+        def true(expected: Grid) -> Grid:
+            found = expected.reshape(-1).copy()
+            near = abs(found) < BAND * 2 / (side - 1) if len(self.steps) > 1 else found < np.inf
+            at = np.stack(np.unravel_index(np.nonzero(near)[0], expected.shape), 1)
+            for first in range(0, len(at), BLOCK):
+                progress(side, first / len(at))
+                part = at[first : first + BLOCK]
+                found[np.ravel_multi_index(tuple(part.T), expected.shape)] = shape.distances(axis[part])
+            self.true = found.reshape(expected.shape)
+            return self.true
+
+        self.before = self.grid
+        self.grid, steps = refine(self.grid, side, shape.dimension, true)
+        self.steps.append(steps)
+
+    def element(self, name: str, points: Points) -> Element:
+        """The element so far, settled on points of the surface; of a solid with fine steps there."""
+        steps, true, finer = self.steps, self.true, False
+        if len(points) and true is not None:
+            finer, grid = true.ndim == 3, settled(true, points)
+            steps = [*steps[:-1], refine(self.before, len(true), true.ndim, lambda _: grid, finer)[1]]
+        return packed(name, self.cells, steps, {}, finer)
+
+
+def fit(
+    shape: Shape,
+    name: str,
+    *,
+    max_error: float | None = None,
+    budget_s: float = np.inf,
+    steps: int | None = None,
+    about: dict[str, str | float] | None = None,
+    report: Callable[[Rung], None] = lambda rung: None,
+    progress: Callable[[int, float], None] = lambda side, share: None,
+) -> tuple[Element, list[Rung]]:
+    """The smallest element whose mean error is at most ``max_error``, or the nearest that was tried.
+
+    Args:
+        max_error: in leaf units; `NEAR` if left out.
+        budget_s: no further pyramid is begun after so many seconds; one is tried in any case. Nor is one,
+            without ``steps``, that may end after `LONG_S` of processor time.
+        steps: how many are tried at most, whatever the time; the same number gives the same bytes.
+        about: what the element says of itself, beside its figures.
+        report: called with each that was tried.
+        progress: called with nodes along an axis of what grows, and the share of it that is done.
+    """
+    started, worked, spent = time.monotonic(), time.process_time(), 0.0
+    long_s = max(LONG_S, budget_s) if budget_s < np.inf else LONG_S
+    points, normals, thin = shape.surface(SAMPLES + SETTLED[shape.dimension])
+    others, points, normals = points[SAMPLES:], points[:SAMPLES], normals[:SAMPLES]
+    growing = [_Pyramid(cells) for cells in CELLS]
+    best: tuple[Rung, Element] | None = None
+    tried: list[Rung] = []
+    ended = "steps"
+    while best is None or (
+        len(tried) < steps if steps is not None else time.monotonic() - started < budget_s
+    ):
+        pyramid = min(growing, key=lambda p: p.next_side)
+        if pyramid.next_side > MOST_SIDE[shape.dimension]:
+            ended = "largest grid"
+            break
+        spent, before = time.process_time() - worked, spent
+        if tried and steps is None and spent + DEARER * (spent - before) > long_s:
+            ended = "time"
+            break
+        pyramid.grow(shape, progress)
+        if pyramid.next_side // 2 + 1 < FEWEST[shape.dimension]:
+            continue
+        element = pyramid.element(name, others)
+        rung = measured(element, points, normals, thin)
+        tried.append(rung)
+        report(rung)
+        if best is None or rung.error < best[0].error:
+            best = rung, element
+        if rung.error <= (max_error or NEAR[shape.dimension]):
+            ended = "near enough"
+            break
+    assert best is not None
+    rung, kept = best
+    said = {
+        **(about or {}),
+        "error": rung.error,
+        "thin": rung.thin,
+        "steps": len(tried),
+        "ended": ended,
+        "size": shape.size,
+    }
+    said |= dict(zip("xyz", shape.centre, strict=False))
+    return replace(kept, about=said), tried
+
+
+def measured(element: Element, points: Points, normals: Points, thin: float = 0.0) -> Rung:
+    """How far an element is off at points (M, d) of the true surface and their normals.
+
+    Args:
+        thin: share of the surface that is too thin for any grid, and has no points here.
+    """
+    grid = unpacked(element)
+    drawn = GridShape(NUMPY, grid.reshape(-1), len(grid), grid.ndim)
+    off, *slope = drawn.field(np.ascontiguousarray(points.T, np.float32), gradient=True)
+    length = np.maximum(np.linalg.norm(slope, axis=0), 1e-9)
+    facing = np.clip((np.array(slope) * normals.T).sum(0) / length, -1, 1)
+    away = abs(off)
+    angle = float(np.degrees(np.median(np.arccos(facing))))
+    side, worst = element.sides[-1], float(np.quantile(away, 0.99))
+    thin += (1 - thin) * _lost(drawn, side, points)
+    return Rung(side, len(element.data), float(away.mean()), worst, angle, thin)
+
+
+def _lost(drawn: GridShape, side: int, points: Points) -> float:
+    """Share of points (M, d) of a surface within a cell of which nothing is inside.
+
+    An edge that is rounded has an inside that near; a fin that fell between the nodes has none.
+    """
+    ways = np.array([*product((-1, 0, 1), repeat=drawn.d)], float)
+    ways *= 2 / (side - 1) / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1)
+    left = points
+    for way in ways:
+        left = left[drawn.distance(np.ascontiguousarray((left + way).T, np.float32)) > 0]
+    return len(left) / len(points)

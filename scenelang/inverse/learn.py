@@ -1,0 +1,443 @@
+"""Elements from files that users bring."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import math
+import os
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
+
+from scenelang.assets.element import TEXELS, Element
+from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
+from scenelang.assets.tensors import TensorError
+from scenelang.assets.zoo import MOST_BYTES, Zoo, is_said, read_zoo, zoo_bytes
+from scenelang.drawing.exact import originals as parts
+from scenelang.drawing.exact import outline
+from scenelang.drawing.exact.mesh import FitError as FitError
+from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
+from scenelang.drawing.exact.originals import MOST_OF, said
+from scenelang.inverse.colours import fit_colours
+from scenelang.inverse.grids import NEAR, THIN, Rung, fit
+from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Apart, Asked, Hear, files_beside, made_apart
+from scenelang.language.diagnostics import plural
+from scenelang.language.scene_data import Elements, load_elements
+from scenelang.output.workers import GivenUp, by_workers
+
+SEEN: Final = 960  # pixels across which a solid is thought of, to say how small its details may be
+COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """How elements are to be made.
+
+    Args:
+        sign: what tells inside of a mesh.
+        max_error: mean distance off that is near enough, in leaf units, `NEAR` if left out; of textures root
+            mean square off of channels in [0, 1], `NEAR_COLOUR` if left out.
+        budget_s: for each file; nothing new is begun after it.
+        steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
+        license: of the originals.
+        source: where they are from.
+        pictures: what they become.
+        texels: most of a texture along its longer side.
+        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        color_error: root mean square off of a mesh's colours that is near enough, of channels in [0, 1];
+            `scenelang.inverse.colours.NEAR` if left out.
+    """
+
+    sign: Sign = "auto"
+    max_error: float | None = None
+    budget_s: float = math.inf
+    steps: int | None = None
+    license: str | None = None
+    source: str | None = None
+    pictures: Literal["texture", "outline"] = "texture"
+    texels: int = TEXELS
+    parts: bool | None = None
+    color_error: float | None = None
+
+    def __post_init__(self) -> None:
+        for text in (self.license, self.source):
+            if text is not None and not is_said(text):
+                raise ValueError("a license or a source is at most 2,000 characters, all of them printable")
+
+    def about(self, original: Path, data: bytes) -> dict[str, str | float]:
+        """What an element says of where it is from; of one file and one wish it is the same."""
+        name = "".join(c if c.isprintable() else "?" for c in original.name)
+        said = {"license": self.license, "source": self.source, "original": name}
+        said |= {"sha256": hashlib.sha256(data).hexdigest()}
+        asked: dict[str, str | float | None]
+        asked = {"sign": None if self.sign == "auto" else self.sign, "max_error": self.max_error}
+        asked |= {"texels": None if self.texels == TEXELS else self.texels, "color_error": self.color_error}
+        asked |= {"parts": None if self.parts is None else "apart" if self.parts else "together"}
+        return {key: value for key, value in (said | asked).items() if value is not None}
+
+    def paints(self, suffix: str) -> bool:
+        """Whether files of a suffix become textures."""
+        return self.pictures == "texture" and suffix.lower() in outline.MOST_OF_PICTURE
+
+    def made(self, element: Element, about: dict[str, str | float]) -> bool:
+        """Whether an element is what would be made again."""
+        said = element.about
+        usual = self.steps is None and self.budget_s == math.inf
+        cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
+        ended = not cut_short or said.get("steps") == self.steps
+        return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
+
+
+ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "color_error", "parts"))
+
+
+class _Job(NamedTuple):
+    """What is asked of an element, and when its file's time ends."""
+
+    wish: Wish
+    about: dict[str, str | float]
+    end_s: float
+    tell: Callable[..., None]
+
+    def say(self, line: str) -> None:
+        self.tell("say", line)
+
+    @property
+    def terms(self) -> dict[str, Any]:
+        """As what fits takes them."""
+        return {
+            "budget_s": self.end_s - time.monotonic(),
+            "steps": self.wish.steps,
+            "about": self.about,
+        }
+
+
+def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
+    """The file of what becomes of an original's bytes, in the process that is kept apart.
+
+    Args:
+        request: its ``suffix``, the ``name`` of the element, what it says ``about`` itself, the ``wish``, and
+            bytes of the ``files`` that it names.
+        tell: called with ``say`` and a line, and ``progress`` and how far what is.
+
+    Raises:
+        FitError: nothing does.
+    """
+    wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
+    job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
+    if wish.paints(suffix):
+        return zoo_bytes([_texture(data, name, job)])
+    brought = parts.brought(data, suffix, name, request["files"], wish.sign, wish.parts)
+    job.say(f"{name}: {', '.join(brought.notes)}")
+    group, made = list(brought.group), []
+    for called, shape in brought.shapes.items():
+        part = next((part for part in group if part.geometry == called), None)
+        number = {"part": brought.numbers[called]} if called in brought.numbers else {}
+        own = job._replace(about=job.about | number)
+        try:
+            made.append(_shape(shape, called, 1.0 if part is None else part.size, own))
+            if part is not None and part.material and isinstance(shape, Mesh):
+                made.append(_colours(shape, called, own))
+        except FitError as error:
+            if called == name:
+                raise
+            job.say(f"{called}: left out: {error}")
+            group = [part for part in group if part.geometry != called]
+    return zoo_bytes(made, {name: tuple(group)} if group else {})
+
+
+def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
+    """The element of a mesh or an outline; one that is small in the whole may be off by more of its size."""
+
+    def report(rung: Rung) -> None:
+        job.say(
+            f"  {rung.side:>4} a side {rung.bytes:>8,} bytes  error {rung.error:.5f}  "
+            f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
+        )
+
+    asked = (job.wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    element, tried = fit(
+        shape,
+        name,
+        max_error=asked,
+        report=report,
+        progress=lambda side, share: job.tell("progress", f"{name}, {side} a side", share, 1.0),
+        **job.terms,
+    )
+    off = float(element.about["error"])
+    short = "" if off <= asked else f", where {asked:g} was asked"
+    if element.about["ended"] == "time":
+        short += ", a finer grid would take minutes: --budget"
+    if (thin := float(element.about["thin"])) > THIN:
+        short += f", {100 * thin:.0f} % of the surface too thin for the grid"
+    if shape.dimension == 3:  # light shows more than distances do
+        best, cell = min(tried, key=lambda rung: rung.error), SEEN / (element.sides[-1] - 1)
+        short += f", normals {best.normal_deg:.1f}° off"
+        short += f", details under {cell:.0f} pixels rounded at {SEEN} wide"
+    shown = f"{element.sides[-1]} distances a side, {len(element.data):,} bytes, error {off:.5f}{short}"
+    job.say(f"{name}: {shown}; {plural(len(tried), 'grid')} tried")
+    return element
+
+
+def _colours(shape: Mesh, name: str, job: _Job) -> Element:
+    """The material of a mesh."""
+    element = fit_colours(
+        shape,
+        name,
+        max_error=job.wish.color_error,
+        report=lambda tried: job.say(
+            f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
+        ),
+        **job.terms,
+    )
+    shown = f"{element.sides[-1]} colours a side, {len(element.data):,} bytes"
+    job.say(f"{name}: {shown}, off by {element.about['error']:.4f}")
+    return element
+
+
+def _texture(data: bytes, name: str, job: _Job) -> Element:
+    """The element of a picture."""
+    found = outline.read_picture(data, job.wish.texels)
+    job.say(f"{name}: {', '.join(found.notes)}")
+    element, tried = outline.fit_picture(
+        found,
+        name,
+        max_error=job.wish.max_error,
+        report=lambda coded: job.say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
+        **job.terms,
+    )
+    height, width = element.sizes
+    shown = f"{width} × {height} texels, {len(element.data):,} bytes, error {element.about['error']:.4f}"
+    job.say(f"{name}: {shown}; {plural(len(tried), 'form')} tried")
+    return element
+
+
+Progress = Callable[[str, float, float], None]
+Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
+"""Files by their places, in whatever order, and what gives what was made of one or raises why nothing was."""
+
+
+def learn_files(
+    files: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    wish: Wish = Wish(),
+    *,
+    name: str | None = None,
+    cluster: str | None = None,
+    say: Callable[[str], None] = lambda line: None,
+    progress: Progress = lambda what, done, total: None,
+) -> list[Element]:
+    """Make files elements of the file ``out``, beside those that it holds.
+
+    It is written after each element, whole or not at all; what it holds already of an original and a wish is
+    not made again. So work that was interrupted is taken up by asking for it again.
+
+    Args:
+        files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
+        progress: is told what is done, how far it is and how far that goes.
+    """
+    names = names_of(files, wish, name)
+    first = held = _writable(out)
+    made: dict[int, Zoo] = {}
+    troubles: dict[int, str] = {}
+
+    @contextmanager
+    def noted(index: int) -> Iterator[None]:
+        """An error of one file does not stop the others."""
+        try:
+            yield
+        except (FitError, GivenUp, TensorError) as error:
+            troubles[index] = f"{files[index]}: {error}"
+        except NotWritten:
+            raise
+        except OSError as error:
+            troubles[index] = f"{files[index]}: {(error.strerror or str(error)).lower()}"
+
+    def asked() -> Iterator[tuple[int, Asked]]:
+        for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
+            with noted(index):
+                known = _named(held).get((called, wish.paints(file.suffix)))
+                found = _request(file, called, wish, known)
+                if isinstance(found, Element):
+                    say(f"{called}: made before of this file")
+                    groups = {called: held.groups[called]} if called in held.groups else {}
+                    made[index] = replace(Zoo.of([found]), groups=groups)
+                else:
+                    yield index, found
+
+    hear: dict[str, Hear] = {"say": say, "progress": progress}
+    with closing(_by_workers(cluster, asked(), hear) if cluster else _here(asked(), hear)) as answers:
+        for index, answer in answers:
+            with noted(index):
+                made[index] = read_zoo(answer())
+                held = _written(out, first, [(names[at], made[at]) for at in sorted(made)])
+            if cluster:
+                progress("files", len(made) + len(troubles), len(files))
+    if troubles:
+        raise FitError("\n".join(troubles[index] for index in sorted(troubles)))
+    return [element for index in sorted(made) for element in made[index].elements]
+
+
+def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
+    """What becomes of requests, one after another."""
+    with Apart() as apart:
+        for index, (request, data) in asked:
+            hear["progress"](request["name"], 0.0, 1.0)
+            yield index, partial(apart, request, data, hear)
+
+
+def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
+    """What becomes of requests, several at a time and in any order."""
+
+    def taken(answer: Callable[[], tuple[list[str], bytes | FitError]]) -> bytes:
+        lines, found = answer()
+        for line in lines:
+            hear["say"](line)
+        if isinstance(found, FitError):
+            raise found
+        return found
+
+    for index, answer in by_workers(cluster, made_apart, asked, LIBRARIES):
+        yield index, partial(taken, answer)
+
+
+def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | None = None) -> list[str]:
+    """What elements of files are called, those of one file ``name``.
+
+    Raises:
+        ValueError: scenes cannot say a name, or it is that of two.
+    """
+    if name is not None and len(files) > 1:
+        raise ValueError("a name is for one file")
+    names = [_word(Path(file).stem) if name is None else name for file in files]
+    owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
+    for file, found in zip(files, names, strict=True):
+        if not (found.isascii() and found.isidentifier()):
+            raise ValueError(f"`{found}` is not a name; letters, digits and _ are, as --name says them")
+        first = owners.setdefault((found, wish.paints(Path(file).suffix)), file)
+        if first is not file:
+            raise ValueError(f"`{first}` and `{file}` would both be `{found}`")
+    return names
+
+
+def _word(stem: str) -> str:
+    """A file's name as an element's."""
+    word = said(stem)
+    return f"_{word}" if word[:1].isdigit() else word
+
+
+def _writable(out: str | os.PathLike[str]) -> Zoo:
+    """What a file of elements holds; found out before the work, as is whether its result has a place."""
+    place = output_place(out)
+    for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
+        if path != place or place.exists():
+            if not path.exists():
+                raise NotWritten(errno.ENOENT, f"there is no folder `{path}`", os.fspath(out))
+            if not os.access(path, right):
+                raise NotWritten(errno.EACCES, os.strerror(errno.EACCES), os.fspath(out))
+    try:
+        with open(place, "rb") as file:
+            return read_zoo(file.read(MOST_BYTES + 1))
+    except FileNotFoundError:
+        return Zoo.of(())
+    except TensorError as error:
+        raise NotWritten(errno.EINVAL, f"it is not a file of elements: {error}", os.fspath(out)) from None
+
+
+def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
+    """Elements by name and whether they are materials."""
+    return {(element.name, element.material): element for element in zoo.elements}
+
+
+def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
+    """Write what was held and what was made, in place of what has the same names and of their groups.
+
+    Raises:
+        OSError: it cannot be written, or would be more than can be read.
+    """
+    elements, groups = _named(held), dict(held.groups)
+    for name, zoo in made:
+        groups.pop(name, None)
+        elements, groups = elements | _named(zoo), groups | zoo.groups
+    data = zoo_bytes(elements.values(), groups)
+    try:
+        found = read_zoo(data)
+    except TensorError as error:
+        raise NotWritten(errno.EFBIG, str(error), os.fspath(out)) from None
+    write_output(out, data)
+    return found
+
+
+def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked | Element:
+    """What `Apart` is asked of a file, with its bytes, or what was made of it before."""
+    suffix = path.suffix.lower()
+    if suffix not in MOST_OF:
+        raise FitError(f"not one of {', '.join(MOST_OF)}")
+    data = read_regular(path, MOST_OF[suffix])
+    if len(data) > MOST_OF[suffix]:
+        raise FitError(f"more than {MOST_OF[suffix] >> 20:,} MiB")
+    about = wish.about(path, data)
+    if known is not None and wish.made(known, about):
+        return known
+    usual_s = CPU_S * (4 if wish.parts else 1)
+    limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
+    request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about, "cpu_s": limit_s}
+    return {**request, "files": files_beside(data, suffix, path.parent)}, data
+
+
+def learn(
+    files: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    max_error: float | None = None,
+    budget_s: float = math.inf,
+    steps: int | None = None,
+    license: str | None = None,
+    source: str | None = None,
+    sign: Sign = "auto",
+    pictures: Literal["texture", "outline"] = "texture",
+    parts: bool | None = None,
+    cluster: str | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Elements:
+    """Make files elements, as ``scenelang learn`` does: ``learn("cow.obj", "zoo.safetensors")``.
+
+    What ``out`` holds stays beside them; what was made before of the same file and in the same way is kept.
+
+    Args:
+        files: meshes, drawings and pictures, or one.
+        out: a file of elements, which may exist.
+        name: of the one element; by default that of the file.
+        max_error: how far off is near enough, by default what the command says.
+        budget_s: for each file; nothing new is begun after so many seconds.
+        steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
+        license, source: of the originals, kept in the file.
+        sign: what tells inside of a mesh.
+        pictures: whether they become textures or geometries.
+        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
+            the extra ``dask``, and what makes elements on each.
+        say: is told in lines what is found and tried; by workers, of a file when it is done.
+
+    Returns:
+        All elements of ``out``, for a Scene.
+
+    Raises:
+        FitError: files cannot be made elements, a line for each; the others were.
+        RenderError: ``cluster`` has no workers, or they differ from this machine.
+        OSError: ``out`` cannot be read or written.
+        ValueError: names that scenes cannot say, or twice the same.
+    """
+    wish = Wish(
+        sign=sign, max_error=max_error, budget_s=budget_s, steps=steps,
+        license=license, source=source, pictures=pictures, parts=parts,
+    )  # fmt: skip
+    listed = [files] if isinstance(files, str | os.PathLike) else files
+    learn_files(listed, out, wish, name=name, cluster=cluster, say=say)
+    return load_elements(os.fspath(out))

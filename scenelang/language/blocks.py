@@ -1,0 +1,633 @@
+"""Blocks and control flow, and the statements that make nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+from scenelang.assets.records import Record
+from scenelang.language import library, tree
+from scenelang.language.advice import VALUES
+from scenelang.language.builder import Action, Builder, ChainBuilder, Place, make
+from scenelang.language.diagnostics import Edit, Fix, Label, Span, did_you_mean, listing
+from scenelang.language.expressions import (
+    VARIES,
+    bind,
+    condition,
+    entering,
+    guarded,
+    lookup,
+    prepare,
+    prepare_arguments,
+)
+from scenelang.language.library import SpanMap, Written
+from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
+from scenelang.language.nodes import blend_width
+from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
+from scenelang.language.scene_data import objects_of
+from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
+from scenelang.language.values import POISON, Problem, RangeValue, Vec, number, show, unexpected
+from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
+
+
+class Body(NamedTuple):
+    """A prepared block, and what a run of it costs."""
+
+    actions: Iterable[Action] = ()
+    weight: int = 1
+
+    def run(self, env: Env, out: Builder, session: Session, span: Span) -> None:
+        """Run the block, whose steps count at ``span``."""
+        session.tick(self.weight, span)
+        for act in self.actions:
+            act(env, out)
+
+
+def prepare_statement(stmt: tree.Stmt, place: Place) -> Action | None:
+    """One statement's action; None where it does nothing when it runs."""
+    place.file.weight += HALF_STEPS.get(stmt.__class__, 0)
+    action: Action | None = place.session.statements[stmt.__class__](stmt, place)
+    return action
+
+
+def prepare_block(statements: Sequence[tree.Stmt], place: Place, span: Span) -> Body:
+    """Prepare a block in its own scope, which ``place`` brings along.
+
+    Functions and modules are known in the whole block; their bodies are prepared after it, when all
+    names of the block are known to them.
+    """
+    file, scope = place.file, place.scope
+    file.nesting += 1
+    if file.nesting > MAX_NESTING:
+        raise file.session.halt("E0324", f"a tree of more than {MAX_NESTING} levels", span)
+    before = file.weight
+    declared = [_declare(stmt, place) for stmt in statements if isinstance(stmt, tree.Fn | tree.Module)]
+    bodies = [prepare_body for prepare_body in declared if prepare_body is not None]
+    for stmt in statements:
+        if isinstance(stmt, tree.Let | tree.Param):
+            scope.later.setdefault(stmt.name.text, stmt.name.span)
+        elif isinstance(stmt, tree.Import):
+            scope.later.setdefault(stmt.alias.text, stmt.alias.span)
+    prepared = [_collected(stmt, place) for stmt in statements]
+    scope.later.clear()
+    actions = [action for action in prepared if action is not None]
+    if bodies and not (scope.slots.root is not None and scope is file.scope):
+        actions = _unbind(scope) + actions
+    for prepare_body in bodies:
+        prepare_body()
+    file.nesting -= 1
+    weight, file.weight = file.weight - before, before  # whoever runs the block counts it
+    return Body(tuple(actions), 1 + len(actions) + weight // 2)
+
+
+def prepare_inner(block: tree.Block | None, place: Place) -> Body:
+    """Prepare a block of a statement, with the place inside it; nothing to run where there is none."""
+    return Body() if block is None else prepare_block(block.statements, place, block.span)
+
+
+def _collected(stmt: tree.Stmt, place: Place) -> Action | None:
+    """`prepare_statement`, noting what the statement depends on; one that no frame changes runs once.
+
+    That holds of statements of a file or its groups. Loops and modules run more than once in a frame.
+    """
+    session = place.session
+    if not session.replays or place.repeated or place.scope.slots.root is None:
+        return prepare_statement(stmt, place)
+    around, session.needs = session.needs, Needs()
+    try:
+        action = prepare_statement(stmt, place)
+        needs = session.needs
+    finally:
+        around.on.append(session.needs)
+        session.needs = around
+    fills = isinstance(stmt, tree.Call | tree.Node | tree.For | tree.If)
+    setting = isinstance(stmt, tree.Call) and stmt.name.text in SETTINGS
+    if action is None or not fills or setting or place.kind not in ("file", "group"):
+        return action
+    return Replayed(action, needs, session, stmt.span)
+
+
+def _unbind(scope: Scope) -> list[Action]:
+    """In a loop, a function must not see what the pass before left in a slot."""
+    slots = [b.slot for b in scope.names.values() if b.kind == "let" and b.slots is scope.slots]
+
+    def action(env: Env, out: Builder) -> None:
+        for slot in slots:
+            env[slot] = UNBOUND
+
+    return [action] if slots else []
+
+
+def misplaced(
+    place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
+) -> None:
+    """Report a statement in the wrong place, unless nothing is known about the place.
+
+    Several in one block with the same ``fact``, a message with ``{}`` for the name, are one report: it is the
+    block that is of the wrong kind.
+    """
+    if place.kind != "unknown":
+        key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
+        place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
+
+
+# ---------------------------------------------------------------- definitions
+
+
+def define(name: tree.Name, binding: Binding, place: Place) -> bool:
+    """Bind a name in this scope; reports a second definition and keeps the first."""
+    scope = place.scope
+    earlier = scope.names.get(name.text)
+    scope.later.pop(name.text, None)
+    if place.report.damage(name.span.source).holds(name.span):
+        # What it stands for is known when its statement reads again.
+        binding.kind = "poison"
+    elif earlier is not None:
+        message = f"`{name.text}` is already defined in this scope"
+        help = "names are bound once; an inner block may bind them anew"
+        labels = earlier.labels("first defined here")
+        place.report.error("E0202", message, name.span, labels=labels, help=help)
+        return False
+    scope.names[name.text] = binding
+    return True
+
+
+def prepare_let(stmt: tree.Let, place: Place) -> Action | None:
+    code = prepare(stmt.value, place)
+    name, session, slots = stmt.name.span, place.session, place.scope.slots
+    slot, known = slots.add(), code.value is not VARIES
+    value = code.value if known else None
+    define(stmt.name, Binding("let", name, slots, slot, value, known, session.needs), place)
+    get, watch = code.run, session.watch
+
+    def action(env: Env, out: Builder) -> None:
+        env[slot] = get(env)
+
+    def watched(env: Env, out: Builder) -> None:
+        env[slot] = get(env)
+        if watch is not None:
+            watch(name, env[slot])
+
+    return action if watch is None else watched
+
+
+def _declare(stmt: tree.Fn | tree.Module, place: Place) -> Callable[[], None] | None:
+    """Make a function or module known; returns how to prepare its body."""
+    name, outer = stmt.name, place.scope.slots
+    if isinstance(stmt, tree.Module) and name.text in LANGUAGE:
+        message = f"`{name.text}` is a word of the language and names no module"
+        place.report.error("E0209", message, name.span, help="rename it")
+        return None
+    definition = Definition(stmt, outer)
+    binding = Binding("fn" if isinstance(stmt, tree.Fn) else "module", name.span, value=definition)
+    define(name, binding, place)
+    return lambda: _prepare_body(stmt, definition, place)
+
+
+def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Place) -> None:
+    file, report, session = place.file, place.report, place.session
+    slots = Slots(definition.outer, owner=stmt.name.span)
+    inside = Place(file, Scope(slots, place.scope), "group")
+    defaults: list[Callable[[Env], Any]] = []
+    places = [slots.add() for _ in stmt.params]
+    optional = False
+    for param, slot in zip(stmt.params, places, strict=True):
+        at = param.name.span
+        if param.default is not None:
+            optional = True
+            defaults.append(prepare(param.default, inside).run)
+        else:
+            if optional:
+                message = f"`{param.name.text}` has no default but follows one that has"
+                report.error("E0308", message, param.span, help="put it first, or give it a default")
+            defaults.append(lambda env: POISON)
+        define(param.name, Binding("argument", at, slots, slot), inside)
+    definition.defaults = tuple(defaults)
+    before = file.weight
+    around, session.needs = session.needs, definition.needs
+    if isinstance(stmt, tree.Fn):
+        definition.run = prepare(stmt.body, inside).run
+        definition.weight = CALL_STEPS + (file.weight - before) // 2
+        file.weight = before
+    else:
+        body = prepare_inner(stmt.body, inside._replace(scope=Scope(slots, inside.scope)))
+        definition.run, definition.weight = body
+    session.needs = around
+    definition.size = slots.size
+
+
+def skip(stmt: tree.Fn | tree.Module | tree.BadStmt, place: Place) -> Action | None:
+    """Nothing to run: `prepare_block` has declared it, or recovery has reported it."""
+    return None
+
+
+# ---------------------------------------------------------------- control flow
+
+
+def _items(value: Any) -> Any:
+    if value.__class__ is Vec:
+        return value.items
+    if value.__class__ is RangeValue:
+        if value.unit != "number" and value.step is None:
+            help = "add a step, as in 0deg..90deg step 30deg"
+            raise Problem("E0311", f"a range of {value.unit}s without a step", help)
+        value.count()
+        return value
+    advice = "write 0..<n for n passes" if value.__class__ is float else None
+    raise unexpected("a range or a vector", value, advice)
+
+
+def prepare_for(stmt: tree.For, place: Place) -> Action | None:
+    get = prepare(stmt.iterable, place).run
+    loop = place.inner()._replace(repeated=True)
+    slot = loop.scope.slots.add()
+    define(stmt.variable, Binding("loop", stmt.variable.span, loop.scope.slots, slot), loop)
+    actions, weight = prepare_inner(stmt.body, loop.inner())
+    session, span = place.session, stmt.iterable.span
+    check = guarded(place, _items, span, (), item_steps=0)
+
+    def action(env: Env, out: Builder) -> None:
+        values = check(get(env))
+        if values is POISON:
+            return
+        for value in values:
+            env[slot] = value
+            if session.watch is not None:
+                session.watch(stmt.variable.span, value)
+            session.tick(weight + 1, span)
+            for act in actions:
+                act(env, out)
+
+    return action
+
+
+def prepare_if(stmt: tree.If, place: Place) -> Action | None:
+    arms: list[tuple[Callable[[Env], Any], Body]] = []
+    at: tree.If | tree.Block | None = stmt
+    while isinstance(at, tree.If):
+        test = condition(at.condition, place).run
+        arms.append((test, prepare_inner(at.then, place.inner())))
+        at = at.otherwise
+    last = prepare_inner(at, place.inner()) if at is not None else None
+    session, span = place.session, stmt.condition.span
+
+    def action(env: Env, out: Builder) -> None:
+        chosen = last
+        for test, body in arms:
+            value = test(env)
+            if value is True:
+                chosen = body
+                break
+            if value is POISON:
+                return
+        if chosen is not None:
+            chosen.run(env, out, session, span)
+
+    return action
+
+
+class Replayed(Record, frozen=False):
+    """The action of a statement of a file or a group that runs at most once in a frame.
+
+    Args:
+        varies: whether frames change it, once that was asked.
+        kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
+    """
+
+    action: Callable[[Any, Builder], None]
+    needs: Needs
+    session: Session
+    span: Span
+    varies: bool | None = None
+    kept: tuple[Builder, SpanMap, int, int, int] | None = None
+
+    def __call__(self, env: Any, out: Builder) -> None:
+        """Run the statement, or replay what it did."""
+        if self.varies is None:
+            self.varies = self.needs.varies()
+        session = self.session
+        if self.varies:
+            self.action(env, out)
+        elif self.kept is None:
+            own = Builder(out.material, out.material_span, out.moved)
+            steps, objects, parts = session.steps, session.objects, session.parts
+            around, session.spans = session.spans, SpanMap()
+            try:
+                self.action(env, own)
+            finally:
+                around.add(session.spans)
+                spans, session.spans = session.spans, around
+            own.material = own.material if out.material is None else None
+            own.moved = own.moved if own.transforms else None
+            counted = session.steps - steps, session.objects - objects, session.parts - parts
+            self.kept = (own, spans, *counted)
+            out.extend(own)
+        else:
+            own, spans, steps, objects, parts = self.kept
+            if (own.children and out.moved) or (own.material and out.material):
+                self.action(env, out)  # an error that needs the place it stands in
+                return
+            session.tick(steps, self.span)
+            session.count_parts(parts, self.span)
+            session.count_objects(objects, self.span)
+            session.spans.add(spans)
+            out.extend(own)
+
+
+HOLDERS = ("file", "group", "chain", "unknown")
+
+
+def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
+    """Whether children may stand here; reports it if not."""
+    if place.kind in HOLDERS:
+        return True
+    if place.kind == "material":
+        help = "a material's block holds texture operations"
+        misplaced(place, span, f"{what} inside a material", name, help)
+    else:
+        help = "a block of an object or a call holds transforms and a material; use group { … } for children"
+        misplaced(place, span, f"{what} inside an object", name, help)
+    return False
+
+
+def place_child(node: Any, where: Written, out: Builder, session: Session) -> None:
+    """Hand a finished node to the block it stands in."""
+    session.spans.record(node, where, session.report.calls)
+    session.count_parts(1, where.name)
+    _join_child(node, where, out, session)
+
+
+def _join_child(node: Any, where: Written, out: Builder, session: Session) -> None:
+    """Append ``node`` to its block, which must not have transforms yet."""
+    if out.moved is not None:
+        labels = (Label(out.moved, "applies to all children"),)
+        help = "put children first; a transform for some of them goes with them into group { … }"
+        session.report.error("E0331", "a child after a transform", where.name, labels=labels, help=help)
+    out.add(node)
+    if session.watch is not None:
+        session.watch(where.statement, node)
+
+
+# ---------------------------------------------------------------- objects
+
+
+def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -> Action | None:
+    """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
+    name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
+    fits = holds_children(place, where.name, "object `{}`", name)
+    body = prepare_inner(stmt.body, place.inner("object"))
+    if stmt.args:
+        prepare_arguments(stmt.args, place)
+        if fits:
+            help = f"size it in its block: {name} {{ scale(0.5); }}"
+            if name == "square":
+                help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
+            fix = None
+            if name == "sphere" and len(stmt.args) == 1 and stmt.body is None:
+                rest = Span(where.name.source, where.name.end, stmt.span.end)
+                fix = Fix(
+                    "put it into its block", (Edit(rest, f" {{ scale({stmt.args[0].value.span.text}); }}"),)
+                )
+            message = f"`{name}` takes no arguments"
+            session.report.error("E0308", message, stmt.args[0].span, help=help, fix=fix)
+        return None
+    if not fits:
+        return None
+    place.file.weight += OBJECT
+
+    def action(env: Env, out: Builder) -> None:
+        inside = Builder()
+        body.run(env, inside, session, where.name)
+        session.count_objects(1, where.name)
+        fields = {
+            "kind": "object",
+            "geometry": geometry or name,
+            "transforms": tuple(inside.transforms),
+            "material": inside.material,
+        }
+        place_child(make(Object, fields), where, out, session)
+
+    return action
+
+
+# ---------------------------------------------------------------- groups, booleans, chains
+
+
+def prepare_node(stmt: tree.Node, place: Place) -> Action | None:
+    fits = holds_children(place, stmt.keyword, "`{}`", stmt.kind)
+    chain = stmt.kind == "chain"
+    if chain:
+        _check_first(stmt, place)
+    width = _width(stmt, place)
+    body = prepare_inner(stmt.body, place.inner("chain" if chain else "group"))
+    if not fits:
+        return None
+    session, where = place.session, Written(stmt.keyword, stmt.span)
+
+    def action(env: Env, out: Builder) -> None:
+        inside = ChainBuilder() if chain else Builder()
+        _run_nested(body, env, inside, session, where.name)
+        node = _finish(stmt.kind, inside, inside.transforms, inside.material, width(env))
+        place_child(node, where, out, session)
+
+    return action
+
+
+def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: Span) -> None:
+    """Run a block one level further down."""
+    session.node_depth += 1
+    if session.node_depth > MAX_NODE_DEPTH:
+        raise session.halt("E0321", f"groups nested deeper than {MAX_NODE_DEPTH}", span)
+    body.run(env, inside, session, span)
+    session.node_depth -= 1
+
+
+def _width(stmt: tree.Node | tree.Combined, place: Place) -> Callable[[Env], float | None]:
+    """The k of a word that joins, None where none is written."""
+    op = stmt.op if isinstance(stmt, tree.Combined) else stmt.kind
+    word = KEYWORDS[op]
+    given = prepare_arguments(stmt.args, place)
+    bound = bind(place.report, tree.Name(stmt.keyword, word.name), word.params, word.required, given)
+    if not bound or bound[0] is None:
+        return lambda env: None
+    get, operand = bound[0].code.run, bound[0].arg.value
+    check = guarded(place, _above_0, operand.span, (operand,))
+
+    def run(env: Env) -> float | None:
+        k = check(get(env))
+        return None if k is POISON else blend_width(op, float(k))
+
+    return run
+
+
+def _above_0(k: Any) -> float:
+    if number(k) <= 0.0:
+        raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
+    return float(k)
+
+
+def _finish(
+    kind: str, inside: Builder, transforms: list[Any], material: Material | None, k: float | None = None
+) -> Any:
+    fields: dict[str, Any] = {
+        "children": tuple(inside.children),
+        "transforms": tuple(transforms),
+        "material": material,
+    }
+    if kind in ("group", "chain"):
+        return make(Group if kind == "group" else Chain, {"kind": kind, **fields})
+    return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
+
+
+# ---------------------------------------------------------------- chains
+
+
+def _check_first(stmt: tree.Node, place: Place) -> None:
+    """The first child that a chain names outright joins nothing and carries no word."""
+    makers = (tree.Combined, tree.Call, tree.Node, tree.For, tree.If)
+    child = next((child for child in stmt.body.statements if isinstance(child, makers)), None)
+    if isinstance(child, tree.Combined):
+        word = child.keyword
+        edit = Edit(Span(word.source, word.start, child.child.span.start), "")
+        fix = Fix(f"remove `{child.op}`", (edit,)) if child.op in ("union", "smooth") else None
+        help = None if fix else "what it is taken from or cut with stands before it"
+        message = f"`{child.op}` on the first child of a chain joins it to nothing"
+        place.report.error("E0335", message, word, help=help, fix=fix)
+
+
+def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
+    report, op, width = place.report, stmt.op, _width(stmt, place)
+    if place.kind not in ("chain", "unknown"):
+        help = f"put the children into chain {{ … }}, or write a boolean node: {op} {{ … }}"
+        misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
+        prepare_statement(stmt.child, Place(place.file, place.scope, "unknown", place.nested))
+        return None
+    if not _makes_child(stmt.child, place):
+        help = "the word joins one object or node to those before it"
+        misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
+        return None
+    act = prepare_statement(stmt.child, place)
+    if act is None:
+        return None
+
+    def action(env: Env, out: Builder) -> None:
+        if not isinstance(out, ChainBuilder):
+            return
+        if not out.children and op in ("subtract", "intersect"):
+            report.error("E0335", f"`{op}` with nothing before it", stmt.keyword)
+        if out.children:
+            out.op, out.k = op, width(env)
+        act(env, out)
+        out.op, out.k = "union", None
+
+    return action
+
+
+def _makes_child(stmt: tree.Stmt, place: Place) -> bool:
+    """Whether a statement after a boolean word is an object, a node or a call of a module."""
+    if isinstance(stmt, tree.Call):
+        binding = lookup(stmt.name, place)
+        return stmt.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
+    return isinstance(stmt, tree.Node)
+
+
+# ---------------------------------------------------------------- modules
+
+
+def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -> Action | None:
+    """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
+    session, where = place.session, Written(stmt.name.span, stmt.span)
+    fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
+    given = prepare_arguments(stmt.args, place)
+    block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
+    enter = entering(stmt.name, given, definition, place)
+    if enter is None or not fits:
+        return None
+    place.file.weight += MODULE_CALL
+
+    def action(env: Env, out: Builder) -> None:
+        before = session.report.calls
+        frame = enter(env)
+        inside = Builder()
+        _run_nested(Body(definition.run, 1), frame, inside, session, where.name)
+        session.report.calls = before
+        session.depth -= 1
+        place_called(inside, block, env, where, out, session)
+
+    return action
+
+
+def place_called(
+    inside: Builder, block: Body | None, env: Env, where: Written, out: Builder, session: Session
+) -> None:
+    """Hand what a call has made to the block it stands in, moved as the call's own block says."""
+    transforms, material = inside.transforms, inside.material
+    if block is not None:
+        own = Builder()
+        block.run(env, own, session, where.name)
+        transforms = [*transforms, *own.transforms]
+        material = material or own.material
+    if len(inside.children) != 1:
+        place_child(_finish("group", inside, transforms, material), where, out, session)
+        return
+    child = inside.children[0]
+    if transforms or (material is not None and child.material is None):
+        moved = (*child.transforms, *transforms)
+        fields = {**child.__dict__, "transforms": moved, "material": child.material or material}
+        changed = make(child.__class__, fields)
+        session.spans.copy(child, changed)
+        child = changed
+    _join_child(child, where, out, session)
+
+
+def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None:
+    """A statement headed by the name of a geometry or a group.
+
+    Args:
+        called: what a Scene calls it.
+    """
+    alias, _, name = called.partition(".")
+    file = next(file for file in place.session.elements.values() if file.name == alias)
+    zoo = file.zoo
+    assert zoo is not None
+    groups, geometries = zoo.groups, zoo.geometries
+    if stmt.args is None or (stmt.args and name not in groups):
+        if name in geometries:
+            return prepare_object(stmt, place, called)
+        _missing(stmt, place, "geometry", [*geometries], f"its group is {stmt.name.text}() {{ … }}")
+        return None
+    session, where = place.session, Written(stmt.name.span, stmt.span)
+    fits = holds_children(place, where.name, "group `{}`", stmt.name.text)
+    block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
+    if name not in groups:
+        _missing(stmt, place, "group", [*groups], f"its geometry is {stmt.name.text} {{ … }}")
+        return None
+    if stmt.args:
+        prepare_arguments(stmt.args, place)
+        help = f"move it in its block: {stmt.name.text}() {{ scale(0.5); }}"
+        message = f"group `{stmt.name.text}` takes no arguments"
+        place.report.error("E0308", message, stmt.args[0].span, help=help)
+        return None
+    if not fits:
+        return None
+    count = len(groups[name])
+    place.file.weight += MODULE_CALL + OBJECT * count
+
+    def action(env: Env, out: Builder) -> None:
+        inside = Builder()
+        session.count_objects(count, where.name)
+        for part in objects_of(zoo, alias, name):
+            place_child(part, where, inside, session)
+        place_called(inside, block, env, where, out, session)
+
+    return action
+
+
+def _missing(stmt: tree.Call, place: Place, what: str, known: list[str], otherwise: str) -> None:
+    """Report a name that stands only for the other of a geometry and a group."""
+    alias, _, name = stmt.name.text.partition(".")
+    last = Span(stmt.name.span.source, stmt.name.span.end - len(name), stmt.name.span.end)
+    help, fix = did_you_mean(name, known, last, effort=place.report.effort)
+    there = f"; it has {listing(known)}" if known and help is None else ""
+    message = f"`{alias}` has no {what} `{name}`"
+    place.report.error("E0212", message, last, help=f"{help or otherwise}{there}", fix=fix)

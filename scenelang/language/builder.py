@@ -1,0 +1,157 @@
+"""Nodes of a Scene made from values that the evaluator has checked itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeVar
+
+from pydantic import BaseModel
+
+from scenelang.language import tree
+from scenelang.language.diagnostics import SourceFile, Span
+from scenelang.language.reporter import Reporter
+from scenelang.language.scene import Link, Material
+from scenelang.language.session import UNBOUND, Defines, Env, Loader, Scope, Session, Slots
+from scenelang.language.words import Combine
+
+M = TypeVar("M", bound=BaseModel)
+
+_set = object.__setattr__
+_fields_set: dict[type[BaseModel], set[str]] = {}
+
+
+def make(cls: type[M], fields: dict[str, Any]) -> M:
+    """A frozen model from all its fields, in their order, unvalidated.
+
+    `BaseModel.model_construct` does the same six times slower; scenes have tens of thousands of nodes.
+    """
+    node = cls.__new__(cls)
+    _set(node, "__dict__", fields)
+    given = _fields_set.get(cls)
+    if given is None:
+        given = _fields_set[cls] = set(fields)
+    _set(node, "__pydantic_fields_set__", given)  # shared: frozen models never change it
+    _set(node, "__pydantic_extra__", None)
+    _set(node, "__pydantic_private__", None)
+    return node
+
+
+class Builder:
+    """What the statements of one block put into their node.
+
+    Attributes:
+        children: nodes, or the links of a chain.
+        transforms: transforms, or the operations of a material.
+        material: the block's material.
+        material_span: where it was given.
+        moved: where the first transform stands.
+    """
+
+    __slots__ = ("children", "material", "material_span", "moved", "transforms")
+
+    def __init__(
+        self, material: Material | None = None, material_span: Span | None = None, moved: Span | None = None
+    ) -> None:
+        self.children: list[Any] = []
+        self.transforms: list[Any] = []
+        self.material, self.material_span, self.moved = material, material_span, moved
+
+    def add(self, node: Any) -> None:
+        """Append a child."""
+        self.children.append(node)
+
+    def extend(self, other: Builder) -> None:
+        """Add all that another builder of the same block holds."""
+        self.children += other.children
+        self.transforms += other.transforms
+        if other.material is not None:
+            self.material, self.material_span = other.material, other.material_span
+        self.moved = self.moved or other.moved
+
+
+class ChainBuilder(Builder):
+    """The block of a chain: each child is joined by the word before it."""
+
+    __slots__ = ("k", "op")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.op: Combine = "union"
+        self.k: float | None = None
+
+    def add(self, node: Any) -> None:
+        self.children.append(make(Link, {"op": self.op, "node": node, "k": self.k}))
+
+
+Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
+"""What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""
+
+Action = Callable[[Env, Builder], None]
+
+
+@dataclass(slots=True)
+class FileContext:
+    """The state of one file.
+
+    Args:
+        path: where it was read from, resolved; None for text without a file.
+        prefix: how the first file calls its params: empty, or ``lib.``.
+        weight: half evaluation steps of what has been prepared of the block at hand.
+        materials: what a Scene calls those of a file of elements.
+        has_params: whether it, or a file that it imports, has params.
+    """
+
+    source: SourceFile
+    session: Session
+    loader: Loader
+    defines: Defines
+    path: Path | None = None
+    prefix: str = ""
+    env: Env = field(default_factory=lambda: [UNBOUND])
+    scope: Scope = field(init=False)
+    nesting: int = 0
+    weight: int = 0
+    first: tree.Stmt | None = None
+    materials: dict[str, str] = field(default_factory=dict)
+    has_params: bool = False
+
+    def __post_init__(self) -> None:
+        self.scope = Scope(Slots(root=self.env))
+        self.session.roots.append(self.env)
+
+
+class Place(NamedTuple):
+    """Where a statement or an expression stands.
+
+    Args:
+        kind: the kind of block around it.
+        nested: whether a ``for`` or ``if`` stands between it and that block's braces.
+        repeated: whether a ``for`` stands around it, however far out.
+        block: the names of that block, which tell it from others.
+    """
+
+    file: FileContext
+    scope: Scope
+    kind: Kind
+    nested: bool = False
+    repeated: bool = False
+    block: Scope | None = None
+
+    @property
+    def session(self) -> Session:
+        """The evaluation."""
+        return self.file.session
+
+    @property
+    def report(self) -> Reporter:
+        """Where mistakes go."""
+        return self.file.session.report
+
+    def inner(self, kind: Kind | None = None) -> Place:
+        """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
+        scope = Scope(self.scope.slots, self.scope)
+        if kind is None:
+            return self._replace(scope=scope, nested=True)
+        return Place(self.file, scope, kind, False, self.repeated, scope)

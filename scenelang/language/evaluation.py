@@ -1,0 +1,544 @@
+"""From the syntax tree to a concrete Scene, and params as values to choose among.
+
+A file is prepared (names resolved, expressions made into closures), then run once; both steps report
+what they find and go on. A Scene comes out only where nothing is wrong.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.assets.records import Record, deep_stack
+from scenelang.language import tree
+from scenelang.language import tree as nodes
+from scenelang.language.blocks import Body
+from scenelang.language.builder import Builder, FileContext, Place, make
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, nearest
+from scenelang.language.expressions import prepare
+from scenelang.language.library import SpanMap, Written
+from scenelang.language.limits import MAX_OBJECTS, MAX_STEPS, Halt
+from scenelang.language.parser import parse
+from scenelang.language.reporter import Reporter
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
+from scenelang.language.scene_text import hex_colour, number
+from scenelang.language.session import UNBOUND, Defines, Loader, Session, Unreadable, Watch, read_source
+from scenelang.language.statements import EXPRESSIONS, STATEMENTS, prepare_file
+from scenelang.language.values import Angle, RangeValue, Time, Vec, unpack
+from scenelang.language.words import STAGE
+
+
+class Source(Record):
+    """A scene as text and what holds for it from outside; one of the first three is enough.
+
+    Args:
+        path: the file, as a user wrote it; imports are found from there.
+        text: what the file holds, or a text that is in no file.
+        tree: the text, parsed.
+        params: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
+            several evaluations; the caller then reports what none of them used.
+        model: name of the model to use, instead of the one that the file names; the Scene names it then.
+        root: folder that imports cannot leave; by default that of ``path``.
+        size: canvas in pixels (width, height), instead of the scene's.
+        fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
+            seconds × fps frames, and t and u follow.
+        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+    """
+
+    path: str | os.PathLike[str] | None = None
+    text: SourceFile | None = None
+    tree: nodes.File | None = None
+    params: Mapping[str, Any] | Defines | None = None
+    model: str | None = None
+    root: str | os.PathLike[str] | None = None
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+    texts: Mapping[Path, str] | None = None
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values for params, by name."""
+        return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
+
+    def parsed(self, diagnostics: Diagnostics) -> Source:
+        """The same with its text and tree; mistakes of the syntax are reported once, here.
+
+        Raises:
+            SceneError: the file is not text.
+            OSError: it cannot be opened.
+        """
+        if self.tree is not None:
+            return self
+        text = self.text
+        if text is None:
+            name = os.fspath(self.path or "")
+            try:
+                text = read_source(Path(name), name)
+            except Unreadable as error:
+                report_unreadable(name, error, diagnostics)
+                raise SceneError(diagnostics) from None
+        return replace(self, text=text, tree=parse(text, diagnostics))
+
+    def evaluation(
+        self,
+        diagnostics: Diagnostics,
+        *,
+        frame: int = 0,
+        replays: bool = False,
+        watch: Watch | None = None,
+    ) -> Evaluation:
+        """Prepare the scene; arguments as for `Evaluation`, and raises as `parsed`."""
+        return Evaluation(self.parsed(diagnostics), diagnostics, frame=frame, replays=replays, watch=watch)
+
+    def scene(self, diagnostics: Diagnostics, frame: int = 0) -> tuple[Scene | None, SpanMap]:
+        """Evaluate one frame.
+
+        Args:
+            diagnostics: where mistakes go, in the order of the text.
+
+        Returns:
+            The Scene, or None if anything is wrong with it, and where its nodes were written.
+
+        Raises:
+            OSError: the file cannot be opened.
+            ValueError: ``size`` is not a canvas.
+        """
+        before, start = len(diagnostics.errors), len(diagnostics)
+        try:
+            scene, spans = self.evaluation(diagnostics, frame=frame).run(frame)
+        except SceneError:
+            return None, SpanMap()
+        diagnostics.items[start:] = in_file_order(diagnostics.items[start:])
+        return (scene if len(diagnostics.errors) == before else None), spans
+
+
+def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) -> None:
+    """Report that a file is not text."""
+    diagnostics.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
+
+
+class Evaluation:
+    """A file prepared once, to be run for any number of frames.
+
+    Args:
+        source: the scene; its text is parsed.
+        diagnostics: where mistakes go; each is reported for the first frame that has it.
+        frame: the first frame that is run, from 0.
+        replays: run what no frame changes once.
+        watch: shown every name's value and every node; see `Session`.
+
+    Attributes:
+        wanted: all files that it imports, also those that are not there.
+        sources: the text of the file and of all that it imports.
+        context: its names, and the values they had in the last run.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        diagnostics: Diagnostics,
+        *,
+        frame: int = 0,
+        replays: bool = False,
+        watch: Watch | None = None,
+    ) -> None:
+        assert source.tree is not None
+        self.file = file = source.tree
+        self.diagnostics, self._size, self._model = diagnostics, source.size, source.model
+        self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
+        self._errors = len(diagnostics.errors)
+        self._steps = self._objects = 0
+        self._session = session = Session(
+            Reporter(diagnostics),
+            EXPRESSIONS,
+            STATEMENTS,
+            frame,
+            source.fps,
+            replays=replays and self.animates,
+            watch=watch,
+        )
+        path = None if source.path is None else Path(source.path).resolve()
+        folder = path.parent if path is not None else None
+        folder = folder if source.root is None else Path(source.root).resolve()
+        loader = Loader(folder, [path] if path is not None else [], texts=source.texts or {})
+        params = source.params
+        self.inputs = given = params if isinstance(params, Defines) else Defines(params or {})
+        self.context = FileContext(file.span.source, session, loader, given, path)
+        self._body: Body | None = None
+        if not self.animates:
+            session.animated[:] = [0.0, 0.0, 0.0, 1.0]
+        with deep_stack(), suppress(Halt):
+            self._body = prepare_file(self.context, file)
+            given.lost |= session.report.damage(file.span.source).words
+            if given is not params:
+                given.report_unused(diagnostics)
+        self.wanted = tuple(loader.wanted)
+        self.sources = (file.span.source, *(imported.span.source for imported in loader.parsed.values()))
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of the animation, as far as the last run knows; 1 without one."""
+        animation = self._session.settings.animation
+        return 1 if animation is None else animation.frames
+
+    @property
+    def spent(self) -> bool:
+        """Whether all runs together exceed the limits of one."""
+        return self._steps > MAX_STEPS or self._objects > MAX_OBJECTS
+
+    def warn_of_zeros(self) -> None:
+        """Warn of angles that were 0 without a unit whenever they were met, and that frames may change."""
+        errors = self.diagnostics.errors
+        wrong = {d.span for d in errors} | {label.span for d in errors for label in d.labels}
+        for span in self._session.zeros.values():
+            if span not in wrong:
+                message = "0 without a unit, which another frame may change"
+                help = "any other number is an error: multiply by 1deg, 1rad or 1turn"
+                self.diagnostics.add("W0303", message, span, help=help)
+
+    def run(self, frame: int) -> tuple[Scene | None, SpanMap]:
+        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame.
+
+        What is found in another frame than the first has the frame's number.
+        """
+        session, before = self._session, len(self.diagnostics)
+        if not self.animates and frame != 0:
+            self.diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
+        session.restart(frame)
+        if self.animates:
+            session.animated[:] = [UNBOUND] * 4
+        out = Builder()
+        if self._body is not None:
+            with deep_stack(), suppress(Halt):
+                session.tick(self._body.weight, self.file.span)
+                for act in self._body.actions:
+                    act(self.context.env, out)
+        self._steps += session.steps
+        self._objects += session.objects
+        if self.animates and frame:
+            name_frame(self.diagnostics, before, frame)
+        if self._body is None or len(self.diagnostics.errors) > self._errors:
+            return None, session.spans
+        settings = session.settings
+        fields = {
+            "version": 1,
+            "model": self._model or settings.model,
+            "canvas": settings.canvas,
+            "background": settings.background,
+            **{word: settings.stage.get(word, "default") for word in STAGE},
+            "animation": settings.animation,
+            "elements": tuple(session.elements.values()),
+            "nodes": tuple(out.children),
+        }
+        scene = make(Scene, fields)
+        scene = scene if self._size is None else scene.sized(self._size)
+        written = settings.given.get("model")
+        if written is not None:
+            session.spans.record(scene, Written(written, written))
+        return scene, session.spans
+
+
+def name_frame(diagnostics: Diagnostics, since: int, frame: int) -> None:
+    """Add the number of a frame to the messages of all diagnostics from index ``since`` on."""
+    for index, d in enumerate(diagnostics.items[since:], since):
+        if d.code != "E0337":  # which names it
+            diagnostics.items[index] = replace(d, message=f"{d.message} (frame {frame})")
+
+
+def in_file_order(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Diagnostics by place, file by file as they were first met; those without a place come last."""
+    files: dict[str, int] = {}
+
+    def key(d: Diagnostic) -> tuple[int, int]:
+        if d.span is None:
+            return len(found), 0
+        return files.setdefault(d.span.source.name, len(files)), d.span.start
+
+    return sorted(found, key=key)
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    size: tuple[int, int] | None = None,
+    diagnostics: Diagnostics | None = None,
+    **values: Any,
+) -> Scene:
+    """Read a scene file: ``load("chain.nsg", k=0.9)``.
+
+    Args:
+        path: the file.
+        params: values for params whose names are not Python identifiers (``lib.k``) or clash with an
+            argument here.
+        model: render with this model instead of the one that the file names.
+        root: folder that imports cannot leave; by default the file's.
+        frame: frame of the animation, from 0.
+        size: canvas in pixels instead of the scene's.
+        diagnostics: collects what is found, warnings too.
+        **values: values for params: numbers, booleans, sequences, or text as after ``-D NAME=``, which
+            is how angles (``"30deg"``) and colours (``"#d33"``) are written.
+
+    Returns:
+        The Scene.
+
+    Raises:
+        SceneError: the scene has errors; it carries all diagnostics.
+        ValueError: ``size`` is not a canvas.
+        OSError: the file cannot be opened.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    given = {**(params or {}), **values}
+    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(found, frame)
+    return _sound(scene, found)
+
+
+def loads(
+    text: str,
+    *,
+    params: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    frame: int = 0,
+    size: tuple[int, int] | None = None,
+    diagnostics: Diagnostics | None = None,
+    name: str = "<text>",
+    **values: Any,
+) -> Scene:
+    """Read scene text; as `load`. Imports are found in ``root`` and refused without it.
+
+    Args:
+        text: the scene.
+        name: what diagnostics call it.
+    """
+    found = diagnostics if diagnostics is not None else Diagnostics()
+    given = {**(params or {}), **values}
+    source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
+    return _sound(source.scene(found, frame)[0], found)
+
+
+def opened(
+    given: Scene | str | os.PathLike[str], diagnostics: Diagnostics, size: tuple[int, int] | None = None
+) -> tuple[Scene, SpanMap | None]:
+    """A Scene as it is, or that of a file, and where its nodes were written.
+
+    Raises:
+        SceneError: the file has errors.
+        TypeError: neither a Scene nor a path.
+        ValueError, OSError: as `load`.
+    """
+    if isinstance(given, Scene):
+        return given if size is None else given.sized(size), None
+    if not isinstance(given, str | os.PathLike):
+        raise TypeError(f"{type(given).__name__} where a Scene or the path of one is needed")
+    scene, spans = Source(given, size=size).scene(diagnostics)
+    return _sound(scene, diagnostics), spans
+
+
+def _sound(scene: Scene | None, found: Diagnostics) -> Scene:
+    if scene is None:
+        raise SceneError(found)
+    return scene
+
+
+MOST_CHOICES: Final = 1000
+_UNITS: Final = {"deg": 180 / math.pi, "rad": 1.0, "turn": 0.5 / math.pi, "s": 1.0, "ms": 1000.0}
+_DIGITS: Final = 4
+
+
+class ParamError(ValueError):
+    """No such param, or one without values to choose among."""
+
+
+class Axis(Record):
+    """One number, or one choice, that is searched.
+
+    Args:
+        label: what reports call it: ``k``, or ``ink.2`` of a vector.
+        low, high: of a continuous one, in base units.
+        choices: values there are, else; none where it is continuous.
+        wraps: whether both ends mean the same, as those of a full turn do.
+    """
+
+    label: str
+    low: float = 0.0
+    high: float = 1.0
+    choices: tuple[Any, ...] = ()
+    wraps: bool = False
+
+
+class Knob(Record):
+    """A param that is searched.
+
+    Args:
+        stmt: its statement.
+        value: its default.
+        axes: one, or one for each number of a vector.
+        inner: whether the value is a vector of the axes' numbers.
+    """
+
+    stmt: tree.Param
+    value: Any
+    axes: tuple[Axis, ...]
+    inner: bool
+
+    @property
+    def name(self) -> str:
+        """As the scene has it."""
+        return self.stmt.name.text
+
+
+def params_of(evaluation: Evaluation) -> dict[str, tree.Param]:
+    """The params of the file itself, by name; those of imports are other files'."""
+    return {stmt.name.text: stmt for stmt in evaluation.file.statements if isinstance(stmt, tree.Param)}
+
+
+def param_named(evaluation: Evaluation, name: str) -> tree.Param:
+    """A param of the file itself; raises `ParamError` without one."""
+    known = params_of(evaluation)
+    if name in known:
+        return known[name]
+    near = nearest(name, known)
+    help = f"did you mean `{near}`?" if near else f"its params are {listing(known)}" if known else ""
+    raise ParamError(f"no param `{name}` in `{evaluation.file.span.source.name}`" + f"; {help}" * bool(help))
+
+
+def knob_of(stmt: tree.Param, file: FileContext) -> Knob:
+    """What a param may be set to, after a run; raises `ParamError` where nothing says so."""
+    name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
+    allowed: Any = None
+    if stmt.range is not None:
+        allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
+    if allowed.__class__ is Vec:
+        return Knob(stmt, value, (Axis(name, choices=_few(name, allowed.items)),), False)
+    if value.__class__ is bool:
+        return Knob(stmt, value, (Axis(name, choices=(False, True)),), False)
+    if value.__class__ is Vec:
+        if allowed is None and is_colour(stmt.default):
+            allowed = RangeValue(0.0, 1.0, False, None, "number")
+        if isinstance(allowed, RangeValue):
+            axes = tuple(_axis(f"{name}.{at}", allowed) for at in range(1, len(value.items) + 1))
+            return Knob(stmt, value, axes, True)
+    if not isinstance(allowed, RangeValue):
+        raise ParamError(f"param `{name}` has no range; give it one, as in `param {name} = … in 0..1;`")
+    return Knob(stmt, value, (_axis(name, allowed),), False)
+
+
+def check_width(name: str, low: float, high: float) -> None:
+    """Raise `ParamError` for a range without values between its ends that can be computed and written."""
+    if not math.isfinite((high - low) * max(_UNITS.values())):
+        raise ParamError(f"the range of param `{name}` is too wide: from {low:.6g} to {high:.6g}")
+
+
+def _axis(label: str, allowed: RangeValue) -> Axis:
+    check_width(label, allowed.start, allowed.stop)
+    if allowed.step is not None and math.isinf((allowed.stop - allowed.start) / allowed.step):
+        raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
+    if allowed.step is not None:
+        if allowed.count() > MOST_CHOICES:
+            raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
+        return Axis(label, choices=_few(label, tuple(allowed)))
+    low, high = allowed.start, allowed.stop
+    if allowed.exclusive:
+        high -= 1e-9 * (high - low)
+    turn = allowed.unit == "angle" and math.isclose(high - low, 2 * math.pi, rel_tol=1e-6)
+    return Axis(label, low, high, wraps=turn)
+
+
+def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not 0 < len(choices) <= MOST_CHOICES:
+        raise ParamError(
+            f"param `{name}` has {len(choices):,} choices, where 1 to {MOST_CHOICES:,} can be tried"
+        )
+    return choices
+
+
+def is_colour(expr: tree.Expr) -> bool:
+    """Whether an expression is written as a colour."""
+    return isinstance(expr, tree.Color) or (
+        isinstance(expr, tree.CallExpr) and expr.name.text in ("rgb", "hsv")
+    )
+
+
+def value_at(axis: Axis, u: float, like: Any) -> Any:
+    """The value at a place of an axis, of the kind that the default's numbers are of."""
+    if axis.choices:
+        return axis.choices[round(u)]
+    if like.__class__ is Vec:
+        like = like.items[0]
+    x = axis.low + u * (axis.high - axis.low)
+    return like.__class__(x) if like.__class__ in (Angle, Time) else x
+
+
+# ---------------------------------------------------------------- values as text
+
+
+def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:
+    """A value as its statement would have it: in the default's unit, with digits enough for its range.
+
+    Args:
+        digits: decimal places, of the range's width.
+    """
+    if not knob.inner:
+        return _literal(value, knob.axes[0], knob.stmt.default, digits)
+    if is_colour(knob.stmt.default):
+        r, g, b = (min(255, max(0, round(255 * item))) / 255 for item in value.items)
+        return hex_colour((r, g, b)) or ""
+    items = zip(value.items, knob.axes, strict=True)
+    return f"[{', '.join(_literal(item, axis, knob.stmt.default, digits) for item, axis in items)}]"
+
+
+def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if value.__class__ is Vec:
+        colour = tuple(item for item in value.items if isinstance(item, float))
+        if len(colour) == len(value.items) == 3 and (text := hex_colour(colour)):
+            return text
+        return f"[{', '.join(_literal(item, axis, default, digits) for item in value.items)}]"
+    x, kind = unpack(value)
+    unit = ""
+    if kind != "number":
+        units = (node.unit for node in tree.walk(default) if isinstance(node, tree.Number))
+        unit = next(filter(None, units), "deg" if kind == "angle" else "s")
+    factor = _UNITS.get(unit, 1.0)
+    if axis.choices:
+        return number(round(x * factor, 9)) + unit
+    width = (axis.high - axis.low) * factor
+    places = max(0, digits - math.floor(math.log10(width))) if width > 0 else 9
+    low, high, tick = axis.low * factor, axis.high * factor, 10.0**-places
+    near = round(x * factor, places)  # rounding may not leave the range
+    near = near - tick if near > high else near + tick if near < low else near
+    return number(round(near, places) + 0.0) + unit
+
+
+def literals_of(evaluation: Evaluation, names: Iterable[str]) -> dict[str, str]:
+    """The values that params of the file had in the last run, as text of the language."""
+    found, file = {}, evaluation.context
+    for name, stmt in params_of(evaluation).items():
+        if name in names:
+            value = file.env[file.scope.names[name].slot]
+            found[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
+    return found
+
+
+def rewritten(file: tree.File, literals: Mapping[str, str]) -> str:
+    """A scene's text with other defaults of its params, by name; all else stays as it was."""
+    text = file.span.source.text
+    for stmt in reversed(file.statements):
+        if isinstance(stmt, tree.Param) and stmt.name.text in literals:
+            span = stmt.default.span
+            text = text[: span.start] + literals[stmt.name.text] + text[span.end :]
+    return text

@@ -1,0 +1,470 @@
+"""Text to tokens, and the LALR automaton that reads them.
+
+One regular expression, made from the terminals of the grammar and the shapes of common slips, eats
+white space and comments and then one token. A slip is reported here once and stands in the token list as
+what was meant, so that the parser meets a sound text.
+
+Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
+tables, keeps token indices on its stack and hands over at a mistake.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import Any
+from unicodedata import category
+
+from scenelang.language.diagnostics import (
+    Diagnostic,
+    Diagnostics,
+    Edit,
+    Fix,
+    Label,
+    SourceFile,
+    Span,
+    removal,
+)
+from scenelang.language.tables import END, tables
+from scenelang.language.words import UNITS
+
+MAX_MISTAKES = 200
+"""After so many the rest of a file is not reported: it is not a scene."""
+
+Token = tuple[int, int, int]
+"""Kind, start and end."""
+
+UNIT_ALIASES = {"degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad"}
+UNIT_ALIASES |= {"turns": "turn", "sec": "s", "second": "s", "seconds": "s", "msec": "ms"}
+FOREIGN = {"**": "^", "===": "==", "!==": "!=", "<>": "!=", "&": "&&", "|": "||", "−": "-", "–": "-"}
+FOREIGN |= {"×": "*", "·": "*", "÷": "/", "≤": "<=", "≥": ">=", "≠": "!="}
+FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
+"""Operators and punctuation of other languages and keyboards: what is written here instead."""
+
+# Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
+_SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
+_SLIPS = {
+    "open_comment": r"/\*",
+    "close_comment": r"\*/",
+    "open_string": r'"(?:\\[^\n]|[^\s;,(){}\[\]"\\])*+',
+    "quotes": r"'[^'\n]*+'|[“”][^“”\n]*+[“”]",
+    "number": r"\.?[0-9](?:[\w°]|\.(?!\.))*+",
+    "variable": r"\$[A-Za-z_]\w*+",
+    "hash": r"#[ \t!#][^\n]*+|#(?=\n|\Z)|(?<![^\n])#\w++[ \t]++[A-Za-z0-9][^\n]*+",
+    "colour": r"#\w*+",
+    "name": r"[^\W\d]\w*+",
+    "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
+}
+_SAID = {
+    "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
+    "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
+    "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
+    "variable": (
+        "NAME",
+        "E0113",
+        "illegal name `{}`",
+        "names have no `$`; in place of `$fn` write s.disc(0.3, sides = 64)",
+    ),
+}
+"""Slips without a fix: what stands in their place, code, message, help."""
+_LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
+_AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
+"""What may follow a string whose end is known though its quote is missing."""
+_ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
+
+
+class Report:
+    """The mistakes of one file, in the order of finding; at most `MAX_MISTAKES`."""
+
+    def __init__(self, source: SourceFile) -> None:
+        self.source = source
+        self.found: list[Diagnostic] = []
+        self.full = False
+
+    def add(
+        self,
+        code: str,
+        message: str,
+        start: int,
+        end: int,
+        *,
+        labels: Iterable[Label] = (),
+        help: str | None = None,
+        fix: Fix | str | None = None,
+    ) -> None:
+        """Record a mistake at ``[start, end)``; a fix that is text takes the place of what is there."""
+        if self.full:
+            return
+        if len(self.found) == MAX_MISTAKES:
+            self.full = True
+            code, message, labels, fix = "E0121", f"more than {MAX_MISTAKES} syntax mistakes", (), None
+            help = "the rest of the file was not checked"
+        if isinstance(fix, str):
+            fix = self.change(start, end, fix)
+        self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
+
+    def change(self, start: int, end: int, text: str, message: str | None = None) -> Fix:
+        """A fix that puts a text in the place of ``[start, end)``."""
+        if not text:
+            return removal(self.source, start, end)
+        usual = f"{'insert' if start == end else 'write'} `{text.strip()}`"
+        return Fix(message or usual, (Edit(Span(self.source, start, end), text),))
+
+    def flush(self, diagnostics: Diagnostics) -> None:
+        """Hand everything over, in the order of the text."""
+        for d in sorted(self.found, key=lambda d: d.span.start if d.span is not None else 0):
+            diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+
+
+class Tokens:
+    """Tokens as parallel lists of kinds, starts and ends; the last one is the end of the text.
+
+    A token that recovery put in is empty (``start == end``).
+    """
+
+    __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")
+
+    def __init__(self, source: SourceFile) -> None:
+        self.source = source
+        self.kinds: list[int] = []  # indices into `Tables.kinds`
+        self.starts: list[int] = []  # offsets of first code points
+        self.ends: list[int] = []  # offsets after the last ones
+        self.reported: set[int] = set()  # where tokens and characters begin whose mistake is reported
+        self.cut = False  # the text ends inside a comment, so what it lacks is not a further mistake
+
+    def append(self, kind: int, start: int, end: int) -> None:
+        self.kinds.append(kind)
+        self.starts.append(start)
+        self.ends.append(end)
+
+    def text(self, index: int) -> str:
+        """The text of one token."""
+        return self.source.text[self.starts[index] : self.ends[index]]
+
+    def place(self, first: int, stop: int = 0) -> tuple[int, int]:
+        """Start and end of a token, or of those before ``stop``."""
+        return self.starts[first], self.ends[(stop or first + 1) - 1]
+
+    def end_before(self, index: int) -> int:
+        """Where the token before ``index`` ends: where something missing belongs."""
+        return self.ends[index - 1] if index else 0
+
+    def on_new_line(self, index: int) -> bool:
+        """Whether a token is the first of its line."""
+        return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
+
+    def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
+        """Put tokens of other kinds in the place of ``count`` tokens.
+
+        A token that takes the place of another keeps it; otherwise new ones are empty and stand where the
+        first old one began, or at the end of the token before where none goes.
+        """
+        if len(kinds) == count == 1:
+            self.kinds[index] = kinds[0]
+            return
+        at = self.starts[index] if count else self.end_before(index)
+        self.splice(index, index + count, [(kind, at, at) for kind in kinds])
+
+    def part(self, first: int, stop: int) -> list[Token]:
+        """Kinds, starts and ends of the tokens ``[first, stop)``."""
+        columns = (self.kinds[first:stop], self.starts[first:stop], self.ends[first:stop])
+        return list(zip(*columns, strict=True))
+
+    def splice(self, first: int, stop: int, new: Sequence[Token]) -> None:
+        """Put others in the place of the tokens ``[first, stop)``."""
+        for number, column in enumerate((self.kinds, self.starts, self.ends)):
+            column[first:stop] = [token[number] for token in new]
+
+    def give_up(self, first: int, stop: int, name: str, start: int, end: int) -> None:
+        """Put one token that stands for what cannot be read in the place of some."""
+        self.splice(first, stop, [(tables().kind(name), start, end)])
+
+    def drop(self, indices: Sequence[int]) -> None:
+        """Take out any number of tokens at once."""
+        gone = set(indices)
+        for column in (self.kinds, self.starts, self.ends):
+            column[:] = [value for index, value in enumerate(column) if index not in gone]
+
+
+# ---------------------------------------------------------------- reading
+
+
+@cache
+def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
+    """The expression; the kind of each of its groups, or -1; the name of each slip's group."""
+    language = tables()
+    words = [text for text in language.literals if text[0].isalpha()]
+    signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
+    names = ["", *language.patterns, *_SLIPS]
+    slips = [*_SLIPS.values()]
+    groups = [*language.patterns.values(), *slips, "|".join(map(re.escape, signs)), _ILLEGAL]
+    kinds = [-1, *(language.kind(name) for name in language.patterns), *[-1] * (len(slips) + 2)]
+    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups) + r"|\Z)"
+    return re.compile(pattern), kinds, [*names, "sign", "illegal"]
+
+
+def scan(source: SourceFile, report: Report) -> Tokens:
+    """All tokens of a text; slips go to ``report``."""
+    pattern, group_kinds, names = _master()
+    literals = tables().literals
+    name_group, sign_group = names.index("NAME"), names.index("sign")
+    name_kind = group_kinds[name_group]
+    tokens = Tokens(source)
+    kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
+    text = source.text
+    keyword = literals.get
+    slips = _Slips(tokens, report)
+    for match in pattern.finditer(text):
+        group = match.lastindex
+        if group is None:
+            break
+        start, end = match.span(group)
+        if group == name_group:
+            kind = keyword(text[start:end], name_kind)
+        elif group == sign_group:
+            kind = literals[text[start:end]]
+        else:
+            kind = group_kinds[group]
+            if kind < 0:
+                slips.read(names[group], start, end)
+                if tokens.cut:
+                    break
+                continue
+        kinds.append(kind)
+        starts.append(start)
+        ends.append(end)
+    tokens.append(END, len(text), len(text))
+    return tokens
+
+
+class _Slips:
+    """Reports each slip and stands something sound in its place."""
+
+    def __init__(self, tokens: Tokens, report: Report) -> None:
+        self.tokens = tokens
+        self.report = report
+
+    def read(self, name: str, start: int, end: int) -> None:
+        text = self.tokens.source.text[start:end]
+        if name not in _SAID:
+            handler: Callable[[int, int, str], None] = getattr(self, f"_{name}")
+            handler(start, end, text)
+            return
+        kind, code, message, help = _SAID[name]
+        if name == "colour" and re.fullmatch("#(?:[0-9a-fA-F]{4}){1,2}", text):
+            help = f"colours have no alpha: write {text[: 1 + (len(text) - 1) * 3 // 4]}"
+        elif text == "$t":
+            help = "the share of an animation that has run is `u`, after animate(seconds = 2, fps = 24);"
+        if kind:
+            self._keep(kind, start, end)
+        self.tokens.cut |= name == "open_comment"
+        self.report.add(code, message.format(text), start, end, help=help)
+
+    def _keep(self, kind: str, start: int, end: int) -> None:
+        self.tokens.append(tables().kind(kind), start, end)
+        self.tokens.reported.add(start)
+
+    def _close_comment(self, start: int, end: int, text: str) -> None:
+        self.report.add("E0115", "end of a comment that was never opened", start, end, fix="")
+
+    def _open_string(self, start: int, end: int, text: str) -> None:
+        self._keep("STRING", start, end)
+        sure = end - start > 1 and _AFTER_STRING.match(self.tokens.source.text, end)
+        fix = self.report.change(end, end, '"') if sure else None
+        help = 'a string ends with `"` on its line'
+        self.report.add("E0114", "string is never closed", start, end, help=help, fix=fix)
+
+    def _quotes(self, start: int, end: int, text: str) -> None:
+        self._keep("STRING", start, end)
+        fix = None if '"' in text or "\\" in text else f'"{text[1:-1]}"'
+        help = 'strings stand in `"`'
+        self.report.add("E0123", "string in the wrong quotes", start, end, help=help, fix=fix)
+
+    def _number(self, start: int, end: int, text: str) -> None:
+        if re.fullmatch("0[xX][0-9a-fA-F]{6}", text):
+            self._keep("COLOR", start, end)
+            self.report.add(
+                "E0116", f"`{text}` is not a number", start, end, help="this is a colour", fix=f"#{text[2:]}"
+            )
+            return
+        self._keep("NUMBER", start, end)
+        found = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
+        value, rest = found.groups() if found else ("", text)
+        message, fix = f"`{text}` is not a number", None
+        help = "numbers look like `1`, `0.5` or `1e-3`"
+        if rest in ("f", "F"):
+            help, fix = "numbers have no type", value
+        elif re.fullmatch("(?:_[0-9]+)+", rest):
+            help, fix = "digits are not grouped", text.replace("_", "")
+        elif rest and not rest.startswith((".", "e", "E")):
+            message = f"`{rest}` is not a unit"
+            if rest in UNIT_ALIASES:
+                fix, help = value + UNIT_ALIASES[rest], f"it is `{UNIT_ALIASES[rest]}` here"
+            elif rest in _LENGTHS:
+                help = "lengths have no unit: the shorter side of the canvas is 2, its middle 0"
+            elif re.fullmatch("x[0-9]+", rest):
+                help = f"sides are separated by a comma: {value}, {rest[1:]}"
+            else:
+                units = ", ".join(f"`{unit}`" for unit in UNITS)
+                help = f"units are {units}; a product is written with `*`"
+        self.report.add("E0116", message, start, end, help=help, fix=fix)
+
+    def _hash(self, start: int, end: int, text: str) -> None:
+        constant = re.fullmatch(
+            r"#(?:define|declare|local)[ \t]+([A-Za-z_]\w*)[ \t]*=?[ \t]*([^;/\n]+);?", text
+        )
+        if constant:
+            bound = f"let {constant[1]} = {constant[2].rstrip()};"
+            self.report.add("E0133", "names are bound by `let`", start, end, fix=bound)
+            return
+        fix = None if text.rstrip().endswith((";", "{", "}")) else "//"  # OpenSCAD marks objects by it
+        message, help = "`#` does not begin a comment", "comments begin with `//`"
+        self.report.add("E0127", message, start, start + 1, help=help, fix=fix)
+
+    def _foreign(self, start: int, end: int, text: str) -> None:
+        new = FOREIGN[text]
+        self._keep(new, start, end)
+        message, help = f"`{text}` is not used here", f"`{new}` is the sign for it"
+        self.report.add("E0127", message, start, end, help=help, fix=new)
+
+    def _illegal(self, start: int, end: int, text: str) -> None:
+        self.tokens.reported.add(start)
+        shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
+        unseen = all(category(c) in ("Cf", "Cc") for c in text)  # comes along when text is copied
+        help, fix = ("it cannot be seen", "") if unseen else (None, None)
+        self.report.add("E0113", f"illegal character `{shown}`", start, end, help=help, fix=fix)
+
+
+LOOKAHEAD = 8
+"""How far past a mistake a repair is followed; further on it tells nothing more."""
+
+# What brings a half-written statement to its end. What is tried first ends something; an operand or a name
+# is taken only where nothing else will do.
+_NEXT = (")", "]", "in", "=", ":", "BAD_EXPRESSION", "STRING", "NAME", "as", "(")
+_LONGEST = 24
+
+Mend = Callable[[list[int], list[Any], int], int | None]
+"""Changes states, values and tokens at the index of one that does not fit, and says where reading goes on."""
+
+
+def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
+    """Read tokens to their end and build what they stand for.
+
+    Args:
+        kinds: of each token, the last of them `END`; ``mend`` may change the list.
+        callbacks: what builds the value of each rule, in the order of `Tables.rules`, from the values of its
+            parts; that of a token is its index. None passes the only value on.
+        mend: is asked at a token that does not fit; None gives up.
+
+    Returns:
+        What the last rule's callback made, None where ``mend`` gave up.
+    """
+    language = tables()
+    actions, gotos, final = language.actions, language.gotos, language.final
+    rules = [(*rule[:2], call) for rule, call in zip(language.rules, callbacks, strict=True)]
+    states = [language.start]
+    values: list[Any] = []
+    state = language.start
+    at = 0
+    kind = kinds[0]
+    while True:
+        action = actions[state].get(kind)
+        if action is None:
+            resumed = mend(states, values, at)
+            if resumed is None:
+                return None
+            at = resumed
+            kind = kinds[at]
+            state = states[-1]
+        elif action >= 0:
+            states.append(action)
+            values.append(at)
+            state = action
+            at += 1
+            kind = kinds[at]
+        else:
+            length, origin, call = rules[~action]
+            if call is None:
+                states.pop()
+            elif length == 1:
+                states.pop()
+                values[-1] = call(values[-1])
+            elif length:
+                parts = values[-length:]
+                del values[-length:], states[-length:]
+                values.append(call(*parts))
+            else:
+                values.append(call())
+            state = gotos[states[-1]][origin]
+            states.append(state)
+            if state == final:
+                return values[0]
+
+
+def advance(stack: list[int], kind: int) -> bool:
+    """Take one token, changing the stack; False where it does not fit."""
+    language = tables()
+    actions, gotos, rules = language.actions, language.gotos, language.rules
+    while True:
+        action = actions[stack[-1]].get(kind)
+        if action is None:
+            return False
+        if action >= 0:
+            stack.append(action)
+            return True
+        length, origin, _ = rules[~action]
+        if length:
+            del stack[-length:]
+        stack.append(gotos[stack[-1]][origin])
+        if stack[-1] == language.final:
+            return True
+
+
+def fits(stack: list[int], kind: int) -> bool:
+    """Whether one token can follow."""
+    return advance(stack.copy(), kind)
+
+
+def reach(stack: list[int], kinds: list[int], start: int, stop: int) -> int:
+    """Index of the first token from ``start`` on that does not fit, at most ``stop``.
+
+    Changes the stack. A text read to its end counts as ``stop``.
+    """
+    for at in range(start, min(stop, len(kinds))):
+        if not advance(stack, kinds[at]):
+            return at
+        if kinds[at] == END:
+            return stop
+    return stop
+
+
+def statement_depth(stack: list[int]) -> int:
+    """Index of the innermost state in which a statement can begin; the last where one has just ended."""
+    language = tables()
+    bad_statement = language.kind("BAD_STATEMENT")
+    at = len(stack) - 1
+    if bad_statement in language.actions[stack[at]]:
+        return at
+    while language.actions[stack[at]].get(bad_statement, -1) < 0:
+        at -= 1
+    return at
+
+
+def completion(stack: Sequence[int], goal: int) -> tuple[int, ...] | None:
+    """Kinds of the missing tokens, after which ``goal`` fits; None where no few do.
+
+    Args:
+        stack: states of the parser; they are not changed.
+        goal: kind of the token that should follow: a `;` or a brace.
+    """
+    kind = tables().kind
+    trial = list(stack)
+    missing: list[int] = []
+    while not fits(trial, goal):
+        following = next((k for k in map(kind, _NEXT) if fits(trial, k)), None)
+        if following is None or len(missing) == _LONGEST:
+            return None
+        advance(trial, following)
+        missing.append(following)
+    return tuple(missing)

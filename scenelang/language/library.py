@@ -1,0 +1,135 @@
+"""The library that ships, `std/…`, and the places where nodes of a Scene were written.
+
+Such a name means a file of this package wherever it is written. A user's own file of that name is
+``./std/shapes``; one with a suffix, ``std/shapes.nsg``, is always the user's.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import field
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from scenelang.assets.records import Record
+from scenelang.language.diagnostics import Edit, Fix, SourceFile, Span
+
+SHAPES: Final = "std/shapes"
+MESHES: Final = "std/meshes"
+_FOLDER: Final = Path(__file__).resolve().parent / "std"
+_RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
+
+
+_SUFFIXES: Final = (".nsg", ".safetensors")
+_FILES: Final = {f"std/{path.stem}": path for path in _FOLDER.iterdir() if path.suffix in _SUFFIXES}
+
+
+def is_reserved(text: str) -> bool:
+    """Whether an import's path is the library's to give, a file of it or not."""
+    return _RESERVED.fullmatch(text) is not None
+
+
+def names() -> list[str]:
+    """What there is to import."""
+    return sorted(_FILES)
+
+
+def find(text: str) -> Path | None:
+    """The file that a name of the library means; None where it means none."""
+    return _FILES.get(text)
+
+
+def owns(path: Path) -> bool:
+    """Whether a resolved path is a file of the library."""
+    return path.parent == _FOLDER
+
+
+def called(name: str) -> str:
+    """What a file of the library is called in diagnostics and Programs, wherever it is installed."""
+    return f"<{name}>"
+
+
+def holds(source: SourceFile) -> bool:
+    """Whether a text is a file of the library."""
+    return source.name.startswith("<std/")
+
+
+def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:
+    """Help and fix for the path of a file that is not there, if the library's was meant."""
+    name = text.removeprefix("./").removesuffix(".nsg").removesuffix(".safetensors")
+    if name not in names():
+        return None, None
+    return f"the library that ships is `{name}`", Fix(f"write `{name}`", (Edit(span, f'"{name}"'),))
+
+
+class Written(NamedTuple):
+    """The two spans of a node: its heading name or keyword, and its whole statement."""
+
+    name: Span
+    statement: Span
+
+
+class Calls(NamedTuple):
+    """The module and function calls that led somewhere, innermost first."""
+
+    span: Span
+    outer: Calls | None
+
+    def outwards(self) -> Iterator[Span]:
+        """The places of the calls."""
+        calls: Calls | None = self
+        while calls is not None:
+            yield calls.span
+            calls = calls.outer
+
+    def outside(self) -> Span | None:
+        """The innermost call that is not written in the library."""
+        return next((call for call in self.outwards() if not holds(call.source)), None)
+
+
+class SpanMap(Record, frozen=False):
+    """Spans of a Scene's nodes, transforms and materials, by identity.
+
+    It answers for the very objects that the evaluator made; for any other it answers None. Nodes that one
+    statement made many times share one place.
+    """
+
+    _known: dict[int, tuple[object, Written, Calls | None]] = field(default_factory=dict)
+    """By `id`; each entry holds its node, so that no other can come by that `id`."""
+
+    def record(self, node: object, written: Written, calls: Calls | None = None) -> None:
+        """Remember where ``node`` was written and through which calls it came about.
+
+        What the library makes counts as written where it is called.
+        """
+        if calls is not None and holds(written.name.source):
+            site = calls.outside() or written.name
+            written = Written(site, site)
+        self._known[id(node)] = node, written, calls
+
+    def copy(self, old: object, new: object) -> None:
+        """``new`` stands for ``old``, which an outer block has added to."""
+        self._known[id(new)] = new, *self._known[id(old)][1:]
+
+    def add(self, other: SpanMap) -> None:
+        """Take over all that ``other`` knows."""
+        self._known.update(other._known)
+
+    def span(self, node: object) -> Span | None:
+        """The name or keyword that heads the statement of ``node``: what a caret points at."""
+        known = self._known.get(id(node))
+        return known[1].name if known else None
+
+    def statement(self, node: object) -> Span | None:
+        """The whole statement of ``node``."""
+        known = self._known.get(id(node))
+        return known[1].statement if known else None
+
+    def calls(self, node: object) -> tuple[Span, ...]:
+        """The calls that led to ``node``, innermost first; empty where it stands in no module."""
+        known = self._known.get(id(node))
+        return tuple(known[2].outwards()) if known and known[2] is not None else ()
+
+    def __len__(self) -> int:
+        return len(self._known)

@@ -1,0 +1,506 @@
+"""Transforms, texture operations and materials: their arguments, and the nodes they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from scenelang.assets.records import Record
+from scenelang.language import tree
+from scenelang.language.advice import VALUES, report_problem, unknown, unknown_member
+from scenelang.language.blocks import misplaced, prepare_inner
+from scenelang.language.builder import Action, Builder, FileContext, Place, make
+from scenelang.language.diagnostics import Edit, Fix, Label, Span
+from scenelang.language.expressions import (
+    POISONED,
+    VARIES,
+    Code,
+    Given,
+    bind,
+    prepare_arguments,
+    value_of,
+    wrong_kind,
+)
+from scenelang.language.library import Written
+from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
+from scenelang.language.nodes import (
+    Bend,
+    Color,
+    Displace,
+    Flip,
+    Frozen,
+    Grayscale,
+    Hue,
+    Matrix,
+    Rotate,
+    Scale,
+    Shear,
+    Translate,
+    Twirl,
+    Twist,
+    singular,
+)
+from scenelang.language.reporter import Reporter
+from scenelang.language.scene import Material
+from scenelang.language.session import Binding, Env
+from scenelang.language.values import POISON, MaterialValue, Problem, Vec, angle, describe, number, unexpected
+from scenelang.language.words import GEOMETRIES, MATERIALS, OPERATIONS, TEXTURES, TRANSFORMS, Word
+
+
+class Spec(Record):
+    """One transform or operation.
+
+    Args:
+        build: the node from one value an argument, None where left out; raises Problem.
+        spread: whether one vector may stand for all arguments.
+        help: advice for a wrong number of arguments; None prints the signature.
+    """
+
+    word: Word
+    build: Callable[..., Any]
+    spread: bool = False
+    help: str | None = None
+
+
+def vector(value: Any, length: int, operand: int = 0, what: str = "a vector") -> tuple[float, ...]:
+    """``length`` numbers; raises Problem for anything else."""
+    if value.__class__ is not Vec or len(value.items) != length:
+        help = "write [x, y, z], or X, Y or Z" if what in ("a point", "an axis") else None
+        raise unexpected(f"{what} of {length} numbers", value, help, operand)
+    return tuple([number(item, operand) for item in value.items])
+
+
+def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
+    """A colour's three numbers."""
+    if value.__class__ is not Vec:
+        help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
+        raise unexpected("a colour", value, help, operand, fix="colour")
+    if len(value.items) == 4:
+        raise unexpected(
+            "a colour of 3 numbers", value, "colours have no alpha: leave the fourth out", operand
+        )
+    r, g, b = vector(value, 3, operand, "a colour")
+    return r, g, b
+
+
+_ONE_AXIS: Final = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
+
+
+def _translate(x: Any, y: Any, z: Any) -> Translate:
+    third = 0.0 if z is None else number(z, 2)
+    return make(Translate, {"kind": "translate", "x": number(x, 0), "y": number(y, 1), "z": third})
+
+
+def _rotate(turn: Any, axis: Any) -> Rotate:
+    if turn.__class__ is Vec:
+        raise unexpected("an angle", turn, _ONE_AXIS, 0, fix="turns")
+    rad = angle(turn, 0)
+    direction = (0.0, 0.0, 1.0) if axis is None else vector(axis, 3, 1, "an axis")
+    if not any(direction):
+        raise Problem("E0312", "an axis of length 0", operand=1)
+    return make(Rotate, {"kind": "rotate", "angle": rad, "axis": direction})
+
+
+def _scale(x: Any, y: Any, z: Any) -> Scale:
+    factors = [number(x, 0), number(y, 1), 1.0 if z is None else number(z, 2)]
+    for index, factor in enumerate(factors):
+        if factor == 0.0:
+            help = "decimals stand behind a point, as in 0.5"
+            raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand=index)
+    return make(Scale, {"kind": "scale", "x": factors[0], "y": factors[1], "z": factors[2]})
+
+
+def _scale_of_one(s: Any) -> Scale:
+    """``scale(s)``, or ``scale([sx, sy])`` with its components in a vector."""
+    return _scale(*spread([s, None, None], GEOMETRY["scale"])) if s.__class__ is Vec else _scale(s, s, s)
+
+
+def _shear(*terms: Any) -> Shear:
+    given = [i for i, term in enumerate(terms) if term is not None]
+    if len(given) != 1:
+        help = "write one term a call, as in shear(xy = 0.5); several calls apply in order"
+        raise Problem("E0308", f"shear takes one term, found {len(given)}", help)
+    at = given[0]
+    return make(Shear, {"kind": "shear", "axes": TRANSFORMS["shear"].params[at], "k": number(terms[at], at)})
+
+
+def _matrix(rows: Any) -> Matrix:
+    if rows.__class__ is not Vec or len(rows.items) != 4:
+        raise unexpected("4 rows of 4 numbers", rows, operand=0)
+    values = tuple([vector(row, 4, 0, "a row") for row in rows.items])
+    if values[3] != (0.0, 0.0, 0.0, 1.0):
+        raise Problem("E0311", "the last row of a matrix is not 0, 0, 0, 1", operand=0)
+    if singular(values):
+        raise Problem("E0312", "a singular matrix flattens what it moves", operand=0)
+    return make(Matrix, {"kind": "matrix", "rows": values})
+
+
+def _numbers(cls: type[Frozen], refused: str = "") -> Callable[..., Any]:
+    """A node whose fields are all numbers; ``refused`` says why an angle is not one of them."""
+    kind, *names = [cls.model_fields["kind"].default, *(name for name in cls.model_fields if name != "kind")]
+
+    def build(*values: Any) -> Any:
+        for operand, value in enumerate(values):
+            if refused and describe(value) == "an angle":
+                raise unexpected("a number", value, refused, operand)
+        found = {name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))}
+        return make(cls, {"kind": kind, **found})
+
+    return build
+
+
+_RATE: Final = "k is radians per unit length, a bare number: divide by 1rad"
+_BUILDS: Final[dict[str, Callable[..., Any]]] = {
+    "translate": _translate,
+    "rotate": _rotate,
+    "scale": _scale,
+    "shear": _shear,
+    "matrix": _matrix,
+    "twirl": _numbers(Twirl, _RATE),
+    "bend": _numbers(Bend, _RATE),
+    "twist": _numbers(Twist, _RATE),
+    "displace": _numbers(Displace),
+    "flip": _numbers(Flip),
+    "color": lambda c: make(Color, {"kind": "color", "rgb": color(c)}),
+    "grayscale": _numbers(Grayscale),
+    "hue": lambda h: make(Hue, {"kind": "hue", "angle": angle(h, fix="hue")}),
+}
+_SPREAD: Final = ("translate", "scale")
+_HELP: Final = {
+    "rotate": _ONE_AXIS,
+    "shear": "name the term, as in shear(xy = 0.5)",
+    "color": "it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
+    **{name: f"it is called {TRANSFORMS[name].head}" for name in ("scale", "matrix")},
+}
+
+
+def _specs(known: Mapping[str, Word]) -> dict[str, Spec]:
+    return {name: Spec(word, _BUILDS[name], name in _SPREAD, _HELP.get(name)) for name, word in known.items()}
+
+
+GEOMETRY: Final = _specs(TRANSFORMS)
+TEXTURE: Final = _specs(OPERATIONS)
+EVEN_SCALE: Final = Spec(Word("scale", "scale(s)", "", ("s",), 1), _scale_of_one)
+
+
+def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
+    """Arguments in full: the items of one vector, or the values as they are.
+
+    Raises:
+        Problem: a vector of a length that does not fit, or one number alone.
+    """
+    first = values[0]
+    if any(v is not None for v in values[1:]):
+        return list(values)
+    if first.__class__ is float:
+        missing = " and ".join(f"`{name}`" for name in spec.word.params[1 : spec.word.required])
+        raise Problem("E0308", f"{missing} is missing, or a vector of all components")
+    if first.__class__ is not Vec:
+        raise unexpected("a vector or its components", first, operand=0)
+    count = len(first.items)
+    if not spec.word.required <= count <= len(spec.word.params):
+        numbers = f"{spec.word.required} or {len(spec.word.params)} numbers"
+        raise unexpected(f"a vector of {numbers}", first, operand=0)
+    return [*first.items, *[None] * (len(spec.word.params) - count)]
+
+
+def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
+    """The action of a transform or a texture operation; checks that it may stand here."""
+    name, report = stmt.name.text, place.report
+    given = prepare_arguments(stmt.args, place, name)
+    spec = _spec(stmt, place)
+    if spec is None:
+        return None
+    if stmt.body is not None:
+        help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
+        _skim(stmt, place)
+        report.error("E0330", f"`{name}` takes no block", stmt.name.span, help=help)
+        return None
+    if name == "scale" and len(given) == 1 and (given[0].arg.name is None or given[0].arg.name.text == "s"):
+        spec = EVEN_SCALE
+    word = spec.word
+    bound = bind(report, stmt.name, word.params, word.required, given, spread=spec.spread, help=spec.help)
+    if bound is None:
+        return None
+    if name == "shear" and any(arg.name is None for arg, _ in given):
+        report.error("E0308", "shear takes a named term", given[0].arg.span, help=spec.help)
+        return None
+    return _action(spec, bound, stmt, place)
+
+
+def _spec(stmt: tree.Call, place: Place) -> Spec | None:
+    """The operation that the name stands for in such a block; None with a report if there is none."""
+    name, span = stmt.name.text, stmt.name.span
+    if place.kind == "material":
+        if name not in TEXTURE:
+            misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
+        return TEXTURE.get(name)
+    if name not in GEOMETRY and place.kind != "unknown":
+        from scenelang.language.advice import material_advice
+
+        help = f"put it into a material's block, as in {material_advice(place, name)}"
+        if name == "flip":
+            help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
+        _skim(stmt, place)
+        misplaced(place, span, "`{}` stands outside a material", name, help)
+        return None
+    if place.kind == "file":
+        help = "put what it moves and the transform into group { … }"
+        _skim(stmt, place)
+        misplaced(place, span, "transform `{}` at top level", name, help)
+        return None
+    return GEOMETRY.get(name) or TEXTURE[name]
+
+
+def _skim(stmt: tree.Call, place: Place) -> None:
+    """Look through the block of a transform as one of children."""
+    if stmt.body is not None and place.kind in ("file", "group", "chain"):
+        prepare_inner(stmt.body, place.inner("group"))
+
+
+def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: Place) -> Action:
+    session, span, where = place.session, stmt.name.span, Written(stmt.name.span, stmt.span)
+    operands = tuple([None if one is None else one.arg.value for one in bound])
+    first = operands[0] if operands else None
+    if first is not None and not any(operands[1:]):
+        operands = (first,) * len(spec.word.params)
+
+    def construct(values: list[Any]) -> Any:
+        """The node, or None after a report."""
+        if POISON in values:
+            return None
+        try:
+            node = spec.build(*spread(values, spec)) if spec.spread else spec.build(*values)
+        except Problem as problem:
+            report_problem(session.report, problem, span, operands)
+            return None
+        if node.__class__ is Color or node.__class__ is Grayscale:
+            _warn(node, session.report, first.span if first else span)
+        return node
+
+    def append(node: Any, out: Builder) -> None:
+        if out.moved is None:
+            out.moved = span  # even by a transform with a mistake: children have their order all the same
+        if node is not None:
+            session.spans.record(node, where)
+            session.count_parts(1, span)
+            out.transforms.append(node)
+            if session.watch is not None:
+                session.watch(stmt.span, node)
+
+    if all(one is None or one.code.value is not VARIES for one in bound):
+        place.file.weight += SAME_MOVE
+        constants = [None if one is None else one.code.value for one in bound]
+        made: list[Any] = []
+
+        def repeat(env: Env, out: Builder) -> None:
+            if not made:
+                made.append(construct(constants))
+            append(made[0], out)
+
+        return repeat
+
+    place.file.weight += MATRIX if stmt.name.text == "matrix" else MOVE
+    getters = [None if one is None else one.code.run for one in bound]
+
+    def action(env: Env, out: Builder) -> None:
+        append(construct([None if get is None else get(env) for get in getters]), out)
+
+    return action
+
+
+def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
+    """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
+    components = node.rgb if isinstance(node, Color) else (node.amount,)
+    outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
+    if outside is not None:
+        help = "components run from 0 to 1; the result is clamped to that"
+        if outside > 1 and outside.is_integer():
+            help = "divide components of 0 to 255 by 255"
+        report.warn("W0301", f"{outside:.6g} is outside 0 to 1", span, help)
+
+
+def _stands(
+    place: Place, span: Span, what: str, help: str, inside: str | None = None, name: str = ""
+) -> bool:
+    """Whether a material may stand here; reports it if not."""
+    if place.kind not in ("file", "material"):
+        return True
+    at_top = place.kind == "file"
+    where = "at top level" if at_top else "inside a material"
+    misplaced(place, span, f"{what} {where}", name, help if at_top else inside)
+    return False
+
+
+def prepare_use(stmt: tree.MaterialUse, place: Place) -> Action | None:
+    word = Span(stmt.span.source, stmt.span.start, stmt.name.span.end)
+    stands = _stands(place, word, "a material", "put it into the block of an object or a group")
+    make_material = _prepare(stmt, place)
+    if make_material is None or not stands:
+        return None
+    session = place.session
+
+    def action(env: Env, out: Builder) -> None:
+        _give(make_material(env), word, out, place)
+        session.count_parts(1, word)
+
+    return action
+
+
+def prepare_material(expr: tree.MaterialExpr, place: Place) -> Code:
+    make_material = _prepare(expr, place)
+    if make_material is None:
+        return POISONED
+    return Code(lambda env: MaterialValue(make_material(env)))
+
+
+def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Callable[[Env], Material] | None:
+    """How to make the material node; None where a name is unknown."""
+    name, session = written.name, place.session
+    operations = _operations(written.body, place)
+    called, shading = _called(name, place), _shading(written, place)
+    if called is None or shading == "":
+        return None
+    where = Written(name.span, written.span)
+
+    def run(env: Env) -> Material:
+        material = make(Material, {"name": called, "ops": operations(env), "shading": shading})
+        session.spans.record(material, where)
+        return material
+
+    return run
+
+
+def _called(name: tree.Name, place: Place) -> str | None:
+    """What a Scene calls a material; None after a report."""
+    alias, dot, rest = name.text.partition(".")
+    if not dot:
+        known = {*MATERIALS, *TEXTURES}
+        if alias in known:
+            return alias
+        _unknown(name, place, known)
+        return None
+    binding = place.scope.find(alias)
+    exported: FileContext | None = binding.value if binding and binding.kind == "import" else None
+    own = None if exported is None else exported.scope.names.get(rest)
+    if exported is not None and rest in exported.materials:
+        return exported.materials[rest]
+    if binding is None:
+        unknown(name, place)
+    elif binding.kind not in ("import", "poison"):
+        wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
+    elif own is not None and own.kind in VALUES:
+        _is_value(name, place)
+    elif own is not None:
+        wrong_kind(name, own, place, "a material")
+    else:
+        unknown_member(name, place, exported, "material")
+    return None
+
+
+def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str | None:
+    """The word before the name, None without one and empty after a report."""
+    word, name = written.shading, written.name
+    if word is None:
+        return None
+    if word.text not in MATERIALS:
+        _unknown(word, place, {*MATERIALS})
+        return ""
+    if name.text in MATERIALS:
+        help = f"write material {name.text}"
+        place.report.error("E0213", f"`{name.text}` is not a texture", name.span, help=help)
+        return ""
+    return word.text
+
+
+def _operations(body: tree.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
+    """How to get the operations of a material's block."""
+    if body is None:
+        return lambda env: ()
+    prepared = prepare_inner(body, place.inner("material"))
+    session, span = place.session, body.span
+
+    def run(env: Env) -> tuple[Any, ...]:
+        out = Builder()
+        prepared.run(env, out, session, span)
+        return tuple(out.transforms)
+
+    return run
+
+
+def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
+    """Report a name that no material has."""
+    report, span, binding = place.report, name.span, place.scope.find(name.text)
+    if binding is not None and binding.kind in ("let", "argument", "loop"):
+        _is_value(name, place)
+    elif name.text in GEOMETRIES:
+        report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
+    else:
+        from scenelang.language.advice import unknown_material  # only mistakes need it
+
+        hint, fix = unknown_material(name, place, known)
+        report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
+
+
+def _is_value(name: tree.Name, place: Place) -> None:
+    """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
+    span, binding = name.span, place.scope.find(name.text)
+    if binding is not None and binding.known and binding.value is not POISON:
+        from scenelang.language.advice import material_advice  # only mistakes need it
+
+        message = f"expected a material, found {describe(binding.value)}"
+        help = f"for a colour write {material_advice(place, 'color', name.text)}"
+        place.report.error("E0301", message, span, help=help, labels=binding.labels())
+        return
+    start = span.source.text.rfind("material", 0, span.start)
+    away = Fix("remove `material`", (Edit(Span(span.source, start, span.start), ""),))
+    help = f"to use the value write {name.text}; without `material`"
+    message = f"`{name.text}` is a value, not a material's name"
+    place.report.error("E0213", message, span, help=help, fix=away if start >= 0 else None)
+
+
+def _give(material: Material, span: Span, out: Builder, place: Place) -> None:
+    """Set the material of the block; a second one is a mistake."""
+    if out.material is None:
+        out.material, out.material_span = material, span
+        return
+    labels = (Label(out.material_span, "first material here"),) if out.material_span else ()
+    place.report.error("E0332", "a second material in one block", span, labels=labels)
+
+
+def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action | None:
+    """``mist;`` or ``mist { hue(0.1turn); }``: the block's operations come after the value's own."""
+    session, name, span = place.session, stmt.name.text, stmt.name.span
+    operations = _operations(stmt.body, place)
+    get = value_of(stmt.name, binding, place).run
+    if stmt.args:
+        session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
+        return None
+    help = "materials stand in the block of an object or a group"
+    if (binding.known and binding.value is POISON) or not _stands(
+        place, span, "value `{}`", help, help, name
+    ):
+        return None
+    place.file.weight += MATERIAL_VALUE
+    where = Written(span, stmt.span)
+
+    def action(env: Env, out: Builder) -> None:
+        value = get(env)
+        if value is POISON:
+            return
+        if value.__class__ is not MaterialValue:
+            message = f"expected a material, found {describe(value)}"
+            from scenelang.language.advice import material_advice  # only mistakes need it
+
+            help = f"for a colour write {material_advice(place, 'color', name)}"
+            session.report.error("E0301", message, span, labels=binding.labels(), help=help)
+            return
+        material = value.material
+        if stmt.body is not None:
+            ops = (*material.ops, *operations(env))
+            material = make(Material, {"name": material.name, "ops": ops, "shading": material.shading})
+            session.spans.record(material, where)
+        _give(material, span, out, place)
+        session.count_parts(1 + len(material.ops), span)
+
+    return action

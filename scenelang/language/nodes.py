@@ -1,0 +1,741 @@
+"""Nodes of a Scene: frozen, validated, with their units; transforms, materials and the stage.
+
+The descriptions and the `json_schema_extra` parts go into the JSON Schema, which says what it can of what
+the validators check.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from math import atan, degrees, nextafter, pi
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, overload
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import ErrorDetails
+
+from scenelang.language.diagnostics import plural
+from scenelang.language.words import BLEND, RESERVED, Combine
+
+Triple = tuple[float, float, float]
+MOST: Final = 1e12
+"""The largest number of a stage: float32 holds what is computed of it."""
+
+
+def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:
+    """The argument that leaves a camera without a picture, and why, if one does."""
+    if eye == target:
+        return "eye", "the eye is the target"
+    if not 0.0 < fov_rad < pi:
+        return "fov", f"a field of view of {degrees(fov_rad):g}° is not between 0° and 180°"
+    if fov_rad < 1.0 / MOST:
+        return "fov", f"a field of view of {degrees(fov_rad):g}° is too narrow"
+    return None
+
+
+def light_fault(power: float) -> str | None:
+    """Why there is no light of such a power, if there is none."""
+    return f"a power of {power:g} is negative" if power < 0.0 else None
+
+
+_NOT_0: dict[str, Any] = {"not": {"const": 0}}
+_NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
+
+
+def _checked(value: Any, wrong: bool, why: str) -> Any:
+    if wrong:
+        raise ValueError(why)
+    return value
+
+
+# Strict: text such as "0.5" is not a number. Integers are.
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Length = Annotated[Finite, Field(description="world units; the shorter side of the canvas spans 2")]
+Radians = Annotated[Finite, Field(description="radians, counter-clockwise")]
+Rate = Annotated[Finite, Field(description="radians per world unit")]
+Factor = Annotated[
+    Finite,
+    Field(description="not 0", json_schema_extra=_NOT_0),
+    AfterValidator(lambda factor: _checked(factor, factor == 0.0, "a scale by 0")),
+]
+Axis = Annotated[
+    tuple[Finite, Finite, Finite],
+    Field(description="of any length but 0", json_schema_extra=_NOT_000),
+    AfterValidator(lambda axis: _checked(axis, not any(axis), "an axis of length 0")),
+]
+Rgb = Annotated[
+    tuple[Finite, Finite, Finite],
+    Field(description="red, green, blue as written (sRGB-encoded); 0 is none, 1 is full"),
+]
+Row = tuple[Finite, Finite, Finite, Finite]
+Share = Annotated[Finite, Field(ge=0, le=1)]
+Opaque = Annotated[
+    tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
+]
+
+
+_NOT_RESERVED: Final = AfterValidator(
+    lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")
+)
+_WORD: Final = "[A-Za-z_][A-Za-z0-9_]*"
+_SPELT: Final[dict[str, Any]] = {"json_schema_extra": {"not": {"enum": list(RESERVED)}}}
+Word = Annotated[str, Field(pattern=f"^{_WORD}$", **_SPELT), _NOT_RESERVED]
+"""A name that text can spell."""
+Dotted = Annotated[str, Field(pattern=rf"^{_WORD}(\.{_WORD})?$", **_SPELT), _NOT_RESERVED]
+"""The same, or that of an element behind the name of its file."""
+
+
+def _whole(value: Any) -> Any:
+    """256.0 is an integer and true is none, as in JSON Schema."""
+    if isinstance(value, bool):
+        raise ValueError("true and false are not numbers")
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Version = Annotated[Literal[1], Field(description="of the language"), BeforeValidator(_whole)]
+Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whole)]
+
+
+def singular(rows: Sequence[Sequence[float]]) -> bool:
+    """Whether the 3 x 3 linear block of an affine has no inverse.
+
+    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
+    """
+    lengths = [math.hypot(*row[:3]) for row in rows[:3]]
+    if not all(lengths) or not all(map(math.isfinite, lengths)):
+        return True
+    unit = [[x / n for x in row[:3]] for row, n in zip(rows, lengths, strict=False)]
+    (a, b, c), (d, e, f), (g, h, i) = unit
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return abs(determinant) < 1e-14
+
+
+def _is_affine(rows: Any) -> Any:
+    _checked(rows, rows[3] != (0.0, 0.0, 0.0, 1.0), "the last row of a matrix is not 0, 0, 0, 1")
+    return _checked(rows, singular(rows), "a singular matrix")
+
+
+def _last_row(schema: dict[str, Any]) -> None:
+    schema["prefixItems"][3] = {"const": [0, 0, 0, 1]}
+
+
+def first_joins_by_union(schema: dict[str, Any]) -> None:
+    """Say of a chain's children what `Chain` checks."""
+    first = {"properties": {"op": {"const": "union"}}}
+    schema["prefixItems"] = [{"allOf": [schema["items"], first]}]
+
+
+Affine = Annotated[
+    tuple[Row, Row, Row, Row],
+    Field(description="four rows; the last is 0, 0, 0, 1", json_schema_extra=_last_row),
+    AfterValidator(_is_affine),
+]
+
+
+def _kind_is_required(schema: dict[str, Any]) -> None:
+    """In data the kind tells nodes apart, while Python's constructors know it."""
+    if "kind" in schema["properties"]:
+        schema["required"] = ["kind", *schema.get("required", ())]
+
+
+_SEVERAL = frozenset(("children", "elements", "nodes", "ops", "transforms"))
+
+
+_COLOURS = frozenset(("background", "color", "rgb"))
+
+
+def _decoded(name: str, text: str) -> tuple[float, float, float]:
+    """The colour that ``#d33`` or ``#dd3333`` is, for a class of that name."""
+    if not re.fullmatch(r"#([0-9a-fA-F]{3}){1,2}", text):
+        raise ValueError(f"{name}: `{text}` is not a colour such as `#d33` or `#dd3333`")
+    digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
+    red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
+    return red, green, blue
+
+
+class Frozen(BaseModel):
+    """What all nodes of a Scene are."""
+
+    # Validators are built when first used: a scene evaluated from text needs none.
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        defer_build=True,
+        json_schema_extra=_kind_is_required,
+    )
+
+    def __init__(self, *args: Any, **data: Any) -> None:
+        """A node; its fields may go without their names, in order, and one thing may stand for a sequence.
+
+        Raises:
+            ValueError: a value that does not fit, or no field of that name.
+            TypeError: arguments that stand for no field.
+        """
+        given = self._arranged(args, data)
+        try:
+            super().__init__(**given)
+        except ValidationError as error:
+            raise refusal(type(self).__name__, error, self._names()) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # data is validated without it
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        """What a constructor takes, in order."""
+        return [name for name in cls.model_fields if name != "kind"]
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """Arguments by their names."""
+        names = cls._names()
+        if len(args) > len(names):
+            takes = f"at most {len(names)}: {', '.join(names)}" if names else "none"
+            raise TypeError(f"{cls.__name__}: {plural(len(args), 'argument')}, where it takes {takes}")
+        for name in names[: len(args)]:
+            if name in data:
+                raise TypeError(f"{cls.__name__}: `{name}` is given twice")
+        given = {**dict(zip(names, args, strict=False)), **data}
+        for name in _SEVERAL & given.keys():
+            if isinstance(given[name], Frozen):
+                given[name] = (given[name],)
+        for name in _COLOURS & given.keys():
+            if isinstance(given[name], str) and given[name] != "default":
+                given[name] = _decoded(cls.__name__, given[name])
+        return given
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What differs from the defaults: the code that makes it."""
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            if field.is_required() or value != field.default:
+                yield name, value
+
+    def __repr__(self) -> str:
+        try:
+            return super().__repr__()
+        except RecursionError:  # nested deeper than Python likes to recurse
+            return f"{type(self).__name__}(…)"
+
+
+TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
+"""What pydantic names in the place of a mistake and text does not nest by."""
+_MOST: Final = 3  # mistakes that one exception tells
+_WIDTH: Final = 40  # characters of a value that are shown
+_KINDS: Final = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "tuple_type": "a sequence",
+}
+
+
+def said(item: ErrorDetails) -> str:
+    """A mistake's message as it stands after the name of its place and a colon."""
+    match item["type"]:
+        case "string_pattern_mismatch":
+            return "not a possible name"
+        case "missing":
+            return "is missing"
+    words = item["msg"].removeprefix("Value error, ")
+    return (words[:1].lower() + words[1:]).removeprefix("input ")
+
+
+def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
+    """What the constructor of class ``name`` raises; ``known`` are the names of its arguments."""
+    found = error.errors(include_url=False)
+    lines = [_line(item, known) for item in found[:_MOST]]
+    more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    return ValueError(f"{name}: {'; '.join(lines)}{more}")
+
+
+def _line(item: ErrorDetails, known: list[str]) -> str:
+    parts = [part for part in item["loc"] if part not in TAGS]
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
+    kind, value = item["type"], item["input"]
+    if kind == "extra_forbidden":
+        from difflib import get_close_matches  # only mistakes need it
+
+        near = get_close_matches(path, known, 1)
+        return f"there is no `{path}`, " + (
+            f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
+        )
+    if kind == "missing":
+        return f"`{path}` is missing"
+    if kind == "union_tag_invalid":
+        wanted = item["ctx"]["expected_tags"].replace("'", "")
+        return f"`{path}` is a {_shown(value)}; it may be {wanted}"
+    if "class_name" in item.get("ctx", {}):
+        return f"`{path}` is {_shown(value)}, not a {item['ctx']['class_name']}"
+    if kind in _KINDS:
+        return f"`{path}` is {_shown(value)}, not {_KINDS[kind]}"
+    return f"`{path}`: {said(item)}" if path else said(item)
+
+
+def _shown(value: Any) -> str:
+    if hasattr(value, "kind"):
+        return type(value).__name__
+    text = repr(value)
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"
+
+
+class _Turn(Frozen):
+    """A turn, whose angle does not go without a word on its unit."""
+
+    kind: str
+    angle: Radians
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        if args:
+            name = cls.__name__
+            raise TypeError(
+                f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
+                f"or {name}(angle={args[0]!r}) for radians"
+            )
+        return data
+
+
+class Translate(Frozen):
+    """A move; z is for 3D models."""
+
+    kind: Literal["translate"] = "translate"
+    x: Length
+    y: Length
+    z: Length = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(self, x: float, y: float, z: float = 0.0) -> None: ...
+
+
+class Rotate(_Turn):
+    """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
+
+    kind: Literal["rotate"] = "rotate"
+    axis: Axis = (0.0, 0.0, 1.0)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *, angle: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> None: ...
+
+    @classmethod
+    def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
+        """A turn by ``angle_deg`` degrees."""
+        return cls(angle=math.radians(angle_deg), axis=axis)
+
+
+class Scale(Frozen):
+    """Factors along the axes, as in text: one alone is for all three, and z is 1 where two are given."""
+
+    kind: Literal["scale"] = "scale"
+    x: Factor
+    y: Factor
+    z: Factor
+
+    if TYPE_CHECKING:
+
+        def __init__(self, x: float, y: float | None = None, z: float | None = None) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        given = {name: value for name, value in super()._arranged(args, data).items() if value is not None}
+        if "x" in given and "z" not in given:
+            given["z"] = 1.0 if "y" in given else given["x"]
+            given.setdefault("y", given["x"])
+        return given
+
+    @classmethod
+    def uniform(cls, s: float) -> Scale:
+        """``scale(s)``: the same factor along each axis."""
+        return cls(x=s, y=s, z=s)
+
+
+class Shear(Frozen):
+    """``xy``: x += k y, and so on."""
+
+    kind: Literal["shear"] = "shear"
+    axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
+    k: Finite
+
+    if TYPE_CHECKING:
+
+        def __init__(self, axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"], k: float) -> None: ...
+
+
+class Matrix(Frozen):
+    """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
+
+    kind: Literal["matrix"] = "matrix"
+    rows: Affine
+
+    if TYPE_CHECKING:
+
+        def __init__(self, rows: Sequence[Sequence[float]]) -> None: ...
+
+
+class _Warp(Frozen):
+    """A turn whose angle grows along something."""
+
+    kind: str
+    k: Rate
+
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
+
+
+class Twirl(_Warp):
+    """A turn that grows with the distance from the origin."""
+
+    kind: Literal["twirl"] = "twirl"
+
+
+class Bend(_Warp):
+    """A turn that grows along x."""
+
+    kind: Literal["bend"] = "bend"
+
+
+class Twist(_Warp):
+    """A turn of (x, z) that grows along y; for 3D models."""
+
+    kind: Literal["twist"] = "twist"
+
+
+class Displace(Frozen):
+    """Adds ``amount`` sin(f x) sin(f y) sin(f z) to the distance, f being ``frequency``; for 3D models."""
+
+    kind: Literal["displace"] = "displace"
+    amount: Length
+    frequency: Annotated[Finite, Field(description="radians per world unit")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, amount: float, frequency: float) -> None: ...
+
+
+Transform = Annotated[
+    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
+    Field(discriminator="kind"),
+]
+Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
+
+
+class Flip(Frozen):
+    """x to -x."""
+
+    kind: Literal["flip"] = "flip"
+
+
+class Color(Frozen):
+    """Multiplies by ``rgb``."""
+
+    kind: Literal["color"] = "color"
+    rgb: Rgb
+
+    if TYPE_CHECKING:
+
+        def __init__(self, rgb: str | tuple[float, float, float]) -> None: ...
+
+    @classmethod
+    def hex(cls, text: str) -> Color:
+        """A colour as text writes it: ``#d33`` or ``#dd3333``."""
+        return cls(text)
+
+
+class Grayscale(Frozen):
+    """Mixes with the luma."""
+
+    kind: Literal["grayscale"] = "grayscale"
+    amount: Annotated[Finite, Field(description="0 keeps the colour, 1 is grey")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, amount: float) -> None: ...
+
+
+class Hue(_Turn):
+    """An HSV hue shift by ``angle`` radians."""
+
+    kind: Literal["hue"] = "hue"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *, angle: float) -> None: ...
+
+    @classmethod
+    def degrees(cls, angle_deg: float) -> Hue:
+        """A shift by ``angle_deg`` degrees."""
+        return cls(angle=math.radians(angle_deg))
+
+
+MaterialOp = Annotated[
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Field(discriminator="kind"),
+]
+
+
+Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
+Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
+Unsaid = Annotated[Literal["default"], Tag("unsaid")]
+"""What the scene does not state: the language's default."""
+STATED = Tag("stated")
+EITHER = Discriminator(lambda value: "unsaid" if isinstance(value, str) else "stated")
+
+
+class Camera(Frozen):
+    """Where a 3D scene is seen from; ``fov`` is the angle of view in radians across the shorter side."""
+
+    eye: Point = (0.0, 1.2, 6.0)
+    target: Point = (0.0, 0.0, 0.0)
+    fov: Annotated[Radians, Field(gt=0, lt=pi)] = 2.0 * atan(1.0 / 3.0)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, eye: Triple = ..., target: Triple = ..., *, fov: float = ...) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        if len(args) > 2:
+            raise TypeError("Camera: an angle without its unit: write fov=… for radians")
+        return super()._arranged(args, data)
+
+    @model_validator(mode="after")
+    def _sees(self) -> Self:
+        fault = camera_fault(self.eye, self.target, self.fov)
+        if fault is not None:
+            raise ValueError(fault[1])
+        return self
+
+
+class Light(Frozen):
+    """A point light; ``color`` is as written."""
+
+    position: Point = (2.5, 4.0, 3.0)
+    power: Annotated[
+        Finite, Field(ge=0, le=MOST, description="what a white surface at distance 1 receives")
+    ] = 28.0
+    color: Opaque = (1.0, 1.0, 1.0)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, position: Triple = ..., power: float = ..., color: Triple | str = ...) -> None: ...
+
+
+class Ground(Frozen):
+    """A diffuse plane at height ``y``; ``color`` is as written, or the default's."""
+
+    y: Place = -1.0
+    color: Annotated[Annotated[Opaque, STATED] | Unsaid, EITHER] = "default"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, y: float = ..., color: Triple | str = ...) -> None: ...
+
+
+MAX_FRAMES = 1_000_000
+MAX_NODE_DEPTH = 400  # nodes within nodes
+Blend = Annotated[
+    Finite, Field(gt=0, description="width of the blend; null: 0.15 of `smooth`, a sharp edge of a cut")
+]
+
+
+class Material(Frozen):
+    """A material, with its texture and colour operations in order.
+
+    One of the model that is a texture, or an element's, is lit as its ``shading`` says.
+    """
+
+    name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
+    ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
+    shading: Annotated[
+        Word | None, Field(description="of a texture: flat, diffuse or volumetric; null: as usual")
+    ] = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, name: str, ops: Iterable[MaterialOp] | MaterialOp | str = (), shading: str | None = None
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """A text such as ``#d33`` alone is the colour."""
+        given = super()._arranged(args, data)
+        if isinstance(given.get("ops"), str):
+            given["ops"] = (Color(given["ops"]),)
+        return given
+
+
+class Object(Frozen):
+    """A leaf geometry, its transforms nearest the leaf first, and its material."""
+
+    kind: Literal["object"] = "object"
+    geometry: Annotated[Dotted, Field(description="a leaf geometry of the model, or an element's")]
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            geometry: str,
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+
+class Group(Frozen):
+    """Children as a union in order, then transforms that apply to all of them."""
+
+    kind: Literal["group"] = "group"
+    children: tuple[SceneNode, ...] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+
+def blend_width(op: str, k: float) -> float | None:
+    """The k of a Scene for a width that is written, None for the usual one.
+
+    JSON from before cuts had widths says 0.15 in every node, so that one of 0.15 is the next number above.
+    """
+    if k != BLEND:
+        return k
+    return nextafter(BLEND, 1.0) if op in ("subtract", "intersect") else None
+
+
+class _Joining(Frozen):
+    """What joins by an operator."""
+
+    @model_validator(mode="after")
+    def _unions_have_no_width(self, info: ValidationInfo) -> Self:
+        op, k = self.__dict__["op"], self.__dict__["k"]
+        if k == BLEND:
+            self.__dict__["k"] = None if info.mode == "json" else blend_width(op, k)
+        elif op == "union" and k is not None:
+            raise ValueError("`union` has no k: `smooth` blends")
+        return self
+
+
+class Boolean(_Joining):
+    """A boolean node over its children, folded left; ``k`` is the width of its blend."""
+
+    kind: Literal["boolean"] = "boolean"
+    op: Combine
+    children: tuple[SceneNode, ...] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+    k: Blend | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            op: Combine,
+            children: Iterable[SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+            k: float | None = None,
+        ) -> None: ...
+
+
+class Link(_Joining):
+    """One child of a chain with the word that joins it to what came before (first: union)."""
+
+    op: Combine = "union"
+    node: SceneNode
+    k: Blend | None = None
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __init__(self, op: Combine, node: SceneNode, k: float | None = None) -> None: ...
+        @overload
+        def __init__(self, *, op: Combine = "union", node: SceneNode, k: float | None = None) -> None: ...
+        def __init__(self, *args: Any, **data: Any) -> None: ...
+
+
+class Chain(Frozen):
+    """The streamed form: children in order, each with its boolean word."""
+
+    kind: Literal["chain"] = "chain"
+    children: Annotated[tuple[Link, ...], Field(json_schema_extra=first_joins_by_union)] = ()
+    transforms: Transforms = ()
+    material: Material | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            children: Iterable[Link | SceneNode] | SceneNode = (),
+            transforms: Iterable[Transform] | Transform = (),
+            material: Material | None = None,
+        ) -> None: ...
+
+    @classmethod
+    def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
+        """A child without a word is joined by union."""
+        given = super()._arranged(args, data)
+        if isinstance(given.get("children"), list | tuple):
+            nodes = (Object, Group, Boolean, Chain)
+            given["children"] = tuple(
+                Link("union", child) if isinstance(child, nodes) else child for child in given["children"]
+            )
+        return given
+
+    @field_validator("children")
+    @classmethod
+    def _starts_with_union(cls, children: tuple[Link, ...]) -> tuple[Link, ...]:
+        if children and children[0].op != "union":
+            raise ValueError(f"the first child of a chain is joined by union, not {children[0].op}")
+        return children
+
+
+SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
+
+
+class Animation(Frozen):
+    """``animate(seconds, fps, loop)``."""
+
+    seconds: Annotated[Finite, Field(gt=0)]
+    fps: Annotated[Finite, Field(gt=0, description="frames per second")]
+    loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
+
+    if TYPE_CHECKING:
+
+        def __init__(self, seconds: float, fps: float, loop: bool = True) -> None: ...
+
+    @model_validator(mode="after")
+    def _is_bounded(self) -> Animation:
+        if self.seconds * self.fps > MAX_FRAMES:
+            raise ValueError(f"an animation of more than {MAX_FRAMES:,} frames")
+        return self
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        return max(1, round(self.seconds * self.fps))

@@ -1,0 +1,720 @@
+"""Recovery: braces matched by indentation, and tokens mended where they do not fit.
+
+Where braces do not match, the layout tells the line of the slip: a line that stands no further in than the
+head of an open block comes after its end. Trying the parser out on that line tells which brace is missing
+or too many. A text whose braces match is left alone, however it is laid out.
+
+What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
+replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
+Where none helps, the statement is skipped. Braces match before parsing (`braces`), so a skip stays inside
+its block.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Iterator
+from functools import cache
+from math import inf
+from typing import Any, Final, NamedTuple
+
+from scenelang.assets.records import Record
+from scenelang.language.diagnostics import Edit, Fix, Label, Span
+from scenelang.language.habits import HEADS, MAX_REPLAY, OPERATORS, head, keywords_near, mend_habit
+from scenelang.language.lexer import (
+    LOOKAHEAD,
+    MAX_MISTAKES,
+    UNIT_ALIASES,
+    Report,
+    Tokens,
+    advance,
+    completion,
+    fits,
+    reach,
+    statement_depth,
+)
+from scenelang.language.tables import END, tables
+from scenelang.language.words import UNITS
+
+_BEHIND: Final = 4  # so many tokens after the line have to fit as well
+_LONGEST: Final = 80  # so many places before the first misfit are tried
+_MOST: Final = 50  # slips of one text
+_INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
+"""What a brace may be written for, likely ones first."""
+
+
+class _Slip(NamedTuple):
+    """A line with a brace too few or too many: its tokens, and the brace that it lacks."""
+
+    first: int
+    stop: int
+    missing: int
+
+
+def balance(tokens: Tokens, report: Report) -> None:
+    """Report braces that do not match and mend the token list."""
+    if not tokens.cut:  # an open comment would have swallowed the rest of the layout
+        line, grown = -1, 0  # the line that is mended, and by how many tokens it grew
+        for slip in reversed(_slips(tokens)):  # from the last on, so that indices hold
+            same = slip.first == line
+            line, grown = slip.first, grown if same else 0
+            size = len(tokens.kinds)
+            _mend(tokens, report, slip._replace(stop=slip.stop + grown))
+            grown += len(tokens.kinds) - size
+    stray = _unmatched(tokens)[1]
+    for at in stray:
+        report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
+    tokens.drop(stray)
+    open_ = _unmatched(tokens)[0]
+    last = len(tokens.kinds) - 1
+    if open_ and not tokens.cut:
+        _report_unclosed(tokens, report, last, open_[-3:], len(open_))
+    tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
+
+
+def _unmatched(tokens: Tokens) -> tuple[list[int], list[int]]:
+    """Indices of the braces that are open at the end, and of those that close nothing."""
+    opening, closing = (tables().literals[sign] for sign in "{}")
+    open_: list[int] = []
+    stray: list[int] = []
+    for index, kind in enumerate(tokens.kinds):
+        if kind == opening:
+            open_.append(index)
+        elif kind == closing and open_:
+            open_.pop()
+        elif kind == closing:
+            stray.append(index)
+    return open_, stray
+
+
+def _report_unclosed(tokens: Tokens, report: Report, at: int, open_: list[int], count: int = 1) -> None:
+    end = tokens.end_before(at)
+    labels = [Label(Span(tokens.source, *tokens.place(index)), "opened here") for index in open_]
+    message = "missing `}`" + f" {count} times" * (count > 1)
+    report.add("E0104", message, end, end, labels=labels)
+
+
+# ---------------------------------------------------------------- the lines of the slips
+
+
+def _slips(tokens: Tokens) -> list[_Slip]:
+    """Lines whose braces do not go with the layout, as many as braces are missing at most."""
+    kinds, starts, text = tokens.kinds, tokens.starts, tokens.source.text
+    opening, closing = (tables().literals[sign] for sign in "{}")
+    surplus = kinds.count(opening) - kinds.count(closing)
+    last = len(kinds) - 1
+    heads = [at for at in range(last) if tokens.on_new_line(at)]
+    columns = [starts[at] - text.rfind("\n", 0, starts[at]) for at in heads]
+    open_: list[tuple[int, int]] = []  # column and line of the heads of open blocks
+    found: list[_Slip] = []
+    doubled: set[int] = set()  # lines that leave two blocks open
+    at_column: dict[int, int] = {}  # the last line that begins at a column
+    for line, first in enumerate(heads):
+        stop = heads[line + 1] if line + 1 < len(heads) else last
+        column, closes = columns[line], kinds[first] == closing
+        while open_ and (open_[-1][0] > column or (open_[-1][0] == column and not closes)):
+            head = open_.pop()[1]
+            if head not in doubled:  # else one of its two is too many
+                head = line - 1
+            found.append(_Slip(heads[head], heads[head + 1], closing))
+        for at in range(first, stop):
+            if kinds[at] == opening:
+                deeper = line + 1 == len(heads) or columns[line + 1] > column
+                inside = deeper or at + 1 < stop
+                open_.append((column if inside else 0, line))
+            elif kinds[at] == closing:
+                if open_ and (open_[-1][1] == line or (closes and open_[-1][0] in (0, column))):
+                    open_.pop()
+                    continue
+                head = at_column.get(column, line) if at == first else line
+                if head < line and columns[head + 1] > column:  # its block was not opened there
+                    found.append(_Slip(heads[head], heads[head + 1], opening))
+                else:
+                    found.append(_Slip(first, stop, opening))
+        at_column[column] = line
+        if sum(head == line for _, head in open_[-2:]) == 2:
+            doubled.add(line)
+    if open_ and open_[-1][1] == len(heads) - 1:
+        found.append(_Slip(heads[-1], last, closing))
+    if sum(1 if slip.missing == closing else -1 for slip in found) != surplus:  # an odd layout
+        wanted = closing if surplus > 0 else opening
+        found = [slip for slip in found if slip.missing == wanted][: abs(surplus)]
+    return sorted(found)[:_MOST]
+
+
+# ---------------------------------------------------------------- mending a line
+
+
+def _mend(tokens: Tokens, report: Report, slip: _Slip) -> None:
+    """Report one brace of a line and mend it."""
+    opening, closing = (tables().literals[sign] for sign in "{}")
+    repair = _best(tokens, slip)
+    names = [tables().kinds[kind] for kind in repair.insert]
+    end = tokens.end_before(repair.at)
+    if names == ["{"] and not repair.delete:
+        report.add("E0106", "missing `{`", end, end, fix=" {")
+    elif names == ["}"] and not repair.delete:
+        open_: list[int] = []
+        for index in range(repair.at):
+            if tokens.kinds[index] == opening:
+                open_.append(index)
+            elif tokens.kinds[index] == closing and open_:
+                open_.pop()
+        _report_unclosed(tokens, report, repair.at, open_[-1:])
+    else:
+        report_repair(tokens, report, repair, [])
+    tokens.replace(repair.at, repair.delete, repair.insert)
+
+
+def _best(tokens: Tokens, slip: _Slip) -> Repair:
+    """The change after which most of the line, and what follows it, reads."""
+    kinds, (opening, closing) = tokens.kinds, (tables().literals[sign] for sign in "{}")
+    first, stop = slip.first, slip.stop
+    limit = stop  # the layout cannot tell a brace at the end of a line from one at the start of the next
+    while kinds[limit] in (opening, closing):
+        limit += 1
+    end = min(limit + _BEHIND, len(kinds) - 1)
+    ends = {opening, closing, tables().literals[";"]}
+    before = range(first, max(0, first - _LONGEST), -1)
+    head = next((at for at in before if kinds[at - 1] in ends), first)
+    if reach(_inside(kinds, head), kinds, head, end) > reach(_inside(kinds, first), kinds, first, end):
+        first = head  # the line goes on with a statement
+    stack = _inside(kinds, first)
+    misfit = min(reach(stack.copy(), kinds, first, end), limit)
+    places = range(max(first, misfit - _LONGEST), misfit + 1)
+    reach(stack, kinds, first, places.start)
+    depth = sum((kind == opening) - (kind == closing) for kind in kinds[first : places.start])
+    best, highest = Repair(stop, 0, (slip.missing,)), (-1, 0.0, -1)
+    for at in places:
+        for mend in _mends(tokens, stack, at, stop, limit, slip.missing):
+            if slip.missing in mend.insert and slip.missing == closing and at < stop and depth < 1:
+                continue  # it would close what the layout leaves open
+            trial = stack.copy()
+            if all(advance(trial, kind) for kind in mend.insert):
+                got = reach(trial, kinds, at + mend.delete, end)
+                if got == end == len(kinds) - 1 and not fits(trial, closing):
+                    got -= 1  # the text would end in the middle of a statement
+                if (got, -mend.cost, mend.at) > highest:
+                    best, highest = mend, (got, -mend.cost, mend.at)
+        depth += (kinds[at] == opening) - (kinds[at] == closing)
+        if at == limit or not advance(stack, kinds[at]):
+            break
+    return best
+
+
+def _inside(kinds: list[int], first: int) -> list[int]:
+    """The states deep inside blocks: all that a line can close fits there."""
+    literals, name = tables().literals, tables().kind("NAME")
+    head = [name, literals["{"]]
+    if literals["else"] in kinds[first : first + 2]:
+        head = [literals["if"], literals["("], name, literals[")"], literals["{"]]
+    stack = [tables().start]
+    for kind in head * 40:
+        advance(stack, kind)
+    if kinds[first] == literals["else"]:
+        advance(stack, literals["}"])
+    return stack
+
+
+def _mends(
+    tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
+) -> Iterator[Repair]:
+    """What may be done at one place about a missing brace, each the cheaper the likelier it is."""
+    literals, kind = tables().literals, tokens.kinds[at]
+    closes = missing == literals["}"]
+    surplus = literals["{"] if closes else literals["}"]
+    if at <= stop:
+        yield Repair(at, 0, (missing,), -0.3)
+    if at == stop and not fits(stack, literals["}"]):  # the line breaks off
+        rest = completion(stack, literals[";"] if closes else literals["{"])
+        if rest is not None and (closes or rest):
+            yield Repair(at, 0, (*rest, *((literals[";"],) if closes else ()), missing), -0.6)
+    elif at == stop and closes:
+        yield Repair(at, 0, (missing, literals[";"]), -0.25)
+    if at == stop and closes and kind != missing:
+        yield Repair(at, 1, (missing,), -0.1)
+    if at >= limit:
+        return
+    if kind == surplus:
+        yield Repair(at, 1, (), -0.2 if closes else -0.5 - 0.05 * tokens.on_new_line(at))
+        for rank, name in enumerate(_INSTEAD):
+            yield Repair(at, 1, (tables().kind(name),), 0.001 * rank - 0.1)
+    elif kind != missing:
+        yield Repair(at, 1, (missing,), -0.1)
+
+
+FOLLOWED: Final = 80
+"""How many tokens the repairs that look best are followed to choose between them."""
+_WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
+_THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
+_FAR: Final = 1000  # tokens that the statement of a loop without braces may have
+
+# What may be missing, and what that costs; tokens that only make sense together count as one.
+_INSERTIONS: Final = {
+    **{";": 1.3, ",": 1.2, "=": 1.3, "in": 1.4, "as": 1.4, ":": 1.5, "..": 2.0, "*": 2.2},
+    **{"(": 1.6, "( )": 1.6, "{ }": 1.9, "BAD_EXPRESSION": 1.6, "NAME": 1.7, "STRING": 1.8},
+    **{"= BAD_EXPRESSION": 1.9, "in BAD_EXPRESSION": 1.9, "as NAME": 1.9, ": BAD_EXPRESSION": 1.9},
+    **{"let": 1.4, "param": 1.5, "fn": 1.5, "for": 1.5, "if": 1.5, "nsg": 1.6, "model": 1.7},
+    **{"import": 1.6, "material": 1.6},
+}
+_ONLY_BEFORE: Final = {
+    **dict.fromkeys(("let", "param", "fn", "material"), "NAME"),
+    **{"for": "(", "if": "(", "nsg": "NUMBER", "model": "STRING", "import": "STRING"},
+}
+_REPLACEMENTS: Final = {
+    "=": {"==": 1.0},
+    "==": {"=": 1.2},
+    ":": {"=": 1.2, ";": 1.2, "..": 1.4, ",": 1.4},
+    ";": {",": 1.2, ":": 1.5, "{ }": 1.8},
+    ",": {";": 1.2, "=": 1.6},
+    ".": {",": 1.5, ";": 1.5},
+    ")": {"]": 1.1},
+    "]": {")": 1.1},
+    "(": {"[": 1.3},
+    "[": {"(": 1.3},
+}
+"""What is likely written for something else; anything else costs `_SUBSTITUTION` more than inserting it."""
+_DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
+_NEW_LINE = 0.6  # a token that begins a line is seldom the slip
+_CLOSING = 1.1
+
+_DIVISION: Final = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
+"""What is taken for a comment and was meant for a division."""
+_DEFINITIONS: Final = ("let", "param", "fn")
+_NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
+_CODES: Final = {
+    **{")": "E0103", "]": "E0103", "}": "E0104", "{": "E0106", "BAD_EXPRESSION": "E0108"},
+    **{"NAME": "E0109", "(": "E0107", ";": "E0102", ",": "E0112", "*": "E0112"},
+}
+"""Codes of what is missing; anything else is E0126."""
+
+
+class Repair(Record):
+    """Put ``insert`` in the place of ``delete`` tokens at index ``at``."""
+
+    at: int
+    delete: int
+    insert: tuple[int, ...]
+    cost: float = 0
+
+
+def _kinds(names: str) -> tuple[int, ...]:
+    return tuple(map(tables().kind, names.split()))
+
+
+@cache
+def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
+    """What may be missing: the tokens, the cost, and what has to follow if that matters."""
+    return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
+
+
+@cache
+def _replacements() -> dict[int, dict[tuple[int, ...], float]]:
+    """`_REPLACEMENTS` by kinds."""
+    rows = _REPLACEMENTS.items()
+    return {tables().kind(old): {_kinds(new): cost for new, cost in row.items()} for old, row in rows}
+
+
+class Recovery:
+    """Recovery for one file, whose tokens it edits."""
+
+    def __init__(self, tokens: Tokens, report: Report) -> None:
+        self.tokens = tokens
+        self.report = report
+        self.literals = literals = tables().literals
+        self.repairs = 0
+        self.closing_of = {literals["("]: literals[")"], literals["["]: literals["]"]}
+        self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
+        self.ends = {literals[";"], literals["}"], END}
+        self.name = tables().kind("NAME")
+        self.words = {kind for text, kind in literals.items() if text.isalpha()}
+
+    def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
+        """Mend what does not fit at a token; the parser's stacks are cut back to read a statement again.
+
+        Returns:
+            The index to go on at, or None where there are too many mistakes.
+        """
+        self.repairs += 1
+        if self.report.full or self.repairs > 4 * MAX_MISTAKES:
+            return None
+        depth = statement_depth(states)
+        base = states[: depth + 1]
+        first = self._index(values[depth]) if depth < len(values) else at
+        if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
+            del states[depth + 1 :], values[depth:]
+            return first
+        if self._start_mistake(states, at) if first == at else self._bare_body(states, first, at):
+            return at
+        if self._spaced_unit(at):
+            return at
+        repair = self._search(base, states, first, at)
+        if repair is None:
+            del states[depth + 1 :], values[depth:]
+            return self._skip(first, at)
+        report_repair(self.tokens, self.report, repair, self._open(first, repair.at))
+        self.tokens.replace(repair.at, repair.delete, repair.insert)
+        if at - first > MAX_REPLAY:
+            return at
+        del states[depth + 1 :], values[depth:]
+        return first
+
+    def _is(self, index: int, *texts: str) -> bool:
+        kinds = self.tokens.kinds
+        return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
+
+    def _index(self, value: Any) -> int:
+        """Index of the first token of something on the value stack."""
+        if isinstance(value, int):
+            return value
+        span: Span = value[1] if isinstance(value, tuple) else value.span
+        return bisect_left(self.tokens.starts, span.start)
+
+    def _open(self, first: int, at: int) -> list[int]:
+        """Indices of the brackets of a statement that are open before a token."""
+        open_: list[int] = []
+        for index in range(first, at):
+            kind = self.tokens.kinds[index]
+            if kind in self.closing_of:
+                open_.append(index)
+            elif kind in self.closing_of.values() and open_:
+                open_.pop()
+        return open_
+
+    # ------------------------------------------------------------ the best repair
+
+    def _search(self, base: list[int], stack: list[int], first: int, at: int) -> Repair | None:
+        """The best repair of a statement from ``first`` on, or None where none helps.
+
+        Args:
+            base: the states before the statement.
+            stack: those at the mistake; used where it is too far from there.
+        """
+        kinds = self.tokens.kinds
+        bound = next((i for i in range(at, at + FOLLOWED) if kinds[i] in self.ends), at + FOLLOWED)
+
+        def worth(stop: int) -> float:  # tokens of later statements that fit count little
+            own = min(stop, bound + 1) - at
+            return own + 0.15 * (min(stop, at + FOLLOWED) - at - own)
+
+        found: list[tuple[float, float, Repair, list[int]]] = []
+
+        def attempt(stack: list[int], place: int, repairs: Iterator[Repair]) -> None:
+            cost = 0.1 + 0.1 * (at - place) if place < at else 0.0
+            for repair in repairs:
+                trial = stack.copy()
+                if not all(advance(trial, kind) for kind in repair.insert):
+                    continue
+                end = repair.at + repair.delete
+                start = max(at, end)
+                stop = reach(trial.copy(), kinds, end, start + LOOKAHEAD)
+                if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
+                    found.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
+
+        def settle() -> tuple[float, Repair | None]:
+            best: tuple[float, Repair | None] = (-inf, None)
+            for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
+                end = repair.at + repair.delete
+                score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
+                best = max(best, (score, repair), key=lambda one: one[0])
+            return best
+
+        if at - first > MAX_REPLAY:
+            attempt(stack, at, self._candidates(stack, first, at))
+            return settle()[1]
+        prefixes, prefix = [], base.copy()
+        for place in range(first, at):  # replayed: the parser may have applied rules for the bad token
+            prefixes.append((place, prefix.copy()))
+            advance(prefix, kinds[place])
+        attempt(prefix, at, self._candidates(prefix, first, at))
+        for place, stack in {index: prefixes[index] for index in (0, -1) if prefixes}.values():
+            attempt(stack, place, self._misspelt(first, place))
+        prefixes = prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else []
+        for place, stack in prefixes:
+            if self._begins_statement(first, place):
+                attempt(stack, place, self._broken_off(stack, place, 0.7 - 0.1 * (at - place)))
+        score, best = settle()
+        if best is None or score < worth(at + FOLLOWED) - 2:
+            for place, stack in prefixes:
+                attempt(stack, place, self._candidates(stack, first, place))
+            best = settle()[1]
+        return best
+
+    def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
+        """All repairs at one token."""
+        tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
+        kind, new_line = kinds[at], tokens.on_new_line(at)
+        after = kinds[at + 1] if kind != END else END
+        open_ = self._open(first, at)
+        if open_:
+            dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
+            closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
+            yield Repair(at, 0, closings[:1], _CLOSING + dangling)
+            yield Repair(at, 0, closings, _CLOSING + dangling + 0.1 * len(closings))
+            yield Repair(at, 0, (*closings, semicolon), _CLOSING + 0.7 + dangling)
+            if kind not in self.fixed and kind not in self.closing_of.values():
+                yield Repair(at, 1, closings[:1], _CLOSING + dangling + _SUBSTITUTION)
+            if new_line:
+                yield Repair(at, 0, (closings[0], self.literals[","]), _CLOSING + 0.7 + dangling)
+        for insert, cost, following in _insertions():
+            after_string = at > 0 and kinds[at - 1] == tables().kind("STRING")
+            if not fits(stack, insert[0]) or (insert[0] == self.literals["as"] and not after_string):
+                continue
+            if following in ((), (after,)) and kind not in self.fixed and insert != (kind,):
+                yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line + len(insert) - 1)
+            if insert[0] == semicolon and (new_line or kind in self.ends):
+                cost = 1.0
+            elif new_line and insert[0] not in self.ends:
+                cost += _NEW_LINE / 2
+            if following in ((), (kind,)):
+                yield Repair(at, 0, insert, cost)
+        if new_line or kind in self.ends:
+            yield from self._broken_off(stack, at)
+        if END not in (kind, after) and kind != after and not self.fixed.issuperset((kind, after)):
+            yield Repair(at, 2, (after, kind), _SWAP)
+        if kind in self.fixed:
+            return
+        for insert, cost in _replacements().get(kind, {}).items():
+            header = kind == self.literals["="] and self._is(first, "fn", "module")
+            yield Repair(at, 1, insert, cost + 0.5 * header)
+        if kind in self.words:
+            yield Repair(at, 1, (self.name,), _MISSPELT + 0.2)
+        yield from self._misspelt(first, at)
+        cost = _DELETION
+        for last in range(at, at + 3):
+            begins = tokens.on_new_line(last)
+            if kinds[last] in self.fixed or (last > at and (kinds[last] == semicolon or begins)):
+                return
+            yield Repair(at, last + 1 - at, (), cost + _NEW_LINE * begins)
+            cost += 0.6
+
+    def _misspelt(self, first: int, at: int) -> Iterator[Repair]:
+        """A keyword with a slip or of another language, or an operator written as a word."""
+        text = self.tokens.text(at) if self.tokens.kinds[at] == self.name else ""
+        for word in (OPERATORS.get(text), HEADS.get(text) if at == first else None, *keywords_near(text)):
+            if text and word:
+                yield Repair(at, 1, (self.literals[word],), _MISSPELT)
+
+    def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
+        """The line before a token breaks off in the middle of a statement."""
+        for goal, rest in ((";", ()), ("{", (self.literals["}"],))):
+            missing = completion(stack, self.literals[goal])
+            if missing or (missing is not None and goal == ";"):
+                yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
+
+    def _begins_statement(self, first: int, at: int) -> bool:
+        """Whether a line in open brackets, or behind half a head, reads like a statement of its own."""
+        kinds = self.tokens.kinds
+        if not self.tokens.on_new_line(at) or kinds[at] not in (self.name, *self.words):
+            return False
+        half = self._is(at - 1, "let", "param", "fn", "module") or self._is(at - 2, "material")
+        depth = 0
+        for kind in kinds[at : at + 300] if half or self._open(first, at) else ():
+            if kind in self.fixed or kind == self.literals[";"]:
+                return not self._is(at, "material", "step", "as")
+            depth += (kind in self.closing_of) - (kind in self.closing_of.values())
+            if depth < 0:
+                return False
+        return False
+
+    # ------------------------------------------------------------ mistakes with words of their own
+
+    def _start_mistake(self, states: list[int], at: int) -> bool:
+        """A token that no statement begins with."""
+        tokens, place = self.tokens, self.tokens.place(at)
+        if self._is(at, ";") and not self._is(at + 1, "{"):
+            self.report.add("W0101", "stray `;`", *place, help="no `;` follows a block", fix="")
+            tokens.replace(at, 1, [])
+        elif self._is(at, "{") and at and self._is(at - 1, ";") and not tokens.on_new_line(at):
+            fix = None if head(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
+            self.report.add("E0130", "`;` between a statement and its block", *tokens.place(at - 1), fix=fix)
+            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
+        elif self._is(at, "{"):
+            help = "a block belongs to an object, a module, `group`, `material`, `for`, `if` or a boolean"
+            self.report.add("E0129", "block without a head", *place, help=help)
+            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
+        elif self._is(at, "else"):
+            self.report.add("E0101", "`else` without `if`", *place)
+            tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if self._is(at + 1, "{") else [])
+        else:
+            return False
+        return True
+
+    def _bare_body(self, states: list[int], first: int, at: int) -> bool:
+        """`for`, `if` or `else` and a statement without braces."""
+        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
+        heads = self._is(first, "for", "if", "module") and self._is(at - 1, ")", "else")
+        if not (wants_block and heads) or self._is(at, ";", "}", ")") or self.tokens.kinds[at] == END:
+            return False
+        stop = self._end_of_statement(at)
+        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
+        if not stop or reach(states.copy(), few, 0, len(few)) < len(few):
+            return False
+        tokens, bodies = self.tokens, [(at, stop)]
+        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
+            bodies.append((stop + 1, self._end_of_statement(stop + 1) or stop + 2))
+        place = tokens.end_before(at) if tokens.on_new_line(at) else tokens.starts[at]
+        ends = [(tokens.starts[i], "{ ") for i, _ in bodies] + [(tokens.ends[j - 1], " }") for _, j in bodies]
+        edits = tuple(Edit(Span(tokens.source, end, end), brace) for end, brace in ends)
+        fix = None if tokens.on_new_line(at) else Fix("put braces around it", edits)
+        self.report.add("E0106", "missing braces", place, place, help="braces are mandatory here", fix=fix)
+        for begin, end in reversed(bodies):
+            tokens.replace(end, 0, [self.literals["}"]])
+            tokens.replace(begin, 0, [self.literals["{"]])
+        return True
+
+    def _end_of_statement(self, at: int) -> int:
+        """Index after the statement at a token, its `;` or its block; 0 where that is far."""
+        depth, last = 0, len(self.tokens.kinds) - 1
+        for index in range(at, min(at + _FAR, last)):
+            if self._is(index, "}"):
+                if depth <= 1:
+                    return index + depth
+                depth -= 1
+            elif self._is(index, "{"):
+                depth += 1
+            elif depth == 0 and self._is(index, ";"):
+                return index + 1
+        return last if last <= at + _FAR else 0
+
+    def _spaced_unit(self, at: int) -> bool:
+        """`30 deg`: mend the number, drop the unit."""
+        tokens, kind = self.tokens, tables().kind
+        if not at or tokens.kinds[at] != self.name or tokens.kinds[at - 1] != kind("NUMBER"):
+            return False
+        word, before = tokens.text(at), tokens.ends[at - 1]
+        gap = tokens.source.text[before : tokens.starts[at]]
+        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
+            return False
+        unit, (start, end) = UNIT_ALIASES.get(word, word), tokens.place(at - 1, at + 1)
+        fix = self.report.change(before, end, unit, f"write `{unit}` right after the number")
+        help = "units are glued to their number"
+        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
+        tokens.splice(at - 1, at + 1, [(kind("BAD_EXPRESSION"), start, end)])
+        return True
+
+    def _skip(self, first: int, at: int) -> int | None:
+        """Give the statement up: one `BadStmt` up to its `;`, its block, or the end of the block around."""
+        tokens = self.tokens
+        if tokens.starts[at] not in tokens.reported:
+            place = (tokens.end_before(at),) * 2 if tokens.kinds[at] == END else tokens.place(at)
+            self.report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", *place)
+        stop = at
+        while tokens.kinds[stop] not in self.fixed:
+            if self._is(stop, ";"):
+                stop += 1
+                break
+            if stop > at and tokens.kinds[stop] in self.words and tokens.on_new_line(stop):
+                break
+            stop += 1
+        if stop == first:
+            return None
+        bad = "BAD_HEAD" if self._is(stop, "{") and not self._is(stop - 1, ";") else "BAD_STATEMENT"
+        tokens.splice(first, stop, [(tables().kind(bad), *tokens.place(first, stop))])
+        return first
+
+
+# ---------------------------------------------------------------- repairs in words
+
+
+def report_repair(tokens: Tokens, report: Report, repair: Repair, open_: list[int]) -> None:
+    """Report the mistake that a repair is going to mend; ``open_`` are the brackets open before it."""
+    at, stop = repair.at, repair.at + repair.delete
+    gap = (tokens.end_before(at), tokens.starts[at])
+    if any(tokens.starts[index] in tokens.reported for index in range(at, stop)):
+        return  # a slip that has been reported already
+    if repair.delete and tokens.starts[at] == tokens.ends[stop - 1]:
+        return  # what recovery put in itself, at a mistake that has been reported
+    if not repair.delete and any(start in tokens.reported for start in range(*gap)):
+        return  # what belongs here was read as something illegal
+    names = [tables().kinds[kind] for kind in repair.insert]
+    if not repair.delete:
+        _report_insertion(tokens, report, at, names, open_)
+    elif not names:
+        text = tokens.source.text[slice(*tokens.place(at, stop))]
+        code, word = ("E0105", "unmatched") if text in (")", "]", "{", "}") else ("E0101", "unexpected")
+        twice = text.isalpha() and text in (tokens.text(stop), tokens.text(at - 1))
+        report.add(code, f"{word} {_quoted(text)}", *tokens.place(at, stop), fix="" if twice else None)
+    else:
+        _report_replacement(tokens, report, repair, names)
+
+
+def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str], open_: list[int]) -> None:
+    end, shown, first = tokens.end_before(at), _shown(tokens, at), names[0]
+    breaks_off = tokens.on_new_line(at) or tokens.kinds[at] == END
+    code, place = _CODES.get(first, "E0126"), (end, end)
+    message, help, labels, fix = f"missing {_listed(names)}", None, [], None
+    if names == ["as", "NAME"]:
+        help = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
+    elif names == ["{", "}"]:
+        help = "braces are mandatory here, even around nothing"
+    elif len(names) > 1 and names[-1] in (";", "}") and set(names) - {")", "]", "}", ";"}:
+        message, help = f"unfinished statement: {message}", "the line breaks off here"
+    elif first in (")", "]") and open_:
+        labels = [Label(Span(tokens.source, *tokens.place(open_[-1])), "opened here")]
+    elif first == ";":
+        help = "a `;` ends every statement without a block"
+        if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
+            help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
+        elif breaks_off or shown == "`}`":
+            fix = ";"
+    elif first in _NAMED:
+        message = f"expected {_NAMED[first]}, found {shown}"
+        if not breaks_off:  # an operand is missed where the next token stands
+            place = tokens.place(at)
+    elif first == ",":
+        message = f"missing `,` or operator before {shown}"
+    else:
+        message = f"{message} before {shown}"
+        fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
+    report.add(code, message, *place, labels=labels, help=help, fix=fix)
+
+
+def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
+    at, (start, end) = repair.at, tokens.place(repair.at, repair.at + repair.delete)
+    text, new = tokens.text(at), "".join(names)
+    code, message, help, fix = "E0130", f"{_shown(tokens, at)} where {_listed(names)} belongs", None, None
+    if repair.delete == 2:
+        code, message = "E0131", f"`{text}` and `{tokens.text(at + 1)}` are in the wrong order"
+    elif new == "NAME" and text.isalpha():
+        code, message, help = "E0110", f"`{text}` is a keyword, not a name", "choose another name"
+    elif names[0] in _NAMED:
+        code = _CODES.get(names[0], "E0126")
+        message = f"expected {_NAMED[names[0]]}, found {_shown(tokens, at)}"
+    elif new == "==":
+        code, message, help = "E0111", "`=` does not compare", "equality is `==`"
+        fix = None if head(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
+    elif names == ["{", "}"]:
+        code, message = "E0106", f"missing block, found `{text}`"
+    elif {text, new} == {")", "]"}:
+        code, fix = "E0105", new
+    elif OPERATORS.get(text) == new:
+        code, message, help = "E0127", f"`{text}` is not used here", f"`{new}` is the sign for it"
+        fix = None if new == "!" and tokens.text(at + 1) != "(" else new  # elsewhere it takes more
+    elif new.isalpha() and new in (HEADS.get(text), *keywords_near(text)):
+        code, message, fix = "E0132", f"unknown word `{text}`", None if text == "int" else new
+        help = f"it is `{new}` here" if text in HEADS else f"did you mean `{new}`?"
+    elif new in _REPLACEMENTS.get(text, ()):
+        fix = " =" if new == "=" and tokens.end_before(at) == start else new
+    report.add(code, message, start, end, help=help, fix=fix)
+
+
+def _listed(names: list[str]) -> str:
+    """What is missing, in words: "an expression, `)` and `{`"."""
+    parts: list[str] = []
+    for name in names:
+        if parts and not (name.isalpha() or parts[-1][-2:-1].isalpha()) and name not in _NAMED:
+            parts[-1] = f"{parts[-1][:-1]}{name}`"  # signs in a row
+        else:
+            parts.append(_NAMED.get(name, f"`{name}`"))
+    return " and ".join((", ".join(parts[:-1]), parts[-1])) if parts[1:] else parts[0]
+
+
+def _shown(tokens: Tokens, at: int) -> str:
+    return "the end of the file" if tokens.kinds[at] == END else _quoted(tokens.text(at))
+
+
+def _quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"

@@ -1,0 +1,199 @@
+"""One place, one mistake; one name, one report; and nothing that only follows from a mistake of syntax."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Hashable, Iterable
+from dataclasses import field, replace
+from itertools import islice
+from typing import Final
+
+from scenelang.assets.records import Record
+from scenelang.language import library, tree
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, Effort, Fix, Label, SourceFile, Span
+from scenelang.language.library import Calls
+from scenelang.language.limits import MAX_COMPARED, Halt
+
+Advice = tuple[str | None, Fix | None]
+"""Help, and a fix."""
+
+_SHOWN: Final = 3  # further places of one report
+_WORD: Final = re.compile(r"[A-Za-z_]\w*")
+_NAMELESS: Final = re.compile(r"\b(?:let|param|fn|module|import)\b(?![ \t]+[\"A-Za-z_])")
+_NAMES: Final = frozenset(("E0201", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
+_PLACES: Final = frozenset(("E0202", "E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
+_CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
+"""Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
+
+
+class Damage(Record):
+    """What the syntax mistakes of a file leave unknown.
+
+    Args:
+        lines: lines of statements that were mended or skipped, by guess.
+        words: words there, which a definition may have been among.
+        nameless: some definition there does not say what it defines.
+        unmatched: braces did not match, so nobody knows what stands where.
+    """
+
+    lines: frozenset[int] = frozenset()
+    words: frozenset[str] = frozenset()
+    nameless: bool = False
+    unmatched: bool = False
+
+    def holds(self, span: Span) -> bool:
+        """Whether a place lies in what was mended or skipped."""
+        return bool(self.lines) and span.locate()[0][0] in self.lines
+
+    def explains(self, code: str, span: Span) -> bool:
+        """Whether a diagnostic may follow from a syntax mistake."""
+        if not self.lines:
+            return False
+        lost = self.nameless or self.unmatched or span.text.partition(".")[0] in self.words
+        return self.holds(span) or (code in _NAMES and lost) or (code in _PLACES and self.unmatched)
+
+
+_SOUND: Final = Damage()
+
+
+def find_damage(file: tree.File, found: Iterable[Diagnostic]) -> Damage:
+    """The damage that a file's syntax mistakes, those among ``found``, have done."""
+    source = file.span.source
+    marks = [
+        (d.span.start, d.span.end, d.code)
+        for d in found
+        if d.code.startswith("E01") and d.span is not None and d.span.source is source
+        if d.fix is None or d.code not in _CERTAIN
+    ]
+    if not marks:
+        return _SOUND
+    ends = sorted(end for _, end, _ in marks)
+    starts = dict(sorted(((end, start) for start, end, _ in marks), reverse=True))
+    parts = [Span(source, start, end) for start, end, _ in marks]
+    for node in tree.walk(file):
+        if isinstance(node, tree.Stmt):
+            blocks = [child.span.start for child in tree.children(node) if isinstance(child, tree.Block)]
+            part = Span(source, node.span.start, min([node.span.end, *blocks]))
+            at = bisect_left(ends, part.start)
+            if isinstance(node, tree.BadStmt) or (at < len(ends) and starts[ends[at]] <= part.end):
+                parts.append(part)
+    lines = {line for part in parts for line in range(part.locate()[0][0], part.locate()[1][0] + 1)}
+    texts = [source.line(line) for line in lines]
+    braces = {"E0104", "E0105", "E0106", "E0129"}
+    return Damage(
+        frozenset(lines),
+        frozenset(word for text in texts for word in _WORD.findall(text)),
+        any(_NAMELESS.search(text) for text in texts),
+        any(code in braces or re.search("[{}]", source.text[start:end]) for start, end, code in marks),
+    )
+
+
+class Reporter(Record, frozen=False):
+    """Where the mistakes of one evaluation go, and what is known of those reported.
+
+    Args:
+        calls: the calls that are running.
+        damaged: what syntax mistakes have damaged, by file.
+        reported: the code that was reported at each place.
+        shared: indices of reports that several places share, by what they have in common.
+        effort: what looking for similar names may still cost.
+        words_in: the words of each file.
+    """
+
+    diagnostics: Diagnostics
+    calls: Calls | None = None
+    damaged: dict[SourceFile, Damage] = field(default_factory=dict)
+    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)
+    shared: dict[Hashable, int] = field(default_factory=dict)
+    effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
+    words_in: dict[SourceFile, frozenset[str]] = field(default_factory=dict)
+
+    def damage(self, source: SourceFile) -> Damage:
+        """What syntax mistakes have damaged of a file."""
+        return self.damaged.get(source, _SOUND)
+
+    def words(self, source: SourceFile) -> frozenset[str]:
+        """All words of a file."""
+        if source not in self.words_in:
+            self.words_in[source] = frozenset(_WORD.findall(source.text))
+        return self.words_in[source]
+
+    def follows(self, code: str, span: Span) -> bool:
+        """Whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
+        if not self.damaged:
+            return False
+        within = self.calls.outwards() if self.calls is not None else ()
+        damage = self.damage(span.source)
+        return damage.explains(code, span) or any(self.damage(call.source).holds(call) for call in within)
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        *,
+        help: str | None = None,
+        fix: Fix | None = None,
+        labels: tuple[Label, ...] = (),
+    ) -> int | None:
+        """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
+
+        One that shows in the library that ships is reported where that is called.
+
+        Returns:
+            The index of the report; None where nothing was added.
+
+        Raises:
+            Halt: there are so many mistakes that no more are kept.
+        """
+        calls = self.calls
+        site = calls.outside() if calls is not None and library.holds(span.source) else None
+        if site is not None:
+            labels, fix, span = (Label(span, "which is used here"),), None, site
+            help = help or _called(site)
+        elif calls is not None:
+            labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
+        if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):
+            return None  # one place, one mistake: what else is wrong there most likely comes of it
+        index = len(self.diagnostics)
+        if not self.diagnostics.add(code, message, span, labels=labels, help=help, fix=fix):
+            raise Halt
+        return None if index == len(self.diagnostics) else index
+
+    def warn(self, code: str, message: str, span: Span, help: str | None) -> None:
+        """Warn, unless it may follow from a mistake of syntax."""
+        if not self.follows(code, span):
+            self.diagnostics.add(code, message, span, help=help)
+
+    def error_once(
+        self,
+        key: Hashable,
+        code: str,
+        message: str,
+        span: Span,
+        *,
+        help: str | None = None,
+        fix: Fix | None = None,
+        labels: tuple[Label, ...] = (),
+    ) -> None:
+        """Report a mistake, or show its place at the report of the same one with the same key."""
+        index = self.shared.get(key)
+        if index is None:
+            index = self.error(code, message, span, help=help, fix=fix, labels=labels)
+            if index is not None:
+                self.shared[key] = index
+            return
+        known = self.diagnostics.items[index]
+        again = [label for label in known.labels if label.message == "also here"]
+        if len(again) < _SHOWN and span not in (known.span, *(label.span for label in again)):
+            labels = (*known.labels, Label(span, "also here"))
+            self.diagnostics.items[index] = replace(known, labels=labels)
+
+
+def _called(site: Span) -> str | None:
+    """Usage line of the library's module that a call names."""
+    from scenelang.language.foreign import SHAPES  # only mistakes need it
+
+    alias, _, module = site.text.rpartition(".")
+    return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None

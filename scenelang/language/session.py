@@ -1,0 +1,438 @@
+"""One evaluation: limits, names, files that it may read, and what it shares.
+
+Names are resolved while a file is prepared, before it runs. A running file, function or module has one
+list of slots; slot 0 of a function's or module's list is the list it was defined in.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import field
+from pathlib import Path, PureWindowsPath
+from typing import Any, Final, Literal
+
+from scenelang.assets.files import read_regular
+from scenelang.assets.records import Record
+from scenelang.assets.tensors import TensorError
+from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
+from scenelang.language import library, tree
+from scenelang.language.diagnostics import Diagnostics, Fix, Label, SourceFile, Span, listing, nearest
+from scenelang.language.library import SpanMap
+from scenelang.language.limits import MAX_BYTES, MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
+from scenelang.language.nodes import Unsaid
+from scenelang.language.parser import parse
+from scenelang.language.reporter import Reporter
+from scenelang.language.scene import Animation, Elements
+
+Env = list[Any]
+
+UNBOUND: Final = object()
+"""What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
+
+
+class Needs(Record, frozen=False):
+    """What a statement, or the body of a function or module, depends on.
+
+    Args:
+        frame: it reads ``t``, ``u`` or ``frame`` itself.
+        on: the needs of the names in it.
+    """
+
+    frame: bool = False
+    on: list[Needs] = field(default_factory=list)
+
+    def varies(self) -> bool:
+        """Whether it may differ from frame to frame; ask when everything is prepared."""
+        seen, stack = {self}, [self]
+        while stack:
+            needs = stack.pop()
+            if needs.frame:
+                return True
+            stack += [other for other in needs.on if other not in seen]
+            seen.update(needs.on)
+        return False
+
+
+class Slots(Record, frozen=False):
+    """The slots of a file, or of one call of a function or module.
+
+    Args:
+        parent: those of where it was defined; None for a file.
+        root: a file's live slots, which exist while it is prepared; None for a call.
+        owner: the name of the function or module that is called.
+    """
+
+    parent: Slots | None = None
+    root: Env | None = None
+    owner: Span | None = None
+    size: int = 1
+
+    def add(self) -> int:
+        """A new slot."""
+        self.size += 1
+        if self.root is not None:
+            self.root.append(UNBOUND)
+        return self.size - 1
+
+
+class Definition(Record, frozen=False):
+    """A fn or module: what calls refer to; ``run`` is set once its body is prepared.
+
+    Args:
+        outer: the slots of where it was defined.
+        run: of a fn ``run(env) -> value``; of a module its block's actions.
+        defaults: how to get each parameter's default.
+        size: number of slots of a call.
+        weight: evaluation steps of one call.
+        needs: what its body depends on besides its arguments.
+    """
+
+    node: tree.Fn | tree.Module
+    outer: Slots
+    run: Any = None
+    defaults: tuple[Any, ...] = ()
+    size: int = 1
+    weight: int = 1
+    needs: Needs = field(default_factory=Needs)
+
+
+class Binding(Record, frozen=False):
+    """What a name stands for.
+
+    Args:
+        span: where; None for the language's own names.
+        slots: what holds its slot.
+        value: a `Definition`, an imported file, what a Scene calls an element, or the value of a ``let`` that
+            never changes.
+        known: whether ``value`` is that of such a ``let``.
+        needs: what the value of a ``let`` depends on.
+    """
+
+    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
+    span: Span | None = None
+    slots: Slots | None = None
+    slot: int = 0
+    value: Any = None
+    known: bool = False
+    needs: Needs | None = None
+
+    def labels(self, words: str = "defined here") -> tuple[Label, ...]:
+        """A label for its definition, if that has a place."""
+        return () if self.span is None else (Label(self.span, words),)
+
+
+class Scope(Record, frozen=False):
+    """The names of one block, and the block around it."""
+
+    slots: Slots
+    parent: Scope | None = None
+    names: dict[str, Binding] = field(default_factory=dict)
+    later: dict[str, Span] = field(default_factory=dict)
+    """Names that a later line of this block defines."""
+
+    def outwards(self) -> Iterator[Scope]:
+        """This block, and those around it."""
+        scope: Scope | None = self
+        while scope is not None:
+            yield scope
+            scope = scope.parent
+
+    def find(self, name: str) -> Binding | None:
+        """What ``name`` stands for here."""
+        return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
+
+    def visible(self) -> Iterator[tuple[str, Binding]]:
+        """All names that can be used here, inner ones first."""
+        for scope in self.outwards():
+            yield from scope.names.items()
+
+    def reach(self, slots: Slots) -> Callable[[Env], Env]:
+        """How to get the live ``slots``, which enclose this scope, from those of here."""
+        root = slots.root
+        if root is not None:
+            return lambda env: root
+        hops, at = 0, self.slots
+        while at is not slots:
+            assert at.parent is not None
+            hops, at = hops + 1, at.parent
+
+        def outer(env: Env) -> Env:
+            for _ in range(hops):
+                env = env[0]
+            return env
+
+        return outer
+
+
+Watch = Callable[[Span, Any], None]
+"""What an editor looks on with; it may raise `Halt` to end the evaluation."""
+
+
+class Settings(Record, frozen=False):
+    """What the top level sets, and where each was given.
+
+    Args:
+        canvas: width and height in pixels.
+        background: colour as written, or None for transparency.
+        stage: camera, light and ground, where they are stated.
+        given: the place of each setting, by its word.
+        model: name of the model that the file names.
+    """
+
+    canvas: tuple[int, int] = (256, 256)
+    background: tuple[float, float, float] | Unsaid | None = "default"
+    stage: dict[str, Any] = field(default_factory=dict)
+    animation: Animation | None = None
+    model: str | None = None
+    given: dict[str, Span] = field(default_factory=dict)
+
+
+class Session(Record, frozen=False):
+    """The state of one evaluation over all its files.
+
+    Args:
+        expressions, statements: how each class of the syntax tree is prepared.
+        frame: the one that is run, from 0.
+        fps: frames a second, instead of those that ``animate`` names.
+        replays: run what no frame changes once; the evaluation is for several frames.
+        roots: the live slots of every file.
+        needs: collects what the statement being prepared depends on.
+        elements: files of elements that were imported, by their places.
+        zeros: where an angle was a 0 without a unit that frames may change.
+        still: it has been said that there is no animation for time to run in.
+        watch: called with the place of each name and its value, and of each statement and its node.
+    """
+
+    report: Reporter
+    expressions: Mapping[type, Callable[..., Any]]
+    statements: Mapping[type, Callable[..., Any]]
+    frame: int = 0
+    fps: float | None = None
+    spans: SpanMap = field(default_factory=SpanMap)
+    steps: int = 0
+    objects: int = 0
+    parts: int = 0
+    depth: int = 0
+    node_depth: int = 0
+    animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
+    settings: Settings = field(default_factory=Settings)
+    replays: bool = False
+    roots: list[list[Any]] = field(default_factory=list)
+    needs: Needs = field(default_factory=Needs)
+    elements: dict[Path, Elements] = field(default_factory=dict)
+    zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)
+    still: bool = False
+    watch: Watch | None = None
+
+    def restart(self, frame: int) -> None:
+        """Forget what the last run left, to run what is prepared for another frame."""
+        self.frame = frame
+        self.spans = SpanMap()
+        self.steps = self.objects = self.parts = self.depth = self.node_depth = 0
+        self.report.calls = None
+        self.settings = Settings(given=self.settings.given, model=self.settings.model)
+        for root in self.roots:
+            root[:] = [UNBOUND] * len(root)
+
+    def halt(self, code: str, message: str, span: Span, help: str | None = None) -> Halt:
+        """Report a limit that was met; the caller raises what this returns."""
+        self.report.error(code, message, span, help=help)
+        return Halt()
+
+    def tick(self, steps: int, span: Span) -> None:
+        """Count evaluation steps."""
+        self.steps += steps
+        if self.steps > MAX_STEPS:
+            raise self.halt("E0322", f"more than {MAX_STEPS:,} evaluation steps", span)
+
+    def count_parts(self, parts: int, span: Span) -> None:
+        """Count nodes, transforms and operations that a Scene will hold."""
+        self.parts += parts
+        if self.parts > MAX_PARTS:
+            raise self.halt("E0320", f"more than {MAX_PARTS:,} nodes and transforms in one scene", span)
+
+    def count_objects(self, number: int, span: Span) -> None:
+        """Count objects that a Scene will hold."""
+        self.objects += number
+        if self.objects > MAX_OBJECTS:
+            raise self.halt("E0320", f"more than {MAX_OBJECTS:,} objects in one scene", span)
+
+
+class Defines(Record, frozen=False):
+    """Values for params from outside, and the params that files have.
+
+    Args:
+        values: text as after ``-D NAME=``, or a Python value.
+        known: where each param stands, by its name seen from the first file.
+        lost: words that recovery skipped: a param may have been among them.
+    """
+
+    values: Mapping[str, Any]
+    known: dict[str, Span] = field(default_factory=dict)
+    lost: set[str] = field(default_factory=set)
+
+    def report_unused(self, diagnostics: Diagnostics) -> None:
+        """Report values that no param takes."""
+        for name in self.values:
+            if name in self.known or name in self.lost:
+                continue
+            found = nearest(name, self.known)
+            if found:
+                help, labels = f"did you mean `{found}`?", [Label(self.known[found], "this param")]
+            else:
+                names = listing(self.known)
+                help, labels = f"its params are {names}" if names else "the scene has no params", []
+            diagnostics.add("E0211", f"no param `{name}` to set", None, help=help, labels=labels)
+
+
+MAX_IMPORTS: Final = 1000
+MAX_IMPORT_DEPTH: Final = 100
+_RELATIVE: Final = "paths are relative to the importing file"
+Labels = tuple[Label, ...]
+
+
+class Unreadable(Exception):
+    """A file that is not scene text, or not one to read; the message says why."""
+
+    def __init__(
+        self, code: str, message: str, help: str | None = None, fix: Fix | None = None, labels: Labels = ()
+    ) -> None:
+        super().__init__(message)
+        self.code, self.help, self.fix, self.labels = code, help, fix, labels
+
+
+def read_source(path: Path, name: str) -> SourceFile:
+    """The text of a file.
+
+    Raises:
+        Unreadable: too large, or not UTF-8.
+        OSError: as the system says, or that it is not a regular file.
+    """
+    return decode_source(read_regular(path, MAX_BYTES), name)
+
+
+def decode_source(data: bytes, name: str) -> SourceFile:
+    """The text that a file's bytes are.
+
+    Raises:
+        Unreadable: more than `MAX_BYTES`, or not UTF-8.
+    """
+    if len(data) > MAX_BYTES:
+        raise Unreadable("E0324", f"a file of more than {MAX_BYTES // 1_000_000} MB")
+    try:
+        return SourceFile(name, data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise Unreadable("E0214", f"it is not UTF-8 text: byte {error.start}") from None
+
+
+class Loader(Record, frozen=False):
+    """Finds imported files inside the import root.
+
+    Args:
+        root: the folder that imports cannot leave, resolved; None where there is none.
+        texts: what to read instead of some files, by their resolved paths: an editor's unsaved buffers, or
+            fixes that are not written yet.
+    """
+
+    root: Path | None
+    chain: list[Path] = field(default_factory=list)
+    sites: list[Span] = field(default_factory=list)
+    """Where the imports of that chain are written."""
+    parsed: dict[Path, tree.File] = field(default_factory=dict)
+    prepared: dict[Path, Any] = field(default_factory=dict)
+    """The `FileContext` of each file that has been prepared, under its last name."""
+    repeated: int = 0
+    """Characters of files that were prepared again, as params of theirs have another name each time."""
+    zoos: dict[Path, Zoo] = field(default_factory=dict)
+    wanted: dict[Path, None] = field(default_factory=dict)
+    """All files that were asked for inside the root, there or not, as written and resolved."""
+    count: int = 0
+    texts: Mapping[Path, str] = field(default_factory=dict)
+
+    def load(
+        self, stmt: tree.Import, importer: Path | None, session: Session
+    ) -> tuple[Path, tree.File | Zoo] | None:
+        """The file that an import in the file ``importer`` means, parsed; None after a report."""
+        span = stmt.path.span
+        try:
+            path = self._locate(stmt.path.value, importer)
+            if path in self.chain:
+                self._refuse_cycle(path)
+            self.count += 1
+            if self.count > MAX_IMPORTS:
+                raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
+            if len(self.chain) > MAX_IMPORT_DEPTH:
+                raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
+            if path.suffix == SUFFIX:
+                if path not in self.zoos:
+                    self.zoos[path] = self._read_zoo(path, stmt.path.value)
+                return path, self.zoos[path]
+            if path not in self.parsed:
+                self.parsed[path] = parse(self._read(path, stmt.path), session.report.diagnostics)
+        except Unreadable as error:
+            fix, labels = error.fix, error.labels
+            session.report.error(error.code, str(error), span, help=error.help, fix=fix, labels=labels)
+            return None
+        return path, self.parsed[path]
+
+    def _refuse_cycle(self, path: Path) -> None:
+        first = self.chain.index(path)
+        names = " → ".join(p.name for p in [*self.chain[first:], path])
+        # The first file of the chain, unless it is standard input, was not imported.
+        around = self.sites[max(0, first + 1 - len(self.chain) + len(self.sites)) :]
+        labels = tuple([Label(site, "which imports this") for site in around])
+        raise Unreadable("E0216", f"import cycle: {names}", labels=labels)
+
+    def _locate(self, text: str, importer: Path | None) -> Path:
+        """The place of a file of the library, or inside the root."""
+        if library.is_reserved(text):
+            shipped = library.find(text)
+            if shipped is None:
+                help = f"it has {listing(library.names())}; a file of your own is `./{text}`"
+                raise Unreadable("E0214", f"the library has no `{text}`", help)
+            return shipped
+        folder = importer.parent if importer is not None else self.root
+        if folder is None or self.root is None:
+            help = "load the scene from a file, or give a root"
+            raise Unreadable("E0214", "text without a folder cannot import", help)
+        if not text or "\0" in text:
+            raise Unreadable("E0214", "an import path without a file name")
+        if os.path.isabs(text) or PureWindowsPath(text).drive or text[0] in "/\\":
+            raise Unreadable("E0215", f"`{text}` is an absolute path", _RELATIVE)
+        try:
+            path = (folder / text).resolve()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
+        if not path.is_relative_to(self.root):
+            help = f"imports stay inside {self.root}; --root sets another folder"
+            raise Unreadable("E0215", f"`{text}` lies outside the import root", help)
+        self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
+        return path
+
+    def _read_zoo(self, path: Path, text: str) -> Zoo:
+        try:
+            return load_zoo(path)
+        except TensorError as error:
+            help = "`scenelang learn` makes files of elements"
+            raise Unreadable("E0217", f"`{text}` is not a file of elements: {error}", help) from None
+        except OSError as error:
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
+
+    def _read(self, path: Path, written: tree.String) -> SourceFile:
+        text, span = written.value, written.span
+        name = os.path.normpath(os.path.join(os.path.dirname(span.source.name), text))
+        if library.is_reserved(text):
+            name = library.called(text)
+        try:
+            return SourceFile(name, self.texts[path]) if path in self.texts else read_source(path, name)
+        except Unreadable as error:
+            raise Unreadable(error.code, f"cannot read `{text}`: {error}") from None
+        except OSError as error:
+            help, fix = library.meant(text, span)
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}", help, fix) from None
+
+
+def _reason(error: BaseException) -> str:
+    """What the system says, lower case."""
+    return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()

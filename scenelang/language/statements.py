@@ -1,0 +1,733 @@
+"""Statements of the top level, params, and statements headed by a name.
+
+The two tables say which function prepares which class. The functions call each other by way of them: the
+`Session` hands them down, so that none imports what it may hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import Any, Final
+
+from scenelang.assets.zoo import Zoo
+from scenelang.language import blocks, expressions, foreign, library, modifiers, tree
+from scenelang.language import blocks as scene_nodes
+from scenelang.language import tree as nodes
+from scenelang.language.advice import (
+    VALUES,
+    report_early,
+    report_problem,
+    report_unknown,
+    unknown,
+    unknown_member,
+    visible,
+)
+from scenelang.language.blocks import (
+    HOLDERS,
+    Body,
+    define,
+    misplaced,
+    prepare_block,
+    prepare_element,
+    prepare_inner,
+    prepare_module_call,
+    prepare_object,
+)
+from scenelang.language.builder import Action, Builder, FileContext, Place, make
+from scenelang.language.diagnostics import (
+    Diagnostics,
+    Edit,
+    Fix,
+    Label,
+    SourceFile,
+    Span,
+    did_you_mean,
+    instead,
+    removal,
+)
+from scenelang.language.expressions import VARIES, bind, lookup, prepare, prepare_arguments, wrong_kind
+from scenelang.language.library import Written
+from scenelang.language.limits import MAX_BYTES
+from scenelang.language.modifiers import color, prepare_move, prepare_value_use, vector
+from scenelang.language.nodes import MOST, camera_fault, light_fault
+from scenelang.language.parser import parse
+from scenelang.language.reporter import Advice, Reporter, find_damage
+from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Ground, Light
+from scenelang.language.session import Binding, Defines, Env, Session
+from scenelang.language.values import (
+    POISON,
+    UNITS,
+    Angle,
+    Problem,
+    RangeValue,
+    Time,
+    Vec,
+    angle,
+    describe,
+    equal,
+    number,
+    same_unit,
+    show,
+    unexpected,
+    unpack,
+)
+from scenelang.language.words import (
+    ANIMATED,
+    COMBINE,
+    CONSTANTS,
+    FUNCTIONS,
+    GEOMETRIES,
+    LANGUAGE,
+    MATERIALS,
+    NODES,
+    OPERATIONS,
+    SETTINGS,
+    STAGE,
+    TRANSFORMS,
+)
+
+MAX_SIDE_PX: Final = 8192
+LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
+
+
+def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
+    """Whether a statement stands at top level; reports it if not."""
+    if place.kind == "file" and not place.nested:
+        return True
+    misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
+    return False
+
+
+def _once(session: Session, what: str, span: Span) -> bool:
+    """Whether a setting is given for the first time; reports a second time."""
+    first = session.settings.given.setdefault(what, span)
+    if first is not span:
+        labels = (Label(first, "first given here"),)
+        more = "; there is one light, and its power says how bright" if what == "light" else ""
+        help = f"leave one of them out{more}"
+        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
+    return first is span
+
+
+def prepare_version(stmt: tree.Version, place: Place) -> Action | None:
+    version, first = stmt.number, place.file.first
+    if not at_top_level(place, stmt.span, "the language version"):
+        return None
+    if version.unit or version.value != 1:
+        message = f"language version {version.span.text} is not supported"
+        place.report.error("E0334", message, version.span, help="this is version 1: nsg 1;")
+    elif first is not stmt:
+        fix = None
+        if first is not None and first.span.source is stmt.span.source:
+            source, start = stmt.span.source, first.span.start
+            there = Edit(Span(source, start, start), f"{stmt.span.text}\n")
+            away = removal(source, stmt.span.start, stmt.span.end)
+            fix = Fix("move it to the top", (there, *away.edits))
+        message = "the language version is not the first statement"
+        place.report.error("E0334", message, stmt.span, fix=fix)
+    return None
+
+
+def prepare_model(stmt: tree.Model, place: Place) -> Action | None:
+    session, name, span = place.session, stmt.name, stmt.name.span
+    if not at_top_level(place, stmt.span, "'model'") or not _once(session, "model", stmt.span):
+        return None
+    if isinstance(name, tree.String):
+        session.settings.model = name.value
+    elif not isinstance(name, tree.BadExpr):
+        prepare(name, place)
+        session.report.error("E0301", "expected the model's name as a string", span)
+    return None
+
+
+def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
+    """``canvas``, ``background``, ``animate``, ``camera``, ``light`` or ``ground``."""
+    session, name, span = place.session, stmt.name.text, stmt.name.span
+    given = prepare_arguments(stmt.args, place)
+    if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
+        return None
+    if stmt.body is not None:
+        session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
+        return None
+    word, apply = SETTINGS[name], _APPLY[name]
+    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=name == "canvas")
+    getters = [None if one is None else one.code.run for one in bound or ()]
+    operands = tuple([None if one is None else one.arg.value for one in bound or ()])
+
+    where = Written(span, stmt.span)
+
+    def action(env: Env, out: Builder) -> None:
+        values = [LEFT_OUT if get is None else get(env) for get in getters]
+        try:
+            if bound is not None and POISON not in values:
+                apply(session, where, *values)
+                return
+        except Problem as problem:
+            report_problem(session.report, problem, span, operands)
+        if name == "animate":  # with a mistake, which is not a further one of what needs its variables
+            session.animated[:] = [POISON] * 4
+
+    return action
+
+
+def _canvas(session: Session, where: Written, width: Any, height: Any) -> None:
+    if width.__class__ is Vec and height is LEFT_OUT:
+        if len(width.items) != 2:
+            raise unexpected("a vector of 2 numbers", width, operand=0)
+        width, height = width.items
+    if height is LEFT_OUT:
+        raise Problem("E0308", "`canvas` needs `w` and `h`", "it is called canvas(w, h)")
+    sides = []
+    for operand, value in enumerate((width, height)):
+        side = number(value, operand)
+        if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
+            message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
+            raise Problem("E0311", message, operand=operand)
+        sides.append(int(side))
+    session.settings.canvas = (sides[0], sides[1])
+
+
+def _opaque(value: Any, what: str, operand: int) -> tuple[float, float, float]:
+    """A colour whose components are in 0..1."""
+    rgb = color(value, operand)
+    for component in rgb:
+        if not 0.0 <= component <= 1.0:
+            raise Problem("E0311", f"{what} component {show(component)} is outside 0..1", operand=operand)
+    return rgb
+
+
+def _background(session: Session, where: Written, value: Any) -> None:
+    session.settings.background = None if value is None else _opaque(value, "background", 0)
+
+
+def _state(session: Session, where: Written, cls: type[Camera | Light | Ground], *given: Any) -> None:
+    """Set one value of the stage from its fields in order, with defaults for those left out."""
+    names = list(cls.model_fields)
+    for at, value in enumerate(given):
+        if value is not LEFT_OUT and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST:
+            raise Problem("E0311", f"`{names[at]}` is not within {MOST:,.0f} of 0", operand=at)
+    default = [field.default for field in cls.model_fields.values()]
+    values = [own if value is LEFT_OUT else value for value, own in zip(given, default, strict=True)]
+    node = make(cls, dict(zip(names, values, strict=True)))
+    if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
+        at = names.index(fault[0])
+        raise Problem("E0338", fault[1], operand=1 if given[at] is LEFT_OUT else at)
+    if isinstance(node, Light) and (dark := light_fault(node.power)):
+        raise Problem("E0339", dark, operand=1)
+    session.settings.stage[cls.__name__.lower()] = node
+    session.spans.record(node, where)
+
+
+def _given(value: Any, read: Callable[..., Any], *rest: Any) -> Any:
+    return LEFT_OUT if value is LEFT_OUT else read(value, *rest)
+
+
+def _camera(session: Session, where: Written, eye: Any, target: Any, fov: Any) -> None:
+    points = [_given(value, vector, 3, at, "a point") for at, value in enumerate((eye, target))]
+    _state(session, where, Camera, *points, _given(fov, angle, 2))
+
+
+def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any) -> None:
+    place = _given(position, vector, 3, 0, "a point")
+    if power.__class__ is Vec:
+        raise unexpected("a number", power, "the power is second: light([2, 4, 3], 30, #fff)", 1)
+    _state(session, where, Light, place, _given(power, number, 1), _given(rgb, _opaque, "colour", 2))
+
+
+def _ground(session: Session, where: Written, y: Any, rgb: Any) -> None:
+    if y.__class__ is Vec:
+        raise unexpected(
+            "a number", y, "the height comes first: ground(-1, #888), or ground(color = #888)", 0
+        )
+    if y is not None:
+        _state(session, where, Ground, _given(y, number, 0), _given(rgb, _opaque, "colour", 1))
+        return
+    if rgb is not LEFT_OUT:
+        raise Problem("E0308", "`ground(none)` has no colour", operand=1)
+    session.settings.stage["ground"] = None
+
+
+def _animate(session: Session, where: Written, seconds: Any, fps: Any, loop: Any) -> None:
+    length = seconds.size if seconds.__class__ is Time else number(seconds, 0)
+    rate = number(fps, 1)
+    for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
+        if value <= 0.0:
+            raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
+    if loop is not LEFT_OUT and loop.__class__ is not bool:
+        raise unexpected("a boolean", loop, operand=2)
+    rate = session.fps or rate
+    if length * rate > MAX_FRAMES:
+        raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)
+    looping = loop is not False
+    animation = make(Animation, {"seconds": length, "fps": rate, "loop": looping})
+    session.settings.animation = animation
+    frame, frames = session.frame, animation.frames
+    if not 0 <= frame < frames:
+        raise Problem("E0337", f"frame {frame} is outside 0..{frames - 1}")
+    u = frame / frames if looping else frame / max(1, frames - 1)
+    session.animated[:] = [frame / rate, u, float(frame), float(frames)]
+
+
+_APPLY: Final[dict[str, Callable[..., None]]] = {
+    "canvas": _canvas,
+    "background": _background,
+    "animate": _animate,
+    "camera": _camera,
+    "light": _light,
+    "ground": _ground,
+}
+
+
+BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version)
+
+
+def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
+    context, alias = place.file, stmt.alias
+    if not at_top_level(place, stmt.span, "an import"):
+        define(alias, Binding("poison", alias.span), place)
+        return None
+    loader = context.loader
+    binding = Binding("import", alias.span)
+    good = define(alias, binding, place)
+    found = loader.load(stmt, context.path, context.session)
+    if found is None or not good:
+        return None
+    path, file = found
+    if isinstance(file, Zoo):
+        binding.value = _elements(path, file, stmt, context)
+        return None
+    known = loader.prepared.get(path)
+    if known is not None and not known.has_params:  # it means the same wherever it is imported
+        binding.value = known
+        return None
+    if known is not None:
+        loader.repeated += len(file.span.source.text)
+        if loader.repeated > MAX_BYTES:
+            message = f"files with params that are imported again come to more than {MAX_BYTES:,} characters"
+            raise context.session.halt("E0324", message, stmt.path.span)
+    prefix = f"{context.prefix}{alias.text}."
+    brought = FileContext(file.span.source, context.session, loader, context.defines, path, prefix)
+    loader.chain.append(path)
+    loader.sites.append(stmt.path.span)
+    try:
+        body = prepare_file(brought, file, imported=True)
+    finally:
+        loader.chain.pop()
+        loader.sites.pop()
+    binding.value = brought
+    loader.prepared[path] = brought
+    context.has_params |= brought.has_params
+
+    def action(_: Env, out: Builder) -> None:
+        for act in body.actions:
+            act(brought.env, Builder())
+
+    return action
+
+
+def _elements(path: Path, zoo: Zoo, stmt: tree.Import, context: FileContext) -> FileContext:
+    """An imported file of elements as a file whose names they are."""
+    session, root = context.session, context.loader.root
+    if path not in session.elements:
+        taken, name, count = {e.name for e in session.elements.values()}, stmt.alias.text, 1
+        while name in taken:  # the alias of another file, elsewhere
+            count += 1
+            name = f"{stmt.alias.text}_{count}"
+        inside = root is not None and not library.owns(path)
+        written = path.relative_to(root).as_posix() if root is not None and inside else stmt.path.value
+        session.elements[path] = Elements.of(name, written, zoo)
+    known = session.elements[path].name
+    source = SourceFile(stmt.path.value, "")
+    brought = FileContext(source, session, context.loader, context.defines, path)
+    for name in (*zoo.geometries, *zoo.groups):
+        brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
+    brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
+    return brought
+
+
+def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> Body:
+    """Prepare a file's statements; of an imported one only what it brings."""
+    report = context.session.report
+    damage = find_damage(file, report.diagnostics)
+    if damage.lines:
+        report.damaged[context.source] = damage
+    context.first = file.statements[0] if file.statements else None
+    if imported:
+        own = {s.name.text for s in file.statements if isinstance(s, tree.Module)}
+        for stmt in file.statements:
+            if isinstance(stmt, tree.Call) and stmt.name.text in STAGE and stmt.name.text not in own:
+                help = "it belongs to the scene: put it into the file that is drawn"
+                fact = f"`{stmt.name.text}` in an imported file"
+                report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
+    statements = [s for s in file.statements if not imported or isinstance(s, BROUGHT)]
+    return prepare_block(statements, Place(context, context.scope, "file"), file.span)
+
+
+def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
+    file, name, session, slots = place.file, stmt.name, place.session, place.scope.slots
+    default = prepare(stmt.default, place)
+    bounds = prepare(stmt.range, place) if stmt.range is not None else None
+    slot = slots.add()
+    if not at_top_level(place, name.span, "a param"):
+        define(name, Binding("poison", name.span), place)
+        return None
+    if not define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
+        return None
+    full = file.prefix + name.text
+    file.has_params = True
+    file.defines.known[full] = name.span
+
+    def action(env: Env, out: Builder) -> None:
+        given = file.defines.values.get(full, VARIES)  # which another run may change
+        value = default.run(env)
+        allowed = bounds.run(env) if bounds is not None else None
+        if value is not POISON:
+            value = _checked_default(value, allowed, stmt, session)
+        if given is not VARIES:
+            value = _from_outside(full, given, value, allowed, stmt, file)
+        env[slot] = value
+        if session.watch is not None:
+            session.watch(name.span, value)
+
+    return action
+
+
+def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Session) -> Any:
+    """The default, or poison where it has no type for a param; reports one outside the range."""
+    if value.__class__ not in (*UNITS, bool, str, Vec):
+        message = f"{describe(value)} as the value of a param"
+        help = "params are numbers, angles, times, booleans, strings and vectors"
+        session.report.error("E0301", message, stmt.default.span, help=help)
+        return POISON
+    if stmt.range is None or allowed is POISON:
+        return value
+    if allowed.__class__ is not RangeValue and allowed.__class__ is not Vec:
+        message = f"expected a range or a vector of choices, found {describe(allowed)}"
+        session.report.error("E0301", message, stmt.range.span, help="write in 0..1")
+        return value
+    try:
+        if not within(value, allowed):
+            labels = (Label(stmt.range.span, "the range"),)
+            message = f"default of `{stmt.name.text}` is outside {stmt.range.span.text}"
+            advice, fix = _range_meant(value, allowed, stmt.range)
+            session.report.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
+    except Problem as problem:
+        report_problem(session.report, problem, stmt.range.span, (stmt.default,))
+    return value
+
+
+def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | None, Fix | None]:
+    """Help and fix for `in [3, 9]` where the default lies between the two."""
+    ends = allowed.items if allowed.__class__ is Vec else ()
+    if len(ends) != 2 or not all(one.__class__ is value.__class__ and one.__class__ in UNITS for one in ends):
+        return None, None
+    low, at, high = (unpack(one)[0] for one in (ends[0], value, ends[1]))
+    if not low < at < high:
+        return None, None
+    help = "a vector has the choices there are; a range is written 3..9"
+    if not isinstance(range, nodes.Vector):
+        return help, None
+    text = "..".join(item.span.text for item in range.items)
+    return help, Fix(f"write `{text}`", (Edit(range.span, text),))
+
+
+def within(value: Any, allowed: Any) -> bool:
+    """Whether a value, or each number of a vector, is in a range or among choices.
+
+    Raises:
+        Problem: a value and a range that do not compare.
+    """
+    if allowed.__class__ is Vec:
+        return any(equal(value, choice) for choice in allowed.items)
+    if value.__class__ is Vec:
+        return all(within(item, allowed) for item in value.items)
+    if value.__class__ not in UNITS:
+        raise Problem("E0301", f"{describe(value)} with a range of {allowed.unit}s")
+    x, kind = unpack(value)
+    same_unit(x, kind, allowed.start or allowed.stop, allowed.unit)
+    return bool(allowed.contains(x))
+
+
+def _from_outside(
+    full: str, given: Any, default: Any, allowed: Any, stmt: nodes.Param, file: FileContext
+) -> Any:
+    """The value from outside, of the default's type and in range; poison after a report."""
+    span, report = stmt.name.span, file.session.report
+    text = given if isinstance(given, str) else repr(given)
+    shown = f"{full}={text}" if len(text) <= 60 else f"{full}={text[:57]}…"
+    value = given
+    if default.__class__ is not str or not isinstance(given, str):
+        value = literal(given, file) if isinstance(given, str) else from_python(given)
+    help: str | None
+    if value is None:
+        colour = foreign.COLOURS.get(given.lower()) if isinstance(given, str) else None
+        help = "write a number with its unit, a colour, a vector, true or false"
+        help = f"colours have no names; {given} is {colour}" if colour else help
+        labels = (Label(stmt.default.span, "its default"),)
+        report.error("E0310", f"{shown} is not a literal", span, help=help, labels=labels)
+        return POISON
+    if default is POISON:
+        return value
+    if value.__class__ is float and default.__class__ is Time:
+        value = Time(value)  # a bare number is seconds
+    elif value.__class__ is float and default.__class__ is Angle and value == 0.0:
+        value = Angle(0.0)
+    if value.__class__ is not default.__class__:
+        help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
+        message = f"{shown} is {describe(value)}, expected {describe(default)}"
+        labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
+        report.error("E0310", message, span, help=help, labels=labels)
+        return POISON
+    if stmt.range is not None and (allowed.__class__ is RangeValue or allowed.__class__ is Vec):
+        try:
+            inside = within(value, allowed)
+        except Problem:
+            return value  # the default has met and reported it
+        if not inside:
+            labels = (Label(stmt.range.span, "the range"),)
+            report.error("E0309", f"{shown} is outside {stmt.range.span.text}", span, labels=labels)
+            return POISON
+    return value
+
+
+def from_python(value: Any) -> Any:
+    """A Python value as one of the language, which one of the language is; None where there is none."""
+    if isinstance(value, bool | str | Angle | Time | Vec):
+        return value
+    if isinstance(value, Real):
+        try:
+            number = float(value)
+        except OverflowError:
+            return None
+        return number if number - number == 0.0 else None
+    if isinstance(value, Sequence) or hasattr(value, "tolist"):
+        try:
+            items = [from_python(item) for item in (value.tolist() if hasattr(value, "tolist") else value)]
+            return None if None in items else Vec(tuple(items))
+        except (Problem, RecursionError, TypeError):
+            return None
+    return None
+
+
+def literal(text: str, file: FileContext) -> Any:
+    """The value of a literal; None where ``text`` is not a literal."""
+    diagnostics, around = Diagnostics(), file.session
+    tree = parse(SourceFile("", f"let value = {text};"), diagnostics)
+    stmt = tree.statements[0] if len(tree.statements) == 1 else None
+    if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
+        return None
+    session = Session(Reporter(diagnostics), around.expressions, around.statements)
+    alone = FileContext(SourceFile("", text), session, file.loader, Defines({}))
+    value = prepare(stmt.value, Place(alone, alone.scope, "file")).run([])
+    return None if value is POISON or diagnostics.errors else value
+
+
+def _is_literal(expr: nodes.Expr) -> bool:
+    """Whether an expression names nothing and computes nothing but a sign."""
+    match expr:
+        case nodes.Number() | nodes.Bool() | nodes.Color() | nodes.String():
+            return True
+        case nodes.Unary(op="-" | "+", operand=nodes.Number()):
+            return True
+        case nodes.Vector():
+            return all(_is_literal(item) for item in expr.items)
+        case nodes.CallExpr():
+            return expr.name.text in ("rgb", "hsv") and all(_is_literal(a.value) for a in expr.args)
+        case _:
+            return False
+
+
+def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
+    name = stmt.name.text
+    binding = None if name in LANGUAGE else lookup(stmt.name, place)
+    if name in SETTINGS and not hides(binding, stmt):
+        return prepare_setting(stmt, place)
+    if name in LANGUAGE:
+        return prepare_move(stmt, place)
+    if binding is None:
+        if name in GEOMETRIES:
+            return prepare_object(stmt, place)
+        if not _lacks_module(stmt, place):
+            if _boolean(stmt) is None:
+                _skim(stmt, place)
+            _unknown(stmt, place)
+        return None
+    if binding.kind == "module":
+        return prepare_module_call(stmt, binding.value, place)
+    if binding.kind == "element":
+        return prepare_element(stmt, place, binding.value)
+    if binding.kind in VALUES:
+        return prepare_value_use(stmt, binding, place)
+    _skim(stmt, place)
+    if binding.kind != "poison":
+        wrong_kind(stmt.name, binding, place, "an object or a module")
+    return None
+
+
+def hides(binding: Binding | None, stmt: tree.Call) -> bool:
+    """Whether a scene's own name stands here for a setting: a module, or a material in use."""
+    return binding is not None and (
+        binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
+    )
+
+
+def _boolean(stmt: tree.Call) -> str | None:
+    """The boolean word that a call with objects as arguments stands for."""
+    here = foreign.WORDS.get(stmt.name.text.lower())
+    return here if here in COMBINE and stmt.args and stmt.body is None else None
+
+
+def _skim(stmt: tree.Call, place: Place) -> None:
+    """Look for mistakes in the arguments and the block of something that will not run."""
+    prepare_arguments(stmt.args, place)
+    prepare_inner(stmt.body, place.inner("unknown"))
+
+
+def _lacks_module(stmt: tree.Call, place: Place) -> bool:
+    """Report ``dot(x, y) { … }`` whose arguments are unknown names: the word `module` is missing."""
+    name = stmt.name.text
+    if stmt.body is None or not stmt.args or "." in name:
+        return False
+    values = [arg.value.name for arg in stmt.args if isinstance(arg.value, tree.NameRef) and not arg.name]
+    params = [arg.name for arg in stmt.args if arg.name] + values
+    if len(params) < len(stmt.args) or not values:
+        return False
+    if any(place.scope.find(p.text) or p.text in CONSTANTS or p.text in ANIMATED for p in values):
+        return False
+    body = place.inner("unknown")
+    body.scope.names.update({param.text: Binding("poison", param.span) for param in params})
+    prepare_inner(stmt.body, body)
+    written = ", ".join(arg.span.text for arg in stmt.args)
+    help = f"to define it write module {name}({written}) {{ … }}"
+    message = f"unknown geometry or module `{name}`"
+    report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
+    return True
+
+
+def _unknown(stmt: tree.Call, place: Place) -> None:
+    """Report a statement whose name stands for nothing."""
+    name, text = stmt.name, stmt.name.text
+    if "." in text:
+        alias = place.scope.find(text.partition(".")[0])
+        if alias is None:
+            unknown(name, place)
+        elif alias.kind == "import":
+            unknown_member(name, place, alias.value, kinds=("module", "element"))
+        else:
+            wrong_kind(name, alias, place, "an imported file")
+        return
+    if report_early(name, place):
+        return
+    if text in FUNCTIONS:
+        from scenelang.language.advice import material_advice  # only mistakes need it
+
+        call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
+        written = f"write color({call});" if inside else material_advice(place, "color", call)
+        message = f"`{text}` is a function, not an object or a module"
+        place.report.error("E0213", message, name.span, help=written if text in ("rgb", "hsv") else None)
+        return
+    what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
+    report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
+
+
+def _advice(stmt: tree.Call, place: Place) -> Advice:
+    """What may have been meant by a statement whose name stands for nothing."""
+    name, text = stmt.name, stmt.name.text
+    candidates = _candidates(stmt, place)
+    help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
+    if fix is None and text.lower() in foreign.STATEMENTS:
+        help = None  # what is known of a word goes before what is only near
+    if place.kind == "object" and text in MATERIALS:
+        return _lacks_material(stmt)
+    if help is None and place.kind in HOLDERS:
+        from scenelang.language.advice import in_library  # only mistakes need it
+
+        if (here := _boolean(stmt)) is not None:
+            return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
+        help, fix = in_library(stmt, place), None
+    if fix is None:
+        known, fix = instead(text, foreign.WORDS, candidates, name.span)
+        help = known or help
+    if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
+        span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
+        fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
+    meant = foreign.WORDS.get(text, "")
+    if help is None and place.kind == "object" and meant in OPERATIONS.keys() - TRANSFORMS.keys():
+        from scenelang.language.advice import material_advice
+
+        help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
+    help = help or foreign.STATEMENTS.get(text.lower())
+    if help is None and place.kind in ("file", "group", "chain"):
+        from scenelang.language.advice import drawn  # only mistakes need it
+
+        help = drawn(place)
+    return help, fix
+
+
+def _lacks_material(stmt: tree.Call) -> Advice:
+    """`square { flat(#f00); }`: the word `material` is missing."""
+    written = f"material {stmt.name.text}"
+    if stmt.args is None:
+        return f"write {written}", Fix("insert `material`", (Edit(stmt.name.span, written),))
+    colour = stmt.args[0].value.span.text if len(stmt.args) == 1 else "…"
+    written = f"{written} {{ color({colour}); }}"
+    if colour == "…" or stmt.body is not None:
+        return f"write {written}", None
+    return f"write {written}", Fix(f"write `{written}`", (Edit(stmt.span, written),))
+
+
+def _candidates(stmt: tree.Call, place: Place) -> set[str]:
+    """Names that could have been meant, given where the statement stands and how it looks."""
+    kind = place.kind
+    if kind == "material":
+        return {*OPERATIONS}
+    if kind == "object" and stmt.args is not None:
+        return {*TRANSFORMS}
+    names = visible(place, VALUES if kind == "object" else ("module",))
+    if kind == "object":
+        return {*names, "material"}
+    found = {*GEOMETRIES, *names}
+    if stmt.body is None:
+        return found if stmt.args is None else found | {*(TRANSFORMS if kind != "file" else SETTINGS)}
+    before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
+    otherwise = before.endswith("}")
+    if not stmt.args:
+        found = {*found, *NODES, *(["else"] if otherwise else [])}
+    return {*found, "else if"} if stmt.args is not None and otherwise else found
+
+
+EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
+    tree.Number: expressions.prepare_number,
+    tree.String: expressions.prepare_literal,
+    tree.Bool: expressions.prepare_literal,
+    tree.Color: expressions.prepare_color,
+    tree.Vector: expressions.prepare_vector,
+    tree.Range: expressions.prepare_range,
+    tree.NameRef: expressions.prepare_name,
+    tree.Unary: expressions.prepare_unary,
+    tree.Binary: expressions.prepare_binary,
+    tree.Conditional: expressions.prepare_conditional,
+    tree.CallExpr: expressions.prepare_call,
+    tree.Member: expressions.prepare_member,
+    tree.Index: expressions.prepare_index,
+    tree.MaterialExpr: modifiers.prepare_material,
+    tree.BadExpr: expressions.skip_bad,
+}
+STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
+    tree.Version: prepare_version,
+    tree.Model: prepare_model,
+    tree.Param: prepare_param,
+    tree.Let: blocks.prepare_let,
+    tree.Fn: blocks.skip,
+    tree.Module: blocks.skip,
+    tree.Import: prepare_import,
+    tree.For: blocks.prepare_for,
+    tree.If: blocks.prepare_if,
+    tree.Call: prepare_headed,
+    tree.Node: scene_nodes.prepare_node,
+    tree.Combined: scene_nodes.prepare_combined,
+    tree.MaterialUse: modifiers.prepare_use,
+    tree.BadStmt: blocks.skip,
+}

@@ -1,0 +1,95 @@
+"""The parse tables at run time: read from `tables.json`, no Lark import.
+
+The grammar is the source and the tables its product. A wheel brings them; in a checkout they are made by
+`scenelang.language.generate` when they are first needed and whenever the grammar has changed. Importing Lark
+and building them takes over 100 ms of a process that should answer within 250; reading them takes about 2.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+from zlib import crc32
+
+from scenelang.assets.records import Record
+
+PACKAGE: Final = Path(__file__).resolve().parent.parent
+PLACE: Final = PACKAGE / "language" / "tables.json"
+END = 0
+"""The kind of the end of the text."""
+
+
+class Tables(Record):
+    """The LALR automaton and the terminals of the language.
+
+    Token kinds are small integers, indices into ``kinds``. An action ``s >= 0`` goes to state s after taking
+    the token, ``r < 0`` applies rule ``~r``.
+    """
+
+    kinds: tuple[str, ...]  # a name for each kind: the text itself for a literal, else the terminal's name
+    literals: dict[str, int]  # text of a keyword or of punctuation to its kind
+    patterns: dict[str, str]  # name of any other terminal to its regular expression
+    start: int
+    final: int  # the state in which the whole text has been read
+    actions: tuple[dict[int, int], ...]  # per state, token kind to what to do
+    gotos: tuple[dict[int, int], ...]  # per state, index of a nonterminal to the next state
+    rules: tuple[tuple[int, int, str], ...]  # length, nonterminal, callback; empty, it passes the only value
+
+    def kind(self, name: str) -> int:
+        """The kind with a name: ``kind("NUMBER")``, ``kind(";")``."""
+        return self.kinds.index(name)
+
+
+def decode(data: dict[str, Any]) -> Tables:
+    """Tables from the plain data of `tables.json`."""
+
+    def pairs(flat: list[int]) -> dict[int, int]:
+        return dict(zip(flat[::2], flat[1::2], strict=True))
+
+    kinds = tuple(data["kinds"])
+    literals = set(kinds) - set(data["patterns"]) - set(data["declared"])
+    return Tables(
+        kinds=kinds,
+        literals={text: kind for kind, text in enumerate(kinds) if text in literals},
+        patterns=data["patterns"],
+        start=data["start"],
+        final=data["final"],
+        actions=tuple(map(pairs, data["actions"])),
+        gotos=tuple(map(pairs, data["gotos"])),
+        rules=tuple((length, origin, callback) for length, origin, callback in data["rules"]),
+    )
+
+
+def grammar_path() -> Path:
+    """Where the grammar lies: inside an installed package, beside it in a checkout."""
+    inside = PACKAGE / "grammar" / "scenelang.lark"
+    return inside if inside.exists() else PACKAGE.parent / "grammar" / "scenelang.lark"
+
+
+def source_mark(grammar: Path) -> int:
+    """A checksum of what tables are made from: a grammar, and the program that makes them."""
+    return crc32(grammar.read_bytes(), crc32(Path(__file__).with_name("generate.py").read_bytes()))
+
+
+def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
+    """The plain data of `tables.json` at ``place``, made anew where missing, damaged or of another grammar.
+
+    What was ``shipped`` in a wheel belongs together.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        found = json.loads(place.read_text("utf-8"))
+        if isinstance(found, dict) and (shipped or found.get("source") == source_mark(grammar)):
+            return found
+    from scenelang.language.generate import make  # and Lark with it
+
+    return make(grammar, place, source_mark(grammar))
+
+
+@cache
+def tables() -> Tables:
+    """The tables of the grammar."""
+    grammar = grammar_path()
+    return decode(current(grammar, PLACE, shipped=grammar.is_relative_to(PACKAGE)))

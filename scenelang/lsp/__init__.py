@@ -1,1 +1,0 @@
-"""The language server, `scenelang lsp`: pure functions over documents by feature, and a thin pygls server."""

@@ -1,0 +1,434 @@
+"""Encoders of animations, frame by frame: GIF, APNG, WebP and video by ffmpeg.
+
+Pillow's own writer of films, also in 13.0, holds every frame until the last has come, and gives each a
+palette of its own; one that is exact for all frames is found here.
+
+Source: CompuServe, Graphics Interchange Format, version 89a.
+
+Pillow's own writer, also in 13.0, holds every frame until the last has come.
+
+Source: W3C, Portable Network Graphics (PNG) Specification, third edition, 2025, chapter 4.9 and 11.3.6.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen, run
+from typing import BinaryIO, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from PIL import GifImagePlugin, Image
+
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.image import SIGNATURE, chunk
+from scenelang.output.frames import Box, Film, Pixels, changed, delays, runs
+
+Palette = Literal["auto", "global", "frame"]
+Colours = npt.NDArray[np.uint8]
+"""(K, 3)."""
+
+PER_SECOND = 100
+SHORTEST = 2  # hundredths of a second; browsers take shorter ones for a tenth
+_LONGEST = 65535
+_KEEP, _CLEAR = 1, 2  # what becomes of a frame when the next one comes
+_SAMPLE = 1 << 18  # pixels that a palette is chosen from
+_MOST_KNOWN = 1 << 20  # colours that are counted; more are thinned to the most frequent half
+
+
+def write_gif(
+    film: Film,
+    part: Path,
+    progress: Callable[[float], None],
+    *,
+    palette: Palette = "auto",
+    dither: bool = False,
+) -> None:
+    """Encode a film; of transparent frames, pixels of less than half coverage are left out.
+
+    Args:
+        palette: ``"global"`` has one for all frames, ``"frame"`` one for each, ``"auto"`` the one that holds
+            all colours exactly, if one does, and otherwise a global one, which keeps still parts still.
+        dither: spread what a palette lacks over neighbouring pixels.
+    """
+    lengths = delays(len(film.files), film.fps, PER_SECOND, SHORTEST)
+    most = 256 - 1  # one is for what is transparent, or stays as it was
+    census = Census(most)
+    count = len(lengths)
+    if palette != "frame":
+        for index, (pixels, length) in enumerate(film.runs(lengths)):
+            census.add(pixels, length)
+            progress(0.4 * index / count)
+    own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
+    common = None if own else census.choose()
+    with part.open("wb") as out:
+        _head(out, film, common)
+        shown: npt.NDArray[np.uint8] | None = None
+        mapper = Mapper(common, dither) if common is not None else None
+        for index, (pixels, length) in enumerate(film.runs(lengths)):
+            if own:
+                one = Census(most)
+                one.add(pixels)
+                mapper = Mapper(one.choose(), dither)
+            assert mapper is not None
+            shown = _frame(out, film, pixels, shown, mapper, length, own)
+            progress(0.4 + 0.6 * index / count)
+        out.write(b";")
+
+
+def _head(out: BinaryIO, film: Film, common: Colours | None) -> None:
+    # of an index; the colour after the last is the transparent one
+    bits = 0 if common is None else max(1, len(common).bit_length())
+    flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
+    out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
+    if common is not None:
+        out.write(common.tobytes().ljust(3 << bits, b"\0"))
+    if film.loop:
+        out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
+
+
+def _frame(
+    out: BinaryIO,
+    film: Film,
+    pixels: npt.NDArray[np.uint8],
+    shown: npt.NDArray[np.uint8] | None,
+    mapper: Mapper,
+    length: int,
+    own: bool,
+) -> npt.NDArray[np.uint8]:
+    """Write one picture; returns what a viewer then shows, the colours that its palette gave."""
+    colours = mapper.colours
+    clear = len(colours)  # the index after the palette's own
+    index = mapper(pixels)
+    now = colours[index]
+    box: Box = (0, 0, *film.size)
+    if film.alpha:
+        index[pixels[..., 3] < 128] = clear
+    elif shown is not None:
+        box = changed(shown, now)
+        index = np.where((now == shown).all(axis=2), np.uint8(clear), index)
+    left, top, right, bottom = box
+    part = index[top:bottom, left:right]
+    while True:  # a longer time than the format holds is a second picture of nothing
+        image = Image.fromarray(np.ascontiguousarray(part))
+        image.putpalette(np.append(colours, [[0, 0, 0]], axis=0).astype(np.uint8).tobytes())
+        options = {
+            "duration": 10 * min(length, _LONGEST),  # Pillow takes milliseconds
+            "disposal": _CLEAR if film.alpha else _KEEP,
+            "transparency": clear,
+            "include_color_table": own,
+        }
+        out.writelines(GifImagePlugin.getdata(image, (left, top), **options))
+        length -= _LONGEST
+        if length <= 0:
+            return now
+        if not film.alpha:
+            part = np.full((1, 1), clear, np.uint8)
+
+
+# ---------------------------------------------------------------- colours
+
+
+def packed(pixels: Pixels) -> npt.NDArray[np.uint32]:
+    """Colours (H, W, 3) as one number each, of any shape before the last axis."""
+    wide = pixels[..., :3].astype(np.uint32)
+    return np.asarray((wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2], np.uint32)
+
+
+def unpacked(numbers: npt.NDArray[np.uint32]) -> Colours:
+    """Numbers (K,) as colours (K, 3)."""
+    return np.stack([numbers >> 16, (numbers >> 8) & 255, numbers & 255], axis=-1).astype(np.uint8)
+
+
+@dataclass(slots=True)
+class Census:
+    """How often each colour comes up in all pictures, counted one picture at a time."""
+
+    most: int  # whether any single picture has more colours than this is noted in `crowded`
+    colours: npt.NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    counts: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    crowded: bool = False
+    thinned: bool = False
+
+    def add(self, pixels: Pixels, weight: int = 1) -> None:
+        """Count what is shown of a picture where one colour is transparent."""
+        numbers = packed(pixels)
+        shown = numbers[pixels[..., 3] >= 128] if pixels.shape[2] == 4 else numbers
+        found, counts = np.unique(shown, return_counts=True)
+        self.crowded |= len(found) > self.most
+        both = np.concatenate([self.colours, found])
+        self.colours, index = np.unique(both, return_inverse=True)
+        total = np.zeros(len(self.colours), np.int64)
+        np.add.at(total, index, np.concatenate([self.counts, counts * weight]))
+        self.counts = total
+        if len(self.colours) > _MOST_KNOWN:
+            kept = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
+            self.colours, self.counts, self.thinned = self.colours[kept], total[kept], True
+
+    @property
+    def fits(self) -> bool:
+        """Whether all colours together are few enough."""
+        return not self.thinned and len(self.colours) <= self.most
+
+    def choose(self) -> Colours:
+        """At most `most` colours, (K, 3): all of them, or a selection near to all.
+
+        That is by median cut over pixels as frequent as the square root of each colour's count, then k-means.
+        The square root keeps small coloured things from drowning in a large background.
+        """
+        if self.fits:
+            return unpacked(self.colours)
+        share = np.sqrt(self.counts.astype(np.float64))
+        repeat = np.maximum(1, np.floor(share * (_SAMPLE / share.sum())).astype(np.int64))
+        sample = np.repeat(self.colours, repeat)
+        side = int(np.ceil(np.sqrt(len(sample))))
+        square = np.resize(sample, side * side)
+        image = Image.fromarray(unpacked(square).reshape(side, side, 3))
+        reduced = image.quantize(self.most, method=Image.Quantize.MEDIANCUT, kmeans=2)
+        used = len(reduced.getcolors(256) or ())
+        table = np.array(reduced.getpalette() or [], np.uint8).reshape(-1, 3)
+        return np.unique(table[: max(used, 1)], axis=0)
+
+
+class Mapper:
+    """Pictures to indices of a palette (K, 3): exact where the colour is in it, the nearest otherwise.
+
+    If asked, the error is dithered over neighbouring pixels (Floyd and Steinberg 1976).
+    """
+
+    def __init__(self, colours: Colours, dither: bool) -> None:
+        self.colours, self.dither = colours, dither
+        self._wide = colours.astype(np.int32)
+        self._known: dict[int, int] = {}
+
+    def __call__(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
+        """Indices (H, W)."""
+        flat = packed(pixels)
+        found, inverse = np.unique(flat, return_inverse=True)
+        index = np.array([self._nearest(number) for number in found.tolist()], np.uint8)
+        exact = (self.colours[index] == unpacked(found)).all(axis=1).all()
+        if self.dither and not exact:
+            return self._dithered(pixels)
+        return index[inverse].reshape(flat.shape)
+
+    def _nearest(self, number: int) -> int:
+        known = self._known.get(number)
+        if known is None:
+            rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
+            known = int(((self._wide - rgb) ** 2).sum(axis=1).argmin())
+            if len(self._known) < _MOST_KNOWN:
+                self._known[number] = known
+        return known
+
+    def _dithered(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
+        table = Image.new("P", (1, 1))
+        table.putpalette(self.colours.tobytes())
+        image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+        index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
+        return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
+
+
+_LONGEST_APNG = 65535
+
+
+def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
+    """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
+    shown = [
+        (file, piece)
+        for file, count in runs(film.files, [1] * len(film.files))
+        for piece in _pieces(count, film.fps)
+    ]
+    with part.open("wb") as out:
+        out.write(SIGNATURE)
+        sequence, before, last = 0, None, None
+        pixels: Pixels | None = None
+        for index, (file, (numerator, denominator)) in enumerate(shown):
+            if file != last or pixels is None:
+                pixels = film.read(file)
+            left, top, right, bottom = changed(before, pixels)
+            chunks = _png(np.ascontiguousarray(pixels[top:bottom, left:right]))
+            if index == 0:
+                out.write(chunk(b"IHDR", next(body for kind, body in chunks if kind == b"IHDR")))
+                out.write(chunk(b"acTL", struct.pack(">II", len(shown), 0 if film.loop else 1)))
+            # what is shown stays (0), and the new pixels replace it (0) instead of being laid over it
+            control = (sequence, right - left, bottom - top, left, top, numerator, denominator, 0, 0)
+            out.write(chunk(b"fcTL", struct.pack(">IIIIIHHBB", *control)))
+            sequence += 1
+            for kind, body in chunks:
+                if kind == b"IDAT" and index == 0:
+                    out.write(chunk(b"IDAT", body))
+                elif kind == b"IDAT":
+                    out.write(chunk(b"fdAT", struct.pack(">I", sequence) + body))
+                    sequence += 1
+            before, last = pixels, file
+            progress((index + 1) / len(shown))
+        out.write(chunk(b"IEND", b""))
+
+
+def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
+    """How long ``count`` frames are shown, as fractions of 16 bits a part; more than one if it is long."""
+    whole = (count / Fraction(fps).limit_denominator(1_000_000)).limit_denominator(_LONGEST_APNG)
+    if whole.numerator <= _LONGEST_APNG:
+        yield whole.numerator, whole.denominator
+        return
+    for share in (count // 2, count - count // 2):
+        yield from _pieces(share, fps) if count > 1 else [(min(_LONGEST_APNG, round(float(whole))), 1)]
+
+
+def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
+    """The chunks of a picture."""
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.fromarray(pixels).save(data, "PNG")
+    raw, at, found = data.getvalue(), len(SIGNATURE), []
+    while at < len(raw):
+        (size,) = struct.unpack_from(">I", raw, at)
+        found.append((raw[at + 4 : at + 8], raw[at + 8 : at + 8 + size]))
+        at += 12 + size
+    return found
+
+
+WEBP_PER_SECOND = 1000
+
+
+class _Reel(Image.Image):
+    """A film as Pillow's writer takes it: it seeks each frame when its turn comes, and holds one."""
+
+    def __init__(self, film: Film, files: list[Path], progress: Callable[[float], None]) -> None:
+        super().__init__()
+        self._film, self._files, self._progress = film, files, progress
+        self.n_frames = len(files)
+        self.seek(0)
+
+    def seek(self, frame: int) -> None:
+        self._progress(frame / self.n_frames)
+        image = Image.fromarray(self._film.read(self._files[frame]))
+        self.im, self._mode, self._size = image.im, image.mode, image.size
+        self._at = frame
+
+    def tell(self) -> int:
+        return self._at
+
+
+def write_webp(film: Film, part: Path, progress: Callable[[float], None]) -> None:
+    """Encode a film, losslessly, with alpha where it has any; of equal pictures it becomes a still."""
+    shown = runs(film.files, delays(len(film.files), film.fps, WEBP_PER_SECOND))
+    reel = _Reel(film, [file for file, _ in shown], progress)
+    with part.open("wb") as out:
+        reel.save(
+            out,
+            "WEBP",
+            save_all=True,
+            lossless=True,
+            quality=80,  # of the search, not of the picture
+            method=4,
+            duration=[length for _, length in shown],
+            loop=0 if film.loop else 1,
+        )
+
+
+_H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
+_OTHERS: Final = (("libopenh264", "-b:v", "8M"), ("mpeg4", "-q:v", "2"))
+_VP9: Final = ("libvpx-vp9", "-crf", "18", "-b:v", "0", "-row-mt", "1")
+_SCALE: Final = "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp"
+_FORMATS: Final = {".mp4": "mp4", ".m4v": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm"}
+MISSING: Final = "video needs ffmpeg, which is not on the PATH: install it, or pip install 'scenelang[video]'"
+
+
+class NoFfmpeg(RenderError):
+    """There is no ffmpeg, or it cannot encode."""
+
+
+@lru_cache(maxsize=1)
+def find_ffmpeg() -> str:
+    """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
+    found = shutil.which("ffmpeg")
+    if found is not None:
+        return found
+    try:
+        import imageio_ffmpeg
+
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError, OSError):
+        raise NoFfmpeg(MISSING) from None
+
+
+@lru_cache(maxsize=1)
+def _encoders(ffmpeg: str) -> frozenset[str]:
+    command = [ffmpeg, "-hide_banner", "-encoders"]
+    done = run(command, capture_output=True, check=False, stdin=DEVNULL)
+    lines = done.stdout.decode(errors="replace").splitlines()
+    return frozenset(words[1] for line in lines if len(words := line.split()) > 1)
+
+
+def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without."""
+    ffmpeg = find_ffmpeg()
+    known = _encoders(ffmpeg)
+    wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
+    for codec in wanted:
+        if codec[0] in known:
+            return ffmpeg, codec
+    raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
+
+
+def write_video(film: Film, part: Path, progress: Callable[[float], None], *, suffix: str) -> None:
+    """Encode a film as 4:2:0 video with BT.709 colours; only WebM keeps alpha, the others lie over white.
+
+    A side of odd length gets one more row or column, a copy of its neighbour. Raises `NoFfmpeg`, or
+    `RenderError` where it fails.
+    """
+    ffmpeg, codec = find_codec(suffix)
+    keeps = film.alpha and suffix == ".webm"
+    width, height = (side + side % 2 for side in film.size)
+    command = [
+        *(ffmpeg, "-hide_banner", "-loglevel", "error", "-nostdin", "-y"),
+        *("-f", "rawvideo", "-pix_fmt", "rgba" if keeps else "rgb24", "-s", f"{width}x{height}"),
+        *("-r", str(Fraction(film.fps).limit_denominator(100_000)), "-i", "-"),
+        *("-vf", _SCALE, "-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
+        *(("-auto-alt-ref", "0") if keeps else ()),
+        *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+        *(("-movflags", "+faststart") if _FORMATS[suffix] in ("mp4", "mov") else ()),
+        *("-f", _FORMATS[suffix], os.fspath(part)),
+    ]
+    # in a session of its own, so that Ctrl-C reaches us alone and we end it
+    with Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=PIPE, start_new_session=True) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        try:
+            last, data = None, b""
+            for index, file in enumerate(film.files):
+                if file != last:
+                    data, last = _even(film.read(file), keeps).tobytes(), file
+                process.stdin.write(data)
+                progress((index + 1) / len(film.files))
+            process.stdin.close()
+        except BrokenPipeError:
+            pass  # it says why
+        except BaseException:
+            process.kill()
+            raise
+        said = process.stderr.read().decode(errors="replace").strip()
+    if process.returncode != 0:
+        raise RenderError(f"ffmpeg failed: {said.splitlines()[-1] if said else process.returncode}")
+
+
+def _even(pixels: Pixels, keeps: bool) -> Pixels:
+    """Pixels with even sides, and without alpha unless it is kept."""
+    if pixels.shape[2] == 4 and not keeps:
+        alpha = pixels[..., 3:].astype(np.uint16)
+        over = pixels[..., :3] * alpha + 255 * (255 - alpha)
+        pixels = ((over + 127) // 255).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    if height % 2 or width % 2:
+        pixels = np.pad(pixels, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    return np.ascontiguousarray(pixels)

@@ -1,0 +1,498 @@
+"""Frames of animations: which, how long, compiled one after another, and kept on disk.
+
+A frame's file is named by a digest of all that decides its pixels: the compiled Program, the weights, the
+renderer and how it splits the picture. A frame of another text, import, param, size or model therefore
+never is taken for one of this run, and equal frames share a file.
+
+A file is read, parsed and prepared once. A frame runs only the statements that ``t``, ``u`` or ``frame``
+reach, and where its nodes are those of the frame before, so is its Program.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import math
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image as pillow
+
+from scenelang.assets.files import lock, open_own, output_place, write_whole
+from scenelang.compiler.lower import Memory
+from scenelang.drawing.how import RenderError
+from scenelang.drawing.image import image_format
+from scenelang.language.diagnostics import Diagnostics, plural
+from scenelang.language.evaluation import Evaluation, Source
+from scenelang.language.library import SpanMap
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Animation, Scene, same_nodes
+
+if TYPE_CHECKING:
+    from scenelang.compiler.program import Program
+
+
+K = TypeVar("K")
+
+_RANGE: Final = re.compile(r"\s*(\d{1,9})\s*(?:\.\.\s*(<?)\s*(\d{1,9})?\s*)?")
+
+
+class FramesError(ValueError):
+    """Not a range of frames, or one that an animation does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRange:
+    """Frames as they are asked for."""
+
+    first: int = 0  # from 0
+    last: int | None = None  # the last one; None for that of the animation
+
+    @classmethod
+    def parse(cls, text: str) -> FrameRange:
+        """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a``; else `FramesError`."""
+        found = _RANGE.fullmatch(text)
+        if found is None or (found[2] and found[3] is None):
+            raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
+        first = int(found[1])
+        if ".." not in text:
+            return cls(first, first)
+        if found[3] is None:
+            return cls(first)
+        last = int(found[3]) - bool(found[2])
+        if last < first:
+            raise FramesError(f"the range of frames `{text}` is empty")
+        return cls(first, last)
+
+    def among(self, frames: int) -> range:
+        """The numbers in an animation of ``frames`` frames; raises `FramesError` if some are outside it."""
+        last = frames - 1 if self.last is None else self.last
+        outside = self.first if self.first >= frames else last if last >= frames else None
+        if outside is not None:
+            raise FramesError(f"frame {outside} is outside 0..{frames - 1}")
+        return range(self.first, last + 1)
+
+
+def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[int]:
+    """Ticks that each frame is shown for; 0 where it is left out, as it would be shorter than ``shortest``.
+
+    When a frame starts is rounded by itself, so that errors do not add up and the whole is as long as it
+    should be, but no shorter than ``shortest``.
+    """
+    step = Fraction(per_second) / Fraction(fps)
+    at = [math.floor(i * step + Fraction(1, 2)) for i in range(count + 1)]
+    shown = [0]
+    for index in range(1, count):
+        if at[index] - at[shown[-1]] >= shortest:
+            shown.append(index)
+    found = [0] * count
+    for index, following in zip(shown, [*shown[1:], count], strict=True):
+        found[index] = at[following] - at[index]
+    while len(shown) > 1 and found[shown[-1]] < shortest:
+        late = shown.pop()
+        found[shown[-1]] += found[late]
+        found[late] = 0
+    found[shown[0]] = max(found[shown[0]], shortest)
+    return found
+
+
+def runs(keys: Sequence[K], lengths: Iterable[int]) -> list[tuple[K, int]]:
+    """Neighbours with the same key as one, as long as all of them; those of length 0 are left out."""
+    found: list[tuple[K, int]] = []
+    for key, length in zip(keys, lengths, strict=True):
+        if length == 0:
+            continue
+        if found and found[-1][0] == key:
+            found[-1] = key, found[-1][1] + length
+        else:
+            found.append((key, length))
+    return found
+
+
+Kind = Literal["sequence", "gif", "webp", "apng", "video"]
+
+_VIDEO: Final[dict[str, Kind]] = dict.fromkeys((".mp4", ".m4v", ".mov", ".mkv", ".webm"), "video")
+ENCODED: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
+PICTURES: Final = frozenset({".gif", ".webp", ".apng"})
+"""Suffixes of animations that hold a single picture as well."""
+_NUMBER: Final = re.compile(r"%(0?\d{0,2})d")
+
+
+class TargetError(ValueError):
+    """A name that says nothing about the format, or cannot be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where an animation goes."""
+
+    kind: Kind  # how
+    path: Path  # the file; for a sequence the folder of its files
+    pattern: str = ""  # name of each file of a sequence, with `%04d` for its number
+
+    def file(self, frame: int) -> Path:
+        """The file of a frame of a sequence."""
+        parts = self.pattern.split("%%")
+        filled = [_NUMBER.sub(lambda found: f"{frame:{found[1] or 'd'}}", part) for part in parts]
+        return self.path / "%".join(filled)
+
+    def there(self) -> list[Path]:
+        """Files of a sequence, of any number, that are there."""
+        number = 1_234_567_890
+        head, tail = self.file(number).name.split(str(number))
+        named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
+        return [path for path in self.path.iterdir() if named.fullmatch(path.name)]
+
+    @property
+    def work(self) -> Path:
+        """The folder beside it where frames are kept while it is made."""
+        if self.kind == "sequence":
+            return self.path / f".{self.pattern}.frames"
+        return self.path.parent / f".{self.path.name}.frames"
+
+
+def is_pattern(out: str) -> bool:
+    """Whether a name has a place for a number: ``frame-%04d.png``."""
+    return "%" in Path(out).name and _NUMBER.search(Path(out).name.replace("%%", "")) is not None
+
+
+def is_animation(out: str) -> bool:
+    """Whether a name asks for an animation if the scene is one."""
+    return is_pattern(out) or Path(out).suffix.lower() in ENCODED
+
+
+def find_target(out: str, stem: str = "frame") -> Target:
+    """What ``out`` asks for: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
+
+    The files in a folder start with ``stem``. Raises `TargetError` where the name fits none of these, or its
+    folder is not there.
+    """
+    path = Path(out)
+    if is_pattern(out):
+        from scenelang.drawing.image import image_format
+
+        bare = path.name.replace("%%", "")
+        if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
+            raise TargetError(
+                f"`{path.name}` has more than one place for a number, or a stray `%` (write %%)"
+            )
+        try:
+            image_format(path)
+        except ValueError as error:
+            raise TargetError(str(error)) from None
+        _check_folder(path.parent, out)
+        return Target("sequence", path.parent, path.name)
+    if out.endswith(("/", "\\")) or path.is_dir():
+        if path.exists() and not path.is_dir():
+            raise TargetError(f"`{out}` is a file")
+        return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
+    kind = ENCODED.get(path.suffix.lower())
+    if kind is None:
+        raise TargetError(
+            f"`{out}` holds one picture; an animation goes to a file with one of the suffixes "
+            f"{', '.join(ENCODED)}, to "
+            "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
+        )
+    _check_folder(path.parent, out)
+    return Target(kind, path)
+
+
+def _check_folder(folder: Path, out: str) -> None:
+    if not folder.is_dir():
+        raise TargetError(f"cannot write `{out}`: there is no folder `{folder}`")
+
+
+_LOCK: Final = "lock"
+_FRAME: Final = re.compile(r"[0-9a-f]{40}(\.\w+){1,3}")
+_PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}(\.\w+){1,3}\.[0-9a-z]+\.part")
+"""What was half-written when a run was killed."""
+Pixels = npt.NDArray[np.uint8]
+Box = tuple[int, int, int, int]
+"""left, top, right, bottom; the last two exclusive."""
+
+
+class Busy(RenderError):
+    """Another process makes the same animation."""
+
+
+def frame_key(*parts: object) -> str:
+    """A digest, hex, of what decides a frame's pixels."""
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:40]
+
+
+class Store:
+    """A folder of frames, made if it is not there; while it is open no other process may use it.
+
+    The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
+
+    Raises:
+        Busy: another process has it.
+        RenderError: the folder, or what is locked in it, is a link.
+        OSError: the folder cannot be made.
+    """
+
+    def __init__(self, folder: Path, suffix: str = ".png") -> None:
+        self.folder, self.suffix = folder, suffix
+        self._made = [p for p in (folder, *folder.parents) if not p.exists()]
+        for place in (folder, folder / _LOCK):
+            if place.is_symlink():
+                raise RenderError(f"cannot keep frames in `{folder}`: `{place.name}` is a link")
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = os.fdopen(open_own(folder / _LOCK), "rb")
+        if lock(self._lock.fileno(), folder / _LOCK) is False:
+            self._lock.close()
+            raise Busy(f"another process is drawing into `{folder}`")
+        for part in self._named(_PASSING):
+            part.unlink()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None and not self._named(_FRAME):
+            self.remove()  # nothing worth keeping
+        self._lock.close()
+
+    def file(self, key: str) -> Path:
+        """Where the frame of a key lies, or will lie."""
+        return self.folder / f"{key}{self.suffix}"
+
+    def beside(self, key: str, number: int, suffix: str) -> Path:
+        """Where a file beside the frame of a key lies, of one number."""
+        return self.folder / f"{key}.{number}{suffix}"
+
+    def adopt(self, frame: Path, file: Path) -> None:
+        """Take a file that lies elsewhere, and stays there, for one of a frame."""
+        if not frame.exists() and not file.is_symlink():
+            try:
+                os.link(file, frame)
+            except OSError:  # the file system has no such links
+                write_whole(frame, file.read_bytes())
+
+    def has(self, key: str, size: tuple[int, int]) -> bool:
+        """Whether a frame is there, whole and of a size (width, height)."""
+        file = self.file(key)
+        if file.is_symlink() or not file.is_file():
+            return False
+        # Pillow has no base class for what its readers raise
+        with contextlib.suppress(Exception), pillow.open(file, formats=[image_format(file)]) as image:
+            if image.size == size:
+                image.load()
+                return True
+        return False
+
+    def remove(self) -> None:
+        """Take our files away, and where nothing else is there the folder and those that were made for it."""
+        for file in (*self._named(_FRAME), *self._named(_PASSING), self.folder / _LOCK):
+            with contextlib.suppress(OSError):
+                file.unlink()
+        self._lock.close()
+        for folder in (self.folder, *self._made[1:]):
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+
+    def _named(self, pattern: re.Pattern[str]) -> list[Path]:
+        with contextlib.suppress(FileNotFoundError):
+            return [self.folder / name for name in os.listdir(self.folder) if pattern.fullmatch(name)]
+        return []
+
+
+def put_frame(files: Mapping[Path, bytes]) -> None:
+    """Write the files of a frame, the first last: where that one is, the others are; links are replaced.
+
+    They are not flushed: a frame that a power cut damaged is drawn again.
+    """
+    for file, data in reversed(list(files.items())):
+        write_whole(file, data, flush=False)
+
+
+def deliver(part: Path, target: Path) -> None:
+    """Flush a finished file to the disk and rename it over ``target``, which stays as it was if it cannot."""
+    place = output_place(target)
+    with part.open("rb") as file:
+        os.fsync(file.fileno())
+    os.replace(part, place)
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Finished frames in the order in which they are shown; read from the disk one at a time."""
+
+    files: Sequence[Path]  # one for each frame; equal frames have the same
+    fps: float  # frames a second
+    loop: bool  # whether it starts again at its end
+    size: tuple[int, int]  # width and height in pixels
+    alpha: bool  # whether the pictures are transparent
+
+    def read(self, file: Path) -> Pixels:
+        """The pixels (H, W, 3 or 4) of a frame; raises `OSError` where its file is damaged."""
+        with pillow.open(file) as image:
+            pixels = np.asarray(image.convert("RGBA" if self.alpha else "RGB"))
+        if pixels.shape[:2] != (self.size[1], self.size[0]):
+            raise OSError(f"{file} has another size")
+        return pixels
+
+    def runs(self, lengths: Sequence[int]) -> Iterator[tuple[Pixels, int]]:
+        """Pictures that differ from their neighbours, and how long each is shown."""
+        for file, length in runs(self.files, lengths):
+            yield self.read(file), length
+
+
+def changed(before: Pixels | None, now: Pixels) -> Box:
+    """The smallest box around all pixels that differ; one pixel where none does."""
+    height, width = now.shape[:2]
+    if before is None:
+        return 0, 0, width, height
+    differs = (before != now).any(axis=2)
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+Encoder = Callable[[Film, Path, Callable[[float], None]], None]
+"""Writes a film to a file in one format, and says which share of it is done."""
+
+
+STILL = Animation(seconds=1.0, fps=1.0)
+"""What a scene without ``animate`` is: one frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One frame."""
+
+    number: int  # from 0
+    scene: Scene  # evaluated
+    spans: SpanMap  # where its nodes were written
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Frames that are Scenes already."""
+
+    scenes: tuple[Scene, ...]  # at least one
+    fps: float | None = None  # frames a second; None for those of the first scene's animation
+    wanted: tuple[Path, ...] = ()
+
+    @property
+    def animates(self) -> bool:
+        return len(self.scenes) > 1
+
+    @property
+    def animation(self) -> Animation:
+        """How long they last; raises `ValueError` where nothing says how fast, or their canvases differ."""
+        if len({scene.canvas for scene in self.scenes}) > 1:
+            raise ValueError("scenes with several canvases, where size says one for all")
+        first, count = self.scenes[0].animation, len(self.scenes)
+        fps = self.fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
+        if fps is None:
+            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
+        return Animation(count / fps, fps, first.loop if first is not None else True)
+
+    def run(self, number: int) -> tuple[Scene, SpanMap]:
+        return self.scenes[number], SpanMap()
+
+
+class Clip:
+    """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
+
+    Args:
+        source: the scene, one that is prepared, or its frames.
+        diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
+        fps: frames a second, instead of those of the first Scene's animation.
+        reuse: keep what frames share; without it each frame is worked out by itself.
+
+    Raises:
+        SceneError: the scene's file is not text.
+        OSError: it cannot be opened.
+    """
+
+    def __init__(
+        self,
+        source: Source | Evaluation | tuple[Scene, ...],
+        diagnostics: Diagnostics | None = None,
+        *,
+        fps: float | None = None,
+        reuse: bool = True,
+    ) -> None:
+        self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
+        self.reuse = reuse
+        self._evaluation: Evaluation | Given = (
+            source.evaluation(self.diagnostics, replays=reuse)
+            if isinstance(source, Source)
+            else Given(source, fps)
+            if isinstance(source, tuple)
+            else source
+        )
+        self._last: tuple[Shot, Program] | None = None
+        self._memory = Memory() if reuse else None
+        self.wanted = self._evaluation.wanted
+        """All files that it imports, also those that are not there."""
+
+    @cached_property
+    def first(self) -> Shot:
+        """The first frame, which every scene has; raises `SceneError` if it has errors."""
+        return self.shot(0)
+
+    @property
+    def animates(self) -> bool:
+        """Whether the scene has ``animate(…)``."""
+        return self._evaluation.animates
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What its files hold."""
+        given = self._evaluation
+        return () if isinstance(given, Given) else tuple(source.text for source in given.sources)
+
+    @property
+    def animation(self) -> Animation:
+        """Length, frames a second and whether it is a loop."""
+        if isinstance(self._evaluation, Given):
+            return self._evaluation.animation
+        return self.first.scene.animation or STILL
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, at least 1."""
+        given = self._evaluation
+        return len(given.scenes) if isinstance(given, Given) else self.animation.frames
+
+    def numbers(self, frames: FrameRange) -> range:
+        """The numbers of the frames that are asked for; raises `SceneError` where some are not there."""
+        animation = self.animation
+        try:
+            return frames.among(animation.frames)
+        except FramesError as error:
+            count = plural(animation.frames, "frame")
+            help = f"{animation.seconds:g} s at {animation.fps:g} frames a second make {count}"
+            self.diagnostics.add("E0337", str(error), None, help=help)
+            raise SceneError(self.diagnostics) from None
+
+    def shot(self, number: int) -> Shot:
+        """Evaluate a frame; raises `SceneError` if it has errors."""
+        scene, spans = self._evaluation.run(number)
+        if scene is None or self.diagnostics.errors:
+            raise SceneError(self.diagnostics)
+        return Shot(number, scene, spans)
+
+    def program(self, shot: Shot) -> Program:
+        """Compile a frame; raises `SceneError`, or `FileNotFoundError` where the model has no weights."""
+        from scenelang.compiler.compile import compile_scene
+
+        if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
+            return self._last[1]
+        program = compile_scene(
+            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory
+        )
+        self._last = shot, program
+        return program

@@ -1,0 +1,364 @@
+"""Frames to pictures: in this process, in others, and on the workers of a cluster.
+
+Each is a plain ``python -m scenelang.output.painting`` that gets compiled Programs through a pipe, and
+ends when its pipe does, so that none outlives this process. Processes of `concurrent.futures` would run an
+embedder's main module again, and stay behind where this one is killed.
+
+Programs go out as bytes, with the elements and textures that they draw, and files come back as bytes: no file
+system is shared.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from scenelang.compiler.program import Program, program_bytes
+from scenelang.drawing.how import DEFAULT, How, RenderError
+from scenelang.drawing.neural.draw import Kept
+from scenelang.output.frames import Clip, Shot, frame_key, put_frame
+from scenelang.output.workers import AHEAD, Link
+
+if TYPE_CHECKING:
+    from distributed import Future as Task
+
+    from scenelang.drawing.image import Image, Output
+
+
+DRAFT = 4  # pixels across that one of a draft stands for
+Progress = Callable[[float], None]
+_version = lru_cache(version)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawable:
+    """A frame ready to be drawn."""
+
+    number: int  # from 0
+    key: str  # digest of all that decides its pixels
+    shot: Shot  # the frame
+    program: Program | None  # what the network draws; None for the reference
+    place: str = "cpu"  # who draws it: numpy, or a torch device
+
+
+@dataclass(slots=True)
+class Painter:
+    """Draws a clip's frames."""
+
+    clip: Clip  # the animation
+    how: How = DEFAULT  # how they are drawn
+    # the picture before, of which what is the same is taken over
+    kept: Kept | None = field(default=None, repr=False)
+    outputs: tuple[Output, ...] = ()  # beside each picture
+    single: bool = False  # draw each as it is drawn by itself: small ones by numpy
+    load_s: float = 0.0  # what loading torch took
+
+    def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
+        """Compile a frame and say what its files depend on; raises as `Clip.program`, or `RenderError`.
+
+        Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
+        """
+        found = self._picture(shot, single or self.single)
+        if not self.outputs:
+            return found
+        # they tell of each object which it is and where it was written
+        program = found.program
+        places: tuple[object, ...] = (self.clip.texts,)
+        if program is not None:
+            places = program.numbers, program.objects, program.places
+        return replace(found, key=frame_key(found.key, self.outputs, *places))
+
+    def _picture(self, shot: Shot, single: bool) -> Drawable:
+        if self.how.backend == "reference":
+            scene = shot.scene.model_copy(update={"animation": None})
+            key = frame_key("reference", _version("scenelang"), scene.to_json())
+            return Drawable(shot.number, key, shot, None)
+        program = self.clip.program(shot)
+        place = self._place(program, single)
+        library = place if place == "numpy" else "torch"
+        cores = () if place == "numpy" and program.stage is None else (self.split(program),)
+        way = self.how.backend, *self.how.care.values()
+        key = frame_key(place, _version("scenelang"), _version(library), *way, *cores, program.digest())
+        return Drawable(shot.number, key, shot, program, place)
+
+    def _place(self, program: Program, single: bool) -> str:
+        """The library or device that draws a Program: numpy, or a torch device."""
+        how = self.how
+        if single or program.stage is not None or how.backend == "exact":
+            from scenelang.drawing.small import choose_drawer
+
+            drawer = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+            if drawer.library == "numpy":
+                return "numpy"
+        started = time.perf_counter()
+        from scenelang.drawing.torch_backend import choose_device
+
+        self.load_s += time.perf_counter() - started
+        return choose_device(how.device)
+
+    def split(self, program: Program) -> int:
+        """How many threads a picture is split for, which shows in the last bits of its pixels."""
+        if self.how.threads is not None:
+            return self.how.threads
+        from scenelang.drawing.how import threads_for
+
+        return threads_for(program.canvas)
+
+    def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
+        """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
+        if frame.program is None:
+            from scenelang.drawing.render import draw_exact
+
+            return draw_exact(frame.shot.scene, spans=frame.shot.spans)
+        from scenelang.drawing.neural.draw import Kept
+        from scenelang.drawing.render import draw
+
+        if self.kept is None and self.clip.reuse:
+            self.kept = Kept()
+        split = self.split(frame.program)
+        how = self.how._replace(threads=split)
+        return draw(
+            frame.program, how, place=frame.place, split=split, kept=self.kept, progress=progress
+        ).image
+
+    def draft(self, frame: Drawable) -> Image | None:
+        """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
+        program = frame.program
+        if program is None or program.stage is None or min(program.canvas) < DRAFT * DRAFT:
+            return None
+        from scenelang.drawing.image import enlarged
+        from scenelang.drawing.small import draw_small
+
+        width, height = program.canvas
+        coarse = replace(program, canvas=(-(-width // DRAFT), -(-height // DRAFT)))
+        return enlarged(draw_small(coarse, samples="one", threads=self.how.threads).image, program.canvas)
+
+    def files(self, frame: Drawable, file: Path, progress: Progress | None = None) -> dict[Path, bytes]:
+        """What the picture's file holds and those of its outputs; raises as `scenelang.render_outputs`."""
+        from scenelang.drawing.image import packed
+        from scenelang.drawing.render import outputs_of
+
+        shot, drawn = frame.shot, frame.program or frame.shot.scene
+        found = outputs_of(drawn, self.outputs, self.how, spans=shot.spans)
+        return packed(self.draw(frame, progress), found, file)
+
+
+class Errand(NamedTuple):
+    """A frame that another process draws, by one thread; its fields are what JSON holds."""
+
+    file: str  # where its picture goes, which names the format
+    place: str  # numpy, or a torch device
+    split: int  # threads that the picture is split for
+    outputs: tuple[Output, ...] = ()  # beside it
+    how: How = DEFAULT  # how it is drawn
+
+    def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
+        """What the files of a Program's bytes hold; raises as `scenelang.render_outputs`."""
+        from scenelang.compiler.program import parse_program
+        from scenelang.drawing.image import packed
+        from scenelang.drawing.render import draw, outputs_of
+
+        read, how = parse_program(program), How(*self.how)._replace(threads=1)
+        image = draw(read, how, place=self.place, split=self.split, kept=kept).image
+        return packed(image, outputs_of(read, self.outputs, how), Path(self.file))
+
+
+FRAMES_AHEAD = 2  # frames that wait for each process, so that none is idle and few are held
+
+
+class Workers:
+    """Processes that draw Programs into files, each with one thread."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._free: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
+        # in sessions of their own: Ctrl-C reaches this process alone, which ends the others
+        command, pipe = [sys.executable, "-m", "scenelang.output.painting"], subprocess.PIPE
+        self._all = [
+            subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True) for _ in range(count)
+        ]
+        for process in self._all:
+            self._free.put(process)
+        self._pool = ThreadPoolExecutor(count)
+        self._waiting: deque[Future[None]] = deque()
+
+    @property
+    def waiting(self) -> int:
+        """Frames that are asked for and not known to be done."""
+        while self._waiting and self._waiting[0].done():
+            self.take()
+        return len(self._waiting)
+
+    def submit(self, program: Program, errand: Errand) -> None:
+        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
+        while len(self._waiting) >= FRAMES_AHEAD * self.count:
+            self.take()
+        self._waiting.append(self._pool.submit(self._draw, program_bytes(program), errand))
+
+    def take(self) -> None:
+        """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
+        self._waiting.popleft().result()
+
+    def _draw(self, program: bytes, errand: Errand) -> None:
+        process = self._free.get()
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            head = {"errand": errand._replace(file=os.path.abspath(errand.file)), "bytes": len(program)}
+            try:
+                process.stdin.write(json.dumps(head).encode() + b"\n" + program)
+                process.stdin.flush()
+                said = process.stdout.readline()
+            except OSError:
+                said = b""
+            if not said:
+                code = process.wait()
+                raise RenderError(f"a drawing process ended by itself (code {code}); --jobs 1 needs none")
+            answer = json.loads(said)
+            if "errno" in answer:
+                raise OSError(answer["errno"], answer["error"], answer["file"])
+            if "error" in answer:
+                raise RenderError(answer["error"])
+        finally:
+            self._free.put(process)
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing."""
+        for future in self._waiting:
+            future.cancel()
+        for process in self._all:
+            process.kill()
+        self._pool.shutdown()
+        for process in self._all:
+            process.communicate()
+
+
+def main() -> None:
+    """Read a line of JSON and a Program, draw, answer in a line, until the input ends."""
+    # Answers go where standard output went; whatever prints goes to standard error.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    kept, source = Kept(), sys.stdin.buffer
+    while line := source.readline():
+        head = json.loads(line)
+        program = source.read(head["bytes"])
+        if len(program) < head["bytes"]:
+            return
+        try:
+            answers.write(json.dumps(_answer(head, program, kept)).encode() + b"\n")
+            answers.flush()
+        except BrokenPipeError:  # whoever asked is gone
+            os._exit(0)
+
+
+def _answer(head: dict[str, Any], program: bytes, kept: Kept) -> dict[str, Any]:
+    errand = Errand(*head["errand"])
+    try:
+        put_frame(errand.run(program, kept))
+    except RenderError as error:
+        return {"error": str(error)}
+    except OSError as error:
+        return {"error": error.strerror or str(error), "errno": error.errno or 5, "file": errand.file}
+    return {}
+
+
+if __name__ == "__main__":
+    main()
+
+
+BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
+MOST_BATCH: Final = 64
+MOST_BYTES: Final = 4 << 20  # of Programs in a batch, where elements make them large
+_local = threading.local()
+
+
+class Cluster:
+    """The workers of a scheduler that draw frames, as `Helpers`; arguments and errors are those of `Link`."""
+
+    def __init__(self, address: str) -> None:
+        self._link = Link(address)
+        self.batches = 0  # sent so far
+        self._batch: list[tuple[bytes, Errand]] = []
+        self._each_s = BATCH_S  # a frame, as far as is known
+        self._under_way: dict[Task[Any], list[Errand]] = {}
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return self._link.count
+
+    @property
+    def waiting(self) -> int:
+        """Frames that are asked for and not known to be done."""
+        while self._under_way and self._link.ready:
+            self._receive()
+        return len(self._batch) + sum(map(len, self._under_way.values()))
+
+    def submit(self, program: Program, errand: Errand) -> None:
+        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
+        self._batch.append((program_bytes(program), errand))
+        large = sum(len(data) for data, _ in self._batch) > MOST_BYTES
+        if large or len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
+            while len(self._under_way) >= AHEAD * self.count:
+                self._receive()
+            self._send()
+
+    def take(self) -> None:
+        """Send what waits for others to travel with, and write what comes back next.
+
+        Raises:
+            RenderError: it cannot be drawn, several workers ended over it, or the scheduler is gone.
+            OSError: a file cannot be written.
+        """
+        self._send()
+        self._receive()
+
+    def close(self) -> None:
+        """Call off what is under way."""
+        self._link.close()
+
+    def _receive(self) -> None:
+        future = self._link.next()
+        errands = self._under_way.pop(future)
+        seconds, found = self._link.result(future)
+        self._each_s = 0.5 * (self._each_s + seconds / len(errands))
+        for errand, files in zip(errands, found, strict=True):
+            folder = Path(errand.file).parent
+            put_frame({folder / name: data for name, data in files.items()})
+
+    def _send(self) -> None:
+        if self._batch:
+            self._under_way[self._link.send(draw_batch, self._batch)] = [errand for _, errand in self._batch]
+            self._batch, self.batches = [], self.batches + 1
+
+
+def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
+    """Draw Programs on this machine: the processor's seconds, and the files of each by their names.
+
+    Args:
+        batch: bytes of Programs, and what is asked of them.
+
+    Raises:
+        RenderError: one cannot be drawn.
+    """
+    from scenelang.drawing.neural.draw import Kept
+
+    kept = _local.__dict__.setdefault("kept", Kept())
+    started = time.process_time()  # others on this machine do not make batches smaller
+    found = [
+        {file.name: data for file, data in errand.run(program, kept).items()} for program, errand in batch
+    ]
+    return time.process_time() - started, found

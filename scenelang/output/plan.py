@@ -1,0 +1,198 @@
+"""What drawing a scene takes, before and after each rewrite, and what was left out: no more than it needs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from scenelang.compiler.choose import why_chosen
+from scenelang.compiler.graph import Fold, Graph, nodes
+from scenelang.compiler.groups import OPERATOR
+from scenelang.compiler.lower import Spans, lower
+from scenelang.compiler.manifest import Manifest, available, load_manifest
+from scenelang.compiler.program import Program
+from scenelang.compiler.steps import Affine
+from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.image import Image
+from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
+from scenelang.drawing.neural.draw import Drawing
+from scenelang.drawing.neural.load import Model, place_of
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.solid.march import Work
+from scenelang.drawing.torch_backend import draw_program
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.scene import Scene
+from scenelang.language.words import TOKENS
+
+REPEATS = 3
+
+
+def token_counts(tokens: Iterable[int]) -> dict[str, int]:
+    """How many rows join by each word, of the words in use."""
+    values = list(tokens)
+    return {word: values.count(value) for word, value in TOKENS.items() if value in values}
+
+
+def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
+    """Sizes after ``lower`` and each pass, and whether the pass changed anything.
+
+    Returns:
+        Of each stage ``objects`` (leaves), ``matrices`` (affine maps and deformations on leaves and folds:
+        each is one matrix of the lifting), of these ``affines`` and ``deformations``, ``folds`` (groups,
+        chains and boolean nodes) and ``tokens`` (children of folds by the word that joins them, of the words
+        in use).
+    """
+    out: list[dict[str, Any]] = []
+    before: Graph | None = None
+    for name, graph in graphs.items():
+        found = list(nodes(graph.root))
+        folds = [node for node in found if isinstance(node, Fold)]
+        steps = [move.step for node in found for move in node.moves]
+        affines = sum(isinstance(step, Affine) for step in steps)
+        out.append(
+            {
+                "stage": name,
+                "objects": len(found) - len(folds),
+                "matrices": len(steps),
+                "affines": affines,
+                "deformations": len(steps) - affines,
+                "folds": len(folds),
+                "tokens": token_counts(TOKENS[link.op] for fold in folds for link in fold.links),
+                "changed": before is not None and graph != before,
+            }
+        )
+        before = graph
+    return out
+
+
+def plan_of(
+    scene: Scene,
+    program: Program,
+    graphs: Mapping[str, Graph],
+    model: Model,
+    *,
+    asked: bool = False,
+    spans: Spans | None = None,
+    threads: int = 1,
+) -> dict[str, Any]:
+    """What `choice` and `drawing_cost` say, the `stages`, and the rows and tokens of the stream."""
+    return {
+        **choice(scene, program.model, asked),
+        "stages": stages(graphs),
+        "rows": len(program),
+        "tokens": token_counts((program.tokens & OPERATOR).tolist()),
+        "drawing": drawing_cost(scene, program, model, spans, threads),
+    }
+
+
+def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
+    """Which model draws a scene, why (the command line ``asked`` for it), and what would have been next."""
+    others = [load_manifest(name) for name in available() if name != chosen]
+    refused = {model.name: refusals(scene, model) for model in others}
+    able = [model for model in others if not refused[model.name]]
+    runner_up = min(able, key=lambda model: (model.flip(), model.name), default=None)
+    return {
+        "model": chosen,
+        "why": why_chosen(scene, asked),
+        "runner_up": runner_up.name if runner_up else None,
+        "lacking": {name: facts for name, facts in refused.items() if facts},
+    }
+
+
+def refusals(scene: Scene, manifest: Manifest) -> list[str]:
+    """What a model cannot draw of a scene, as messages, each once."""
+    lower(scene, manifest, None, found := Diagnostics())
+    return list(dict.fromkeys(error.message for error in found.errors))
+
+
+def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
+    """The exact picture of a scene over its background, names as a model knows them.
+
+    ``per_side`` is samples along each side of a pixel; 2 is the definition.
+    """
+    graph = lower(scene, manifest, spans, Diagnostics())
+    if not graph.elements:
+        return reference_image(graph, per_side=per_side)
+    from scenelang.drawing.exact.originals import originals_of
+
+    return reference_image(graph, per_side=per_side, brought=originals_of(scene, graph))
+
+
+def drawing_cost(
+    scene: Scene, program: Program, model: Model, spans: Spans | None = None, threads: int = 1
+) -> dict[str, Any]:
+    """Draw a Program of a scene and say what it took and how far it is off.
+
+    Returns:
+        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), what `_meetings` or `_rays` say,
+        ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
+        (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
+    """
+    by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
+
+    def draw() -> Drawing:
+        return (
+            draw_small(program, threads=threads)
+            if by_numpy
+            else draw_program(program, model, threads=threads)
+        )
+
+    drawing = draw()
+    times = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        drawing = draw()
+        times.append(1000 * (time.perf_counter() - started))
+    own, unknown = over_white(drawing.image), None
+    try:
+        exact = over_white(reference_of(scene, model.manifest, spans=spans))
+    except ValueError as error:
+        exact, unknown = None, str(error)
+    return {
+        "pixels": program.canvas[0] * program.canvas[1],
+        "refined": drawing.refined,
+        **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
+        "ms": round(min(times), 2),
+        "psnr": None if exact is None else round(min(MOST_DB, psnr(own, exact)), 2),
+        "flip": None if exact is None else _flip(own, exact),
+        "unknown": unknown,
+        "parameters": sum(p.numel() for p in model.network.parameters()),
+    }
+
+
+def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int]:
+    """In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
+    ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
+    every object)."""
+    samples = program.canvas[0] * program.canvas[1] + 4 * drawing.refined
+    if model.manifest.renderer != "framed":  # which take every sample, and meet every object there
+        samples = drawing.pairs // max(1, len(program))
+    return {
+        "evaluated": drawing.met,
+        "samples": samples,
+        "meetings": drawing.pairs,
+        "meetings_unskipped": samples * len(program),
+    }
+
+
+def _rays(work: Work) -> dict[str, int]:
+    """In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the light, how many of
+    both came ``near`` an object, their ``steps`` (points at which the field was asked) and ``evaluations``
+    (an object's network at a point)."""
+    return {
+        "rays": work.rays,
+        "light_rays": work.lights,
+        "near": work.near,
+        "steps": work.steps,
+        "evaluations": work.met,
+    }
+
+
+def _flip(picture: np.ndarray, exact: np.ndarray) -> float | None:
+    try:
+        return round(flip(picture, exact), 5)
+    except ImportError:
+        return None

@@ -1,0 +1,279 @@
+"""The workers of a dask cluster: a connection to them, and that they give what this machine does.
+
+Dask sends functions of ours by their names, and what they take and give by pickle, so that whoever reaches a
+scheduler runs code on its workers; what is sent are bytes of files and plain data.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
+from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from scenelang.compiler.manifest import ROOT as MODELS
+from scenelang.drawing.how import RenderError, usable_cores
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+
+LOCAL: Final = "local"
+AHEAD: Final = 3  # tasks under way for each worker
+LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, and what is in them
+_LARGE: Final = "distributed.admin.large-graph-warning-threshold"  # bytes that it warns of
+WAIT_S: Final = 30.0  # for a scheduler to answer, and for workers
+_END_S: Final = 2.0  # for workers of this machine to end by themselves
+_HARMLESS: Final = ("python", "processor")
+"""What differs without a difference in pixels, or with one of 1/255 at most."""
+_NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
+K = TypeVar("K")
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class GivenUp(RenderError):
+    """Several workers ended over something that was sent, one after another."""
+
+
+class Link:
+    """A connection to workers that give what this machine does.
+
+    Args:
+        address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
+            machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
+        libraries: packages whose versions count, besides those that draw.
+
+    Raises:
+        RenderError: there is no dask, no scheduler or no worker, or a worker would give something else.
+    """
+
+    def __init__(self, address: str, libraries: tuple[str, ...] = ()) -> None:
+        try:
+            import dask
+            import distributed
+        except ModuleNotFoundError:
+            raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
+        for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        dask.config.set({LOGGED: 1, _LARGE: 1 << 40})  # else what was sent stays in memory, and is warned of
+        self.address = address
+        self._libraries = libraries
+        self._own: _Local | None = None
+        try:
+            if address.partition(":")[0] == LOCAL:
+                self._own = _Local(address)
+            where = self._own.address if self._own else address
+            # in two steps, as one that does not come about has to be closed too: it would hold up the end
+            self._client: Client = distributed.Client.__new__(distributed.Client)
+            self._client.__init__(where, timeout=WAIT_S, set_as_default=False)  # type: ignore[misc]
+            self._client.wait_for_workers(self._own.count if self._own else 1, timeout=WAIT_S)
+        except (OSError, TimeoutError, TypeError, ValueError) as error:  # TypeError: no certificates
+            self.close()
+            raise RenderError(f"no scheduler with workers at `{address}`: {_told(error)}") from None
+        try:
+            self._first = self._compare()
+        except BaseException:
+            self.close()
+            raise
+        self._done = distributed.as_completed(loop=self._client.loop)
+
+    @property
+    def count(self) -> int:
+        """Workers that there were a few seconds ago."""
+        known: int = self._client._scheduler_identity.get("n_workers", 0)  # asking would wait for an answer
+        return known or self._first
+
+    @property
+    def ready(self) -> bool:
+        """Whether `next` need not wait."""
+        return bool(self._done.has_ready())
+
+    def send(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Have a function of ours called by a worker, after it has compared fingerprints."""
+        ours = self._libraries, fingerprint(self._libraries)
+        future = self._client.submit(_checked, *ours, function, *arguments, pure=False)
+        self._done.add(future)
+        return future
+
+    def next(self) -> Future[Any]:
+        """What was sent and is done next."""
+        return next(self._done)
+
+    def result(self, future: Future[Any]) -> Any:
+        """What something gave that is done; raises what it raised.
+
+        Raises:
+            GivenUp: several workers ended over it.
+            RenderError: the scheduler is gone.
+        """
+        from distributed.comm.core import CommClosedError
+        from distributed.scheduler import KilledWorker
+
+        try:
+            return future.result()
+        except KilledWorker as error:
+            raise GivenUp(f"given up: {error.allowed_failures + 1} workers ended over it") from None
+        except (CancelledError, CommClosedError, TimeoutError):
+            raise RenderError(
+                f"the scheduler at `{self.address}` is gone; the same command goes on with what is left"
+            ) from None
+
+    def close(self) -> None:
+        """Call off what is under way; workers of this machine end."""
+        with contextlib.suppress(Exception):  # there may be none yet, or none any more
+            self._client.close(timeout=2)
+        if self._own is not None:
+            self._own.close()
+
+    def _compare(self) -> int:
+        """How many workers there are; raises `RenderError` where one would give something else."""
+        found = self._client.run(look, self._libraries, on_error="return")
+        for address, theirs in found.items():
+            if not isinstance(theirs, dict):
+                raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
+            fatal, harmless = differences(fingerprint(self._libraries), theirs)
+            if fatal:
+                raise RenderError(f"worker {address} has {fatal[0]}")
+            for fact in harmless:
+                logging.getLogger("scenelang").warning("worker %s has %s", address, fact)
+        return len(found)
+
+
+def by_workers(
+    address: str,
+    function: Callable[[T], R],
+    items: Iterable[tuple[K, T]],
+    libraries: tuple[str, ...] = (),
+) -> Iterator[tuple[K, Callable[[], R]]]:
+    """A function of ours on many items, by workers.
+
+    Args:
+        address, libraries: as for `Link`.
+        items: what the function takes, each with a name; the next is asked for when it can be sent.
+
+    Yields:
+        The names, in whatever order items are done, and what gives a result, or raises as `Link.result`; it
+        is to be called before the next is asked for.
+
+    Raises:
+        RenderError: as `Link`.
+    """
+    link = Link(address, libraries)
+    under_way: dict[Future[Any], K] = {}
+
+    def taken() -> tuple[K, Callable[[], R]]:
+        future = link.next()
+        return under_way.pop(future), partial(link.result, future)
+
+    try:
+        for name, item in items:
+            under_way[link.send(function, item)] = name
+            while under_way and (link.ready or len(under_way) >= AHEAD * link.count):
+                yield taken()
+        while under_way:
+            yield taken()
+    finally:
+        link.close()
+
+
+class _Local:
+    """A scheduler in this process and a worker for each core, which listen to this machine alone.
+
+    Workers are plain processes: those that dask starts by itself run an embedder's main module again.
+    """
+
+    def __init__(self, address: str) -> None:
+        from distributed import LocalCluster
+
+        port = address.partition(":")[2]
+        self._cluster = LocalCluster(
+            n_workers=0,
+            host="127.0.0.1",
+            dashboard_address=f"127.0.0.1:{int(port)}" if port else None,
+            silence_logs=logging.CRITICAL,
+        )
+        self.address: str = self._cluster.scheduler_address
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", self.address, "--host", "127.0.0.1"]
+        command += ["--nthreads", "1", "--dashboard-address", "127.0.0.1:0", "--death-timeout", "10"]
+        quiet = subprocess.DEVNULL
+        self.count = usable_cores()
+        self._workers = [
+            subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
+            for _ in range(self.count)
+        ]
+
+    def close(self) -> None:
+        """End all of it; dask would let tasks of seconds come to their end."""
+        for worker in self._workers:
+            worker.terminate()
+        latest = time.monotonic() + _END_S
+        for worker in self._workers:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                worker.wait(max(0.0, latest - time.monotonic()))
+            worker.kill()  # what it began ends with it
+            worker.wait()
+        self._cluster.close()
+
+
+def _told(error: object) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+# ---------------------------------------------------------------- what runs on workers
+
+
+def _checked(
+    libraries: tuple[str, ...], ours: dict[str, str], function: Callable[..., Any], *arguments: Any
+) -> Any:
+    """Call a function where the fingerprint of who asks is that of this machine."""
+    fatal, _ = differences(ours, fingerprint(libraries))
+    if fatal:
+        raise RenderError(f"a worker has {fatal[0]}")
+    return function(*arguments)
+
+
+@cache
+def fingerprint(libraries: tuple[str, ...] = ()) -> dict[str, str]:
+    """What decides results on this machine: versions, digests of the code and of each model's weights.
+
+    Args:
+        libraries: packages whose versions are wanted too.
+    """
+    found = {"python": platform.python_version(), "processor": platform.machine()}
+    for name in (*_NEEDED, *libraries):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "none"
+    package = MODELS.parent
+    code = hashlib.sha256()
+    for file in sorted(package.rglob("*.py")):
+        code.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
+    found["scenelang's code"] = code.hexdigest()[:12]
+    for weights in sorted(MODELS.glob("*/weights.safetensors")):
+        found[f"weights of {weights.parent.name}"] = hashlib.sha256(weights.read_bytes()).hexdigest()[:12]
+    return found
+
+
+def look(libraries: tuple[str, ...] = ()) -> dict[str, str]:
+    """The fingerprint of the machine where it is called."""
+    return fingerprint(libraries)
+
+
+def differences(ours: dict[str, str], theirs: dict[str, str]) -> tuple[list[str], list[str]]:
+    """What a worker has otherwise, in words: what changes results, and what hardly does."""
+    found: tuple[list[str], list[str]] = [], []
+    for name in sorted(ours.keys() | theirs.keys()):
+        here, there = ours.get(name, "none"), theirs.get(name, "none")
+        if here != there:
+            found[name in _HARMLESS].append(f"{name} {there}, where {here} is here")
+    return found

@@ -1,1 +1,0 @@
-"""Definitions and their uses, found without running anything."""

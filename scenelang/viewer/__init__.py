@@ -1,1 +1,0 @@
-"""Scenes drawn in a browser: a view of a scene, the shader that draws it, and the page around it."""

@@ -1,1 +1,0 @@
-"""Drawing a scene again on each save: `screen` shows what came of it, `picture` draws and waits."""

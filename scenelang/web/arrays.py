@@ -1,0 +1,264 @@
+"""What a page gets beside its form: scripts, arrays, grids, and Programs as rows.
+
+The files of ``web/`` are ES modules for the sake of editors and tests. A page gets them one after the other
+in one scope, without their imports and exports, so names at their top level differ across all of them.
+
+They are named in the data as ``[kind, offset, count]``, with a kind of `KINDS`, an offset in bytes into the
+blob, a multiple of 4, and a count of numbers.
+
+The page unfolds pyramids itself (``web/grids.js``): its steps are a fifth of the grid, deflated.
+
+The page's own evaluator (``web/graph.js``) makes rows of a scene; rows of a Program never change.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+from collections.abc import Iterable
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.element import Element
+from scenelang.assets.picture import texels
+from scenelang.assets.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, has_finer, unpacked
+from scenelang.assets.tensors import TensorError
+from scenelang.compiler.groups import OPERATOR, widths_of
+from scenelang.compiler.lifting import LAYOUTS, Layout
+from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.compiler.spaces import Stage
+from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.solid.passes import read_solid_frame
+
+MODULES: Final = (
+    *("store", "gl", "grids", "groups", "ways", "plane"),
+    *("values", "functions", "maps", "looks", "chain", "graph", "stage"),
+    *("eye", "expressions", "evaluate"),
+    *("elements", "balls", "solid"),
+    *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
+)
+"""Of ``web/``; each stands behind what it imports."""
+
+_IMPORT: Final = re.compile(r'^import \{[^}]*\} from "[^"]*";\n', re.MULTILINE)
+_EXPORT: Final = re.compile(r"^export (?=(?:async )?(?:function|class|const)\b)", re.MULTILINE)
+
+
+@cache
+def script() -> str:
+    """All of it, to stand in a function or a module."""
+    return "\n".join(_EXPORT.sub("", _IMPORT.sub("", web(f"{name}.js"))) for name in MODULES)
+
+
+def web(name: str) -> str:
+    """The text of a file of ``web/``."""
+    return files("scenelang").joinpath("web/viewer", name).read_text("utf-8")
+
+
+KINDS: Final = {
+    "float32": "f32",
+    "int8": "i8",
+    "uint8": "u8",
+    "int16": "i16",
+    "uint16": "u16",
+    "int32": "i32",
+}
+
+
+class Store:
+    """Arrays one after the other, as they lie in the blob."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, array: np.ndarray) -> list[Any]:
+        """Take in an array of a dtype of `KINDS` and return what names it in the data."""
+        data = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
+        name = [KINDS[array.dtype.name], self._size, array.size]
+        self._parts.append(data + bytes(-len(data) % 4))
+        self._size += len(self._parts[-1])
+        return name
+
+    def bytes(self) -> bytes:
+        """The blob."""
+        return b"".join(self._parts)
+
+
+def packed(data: bytes) -> str:
+    """Deflated (zlib), in base64."""
+    return base64.b64encode(zlib.compress(data, 9)).decode()
+
+
+def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
+    """Entries of a view's ``shapes`` for the geometries among elements.
+
+    Raises:
+        ProgramError: one is damaged.
+    """
+    return [_shape(element, store) for element in elements if not element.material]
+
+
+def paints_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
+    """Entries of a view's ``paints`` for the materials among elements; raises as `shapes_of`."""
+    worn = [element for element in elements if element.material]
+    return [(_picture if element.form == "picture" else _colours)(element, store) for element in worn]
+
+
+def _shape(element: Element, store: Store) -> dict[str, Any]:
+    return {
+        "name": element.name,
+        "kind": "grid",
+        "dimension": element.dimension,
+        "sides": element.sides,
+        "finest": len(unpacked(element)),
+        "steps": store.add(_steps(element)),
+        "codec": {
+            **{"fine": FINE, "far": FAR, "first": FIRST, "farthest": FARTHEST},
+            **{"finer": FINER, "near": NEAR if has_finer(element) else 0.0},
+        },
+        "bounds": bounds_of(element) if element.dimension == 2 else None,
+    }
+
+
+@lru_cache(maxsize=32)
+def bounds_of(element: Element) -> tuple[float, float, float]:
+    """Of an element of the plane x, y and r: it is no nearer than |q.x| - x, |q.y| - y and |q| - r."""
+    grid = unpacked(element)
+    axis = np.linspace(-1.0, 1.0, len(grid))
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    # a cell's distances lie between those of its nodes, and beyond the square they grow as the way out does
+    least = np.min([grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]], 0)
+    most = [np.maximum(length[:-1, :-1], length[1:, 1:]) for length in (abs(x), abs(y))]
+    found = [float((length - least).max()) for length in (*most, np.hypot(*most))]
+    return max(found[0], 1.0), max(found[1], 1.0), max(found[2], 2.0**0.5)
+
+
+def _picture(element: Element, store: Store) -> dict[str, Any]:
+    try:
+        colours = texels(element)
+    except TensorError as error:
+        raise ProgramError(str(error)) from None
+    high, wide = element.sizes
+    return {
+        "name": element.name,
+        "kind": "picture",
+        "wide": wide,
+        "high": high,
+        "texels": store.add(np.rint(colours * 255).astype(np.uint8).reshape(-1)),
+    }
+
+
+def _colours(element: Element, store: Store) -> dict[str, Any]:
+    return {
+        "name": element.name,
+        "kind": "colours",
+        "sides": element.sides,
+        "steps": store.add(_steps(element)),
+        "fineness": element.sizes[1],
+    }
+
+
+def _steps(element: Element) -> npt.NDArray[np.int8]:
+    try:
+        return np.frombuffer(element.inflated(), np.int8)
+    except TensorError as error:
+        raise ProgramError(str(error)) from None
+
+
+Row = dict[str, Any]
+Step = list[Any]
+
+
+def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_codes: np.ndarray) -> list[Row]:
+    """Rows of a Program as JSON data, see docs/architecture.md.
+
+    Args:
+        program: compiled for the manifest's model.
+        codes: (geometries, C) of its weights.
+        material_codes: (materials, .) likewise.
+
+    Raises:
+        ProgramError: a vector is not one that a scene compiles to.
+    """
+    layout = LAYOUTS[manifest.dimension]
+    parts = layout.unpack(program.vectors)
+    forms = [at for at, element in enumerate(program.elements) if not element.material]
+    paints = [element for element in program.elements if element.material]
+    scales = _scales(program, layout)
+    widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
+    rows = []
+    for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
+        row = {
+            "token": int(program.tokens[i]),
+            "shape": _index(codes, parts.code[i]) if form < 0 else len(codes) + forms.index(form),
+            "material": _index(material_codes, parts.material[i]),
+            "steps": _row_steps(v.astype(np.float64), layout),
+            "scale": scales[i],
+            "colour": parts.rgb[i].tolist(),
+            "paint": -1,
+            "amount": 0.0,
+            "frequency": 0.0,
+            "blend": widths[i],
+            "object": program.numbers[i],
+        }
+        if layout.dimension == 3:
+            row["amount"], row["frequency"] = parts.bulge[i].tolist()
+        if worn >= 0:
+            paint = program.palette[worn]
+            row |= {"paint": paints.index(paint.element), "paintSteps": paint.steps}
+            row["place"] = parts.texture[i].tolist()
+        rows.append(row)
+    return rows
+
+
+def stage_of(stage: Stage) -> dict[str, Any]:
+    """A stage as JSON data, with the camera's axes."""
+    camera, light, ground = stage.camera, stage.light, stage.ground
+    return {
+        "eye": camera.eye,
+        "axes": camera.axes(),
+        "target": camera.target,
+        "fov": camera.fov_rad,
+        "light": light.position,
+        "power": light.power,
+        "lightRgb": light.rgb,
+        "ground": ground and {"y": ground.y, "rgb": ground.rgb},
+        "horizon": stage.horizon,
+        "zenith": stage.zenith,
+        "transparent": stage.transparent,
+    }
+
+
+def _index(known: np.ndarray, code: np.ndarray) -> int:
+    found = np.flatnonzero((known.astype(np.float32) == code).all(1))
+    if not len(found):
+        raise ProgramError("codes that are not the model's")
+    return int(found[0])
+
+
+def _scales(program: Program, layout: Layout) -> list[float]:
+    """World distances per leaf distance."""
+    if layout.dimension == 2:
+        return list(Frames(program.vectors, layout).scale.tolist())
+    return [read_solid_frame(vector, layout).scale for vector in program.vectors]
+
+
+def _row_steps(v: np.ndarray, layout: Layout) -> list[Step]:
+    """The way of a world point to the leaf, outermost first."""
+    steps: list[Step] = []
+    for frame, warps in layout.ways:
+        if tuple(v[frame]) != layout.identity:
+            steps.append(["map", *v[frame].tolist()])
+        for a, b, c in v[warps].reshape(-1, 3).tolist():
+            if layout.dimension == 2:
+                steps += [["turn", a, b, c]] if a or b or c else []
+            else:
+                steps += [["turn", a, b]] if a or b else []
+                steps += [["twist", c]] if c else []
+    return steps

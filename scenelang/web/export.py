@@ -1,0 +1,457 @@
+"""Scenes as pages that draw themselves: the view of a scene, the page around it, `scenelang.export`."""
+
+from __future__ import annotations
+
+import base64
+import colorsys
+import hashlib
+import io
+import json
+import os
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from html import escape
+from importlib.metadata import version
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from scenelang.assets.element import credit_of
+from scenelang.assets.files import write_output
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.program import Program, ProgramError, load_program
+from scenelang.compiler.spaces import encoded
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.network import FramedArrays
+from scenelang.drawing.render import render
+from scenelang.drawing.solid.network import SolidArrays
+from scenelang.language import library
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.evaluation import Evaluation, Source
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Animation, Scene
+from scenelang.web import plane, solid
+from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, stage_of, web
+from scenelang.web.form import Form, form_of
+
+if TYPE_CHECKING:
+    import PIL.Image
+
+    from scenelang.drawing.image import Image
+
+
+MOST: Final = 5  # kinds of objects and colours that are named
+_HUES: Final = (
+    (0.03, "red"),
+    (0.11, "orange"),
+    (0.18, "yellow"),
+    (0.42, "green"),
+    (0.53, "turquoise"),
+    (0.69, "blue"),
+    (0.80, "purple"),
+    (0.95, "pink"),
+    (1.00, "red"),
+)  # up to which hue, in turns, a colour is called so
+
+_PLURALS: Final = {"torus": "tori"}
+
+
+def alternative(data: dict[str, Any]) -> str:
+    """The alternative text of a view's data."""
+    program, animation, solid = data["program"], data["animation"], data["dimension"] == 3
+    rows = program["rows"]
+    shapes = [shape["name"] for shape in data["shapes"]]
+    groups = read_groups(np.array([row["token"] for row in rows], np.int8))
+    around = np.append(groups.joins, UNION)[groups.path]
+    joins = np.column_stack([around, groups.tokens])  # of rows and of the groups that they are in
+    holes, drawn = (joins == SUBTRACT).any(1), (joins <= SMOOTH).all(1)
+    parts = _counted(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
+    said = f"A {'3D scene' if solid else 'picture'} of {parts}" if parts else "An empty picture"
+    if count := int(holes.sum()):
+        said += f", with {count:,} cut-outs" if count > 1 else ", with a cut-out"
+    plain = [rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0]
+    colours = Counter(colour_name(_colour(data, row)) for row in plain)
+    if colours:
+        said += f", in {_listed([name for name, _ in colours.most_common(MOST)], len(colours))}"
+    stage, background = program["stage"], program["background"]
+    if stage:
+        said += "" if stage["transparent"] else f", under a {colour_name(encoded(stage['zenith']))} sky"
+        said += ", on the ground" if stage["ground"] else ""
+    elif background:
+        said += f", on {colour_name(background)}"
+    said += "."
+    if animation:
+        said += (
+            f" It moves for {animation['seconds']:g} seconds{', over and over' * bool(animation['loop'])}."
+        )
+    return said
+
+
+def colour_name(rgb: Iterable[float]) -> str:
+    """What an sRGB colour is called, in one or two words."""
+    r, g, b = (min(1.0, max(0.0, float(v))) for v in rgb)
+    hue, light, _ = colorsys.rgb_to_hls(r, g, b)
+    chroma = max(r, g, b) - min(r, g, b)
+    if light > 0.96 or (light > 0.88 and chroma < 0.12):
+        return "white"
+    if light < 0.08:
+        return "black"
+    if chroma < 0.08:
+        return "light grey" if light > 0.7 else "dark grey" if light < 0.3 else "grey"
+    name = next(name for most, name in _HUES if hue <= most)
+    if light < 0.4 and name == "orange":
+        return "brown"
+    return f"light {name}" if light > 0.75 else f"dark {name}" if light < 0.3 else name
+
+
+def _colour(data: dict[str, Any], row: dict[str, Any]) -> Iterable[float]:
+    albedo = data["materials"][row["material"]]["albedo"]
+    colour = [a * c for a, c in zip(albedo, row["colour"], strict=True)]
+    return encoded((colour[0], colour[1], colour[2])) if data["dimension"] == 3 else colour
+
+
+def _counted(names: Iterable[str]) -> str:
+    """``2 squares, a pentagon and a star``."""
+    counts = Counter(names)
+    told = [_several(name, n) for name, n in counts.most_common(MOST)]
+    return _listed(told, len(counts))
+
+
+def _several(name: str, count: int) -> str:
+    if count == 1:
+        return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
+    return f"{count:,} {_PLURALS.get(name, f'{name}s')}"
+
+
+def _listed(names: list[str], count: int) -> str:
+    if count > len(names):
+        names = [*names, "more"]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""
+
+
+FORMAT: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a page draws.
+
+    Args:
+        data: JSON data; docs/architecture.md has its parts.
+        blob: the arrays that it names.
+    """
+
+    data: dict[str, Any]
+    blob: bytes = field(repr=False)
+
+    def message(self) -> str:
+        """One JSON text: the data, and under ``blob`` the arrays, deflated (zlib) and in base64."""
+        return json.dumps({**self.data, "blob": packed(self.blob)}, separators=(",", ":"), allow_nan=False)
+
+
+def view_of(
+    program: Program,
+    *,
+    title: str = "",
+    source: Sequence[tuple[str, str]] = (),
+    form: Form | None = None,
+    animation: Animation | None = None,
+) -> View:
+    """The view of a Program; without a form its numbers never change.
+
+    Args:
+        program: compiled for a shipped model.
+        title: of the page.
+        source: names and texts of the files that it was compiled from.
+        form: of the scene that it was compiled from.
+        animation: of that scene.
+
+    Raises:
+        ProgramError: it was compiled for other weights, or no page can draw its model.
+    """
+    manifest, store = load_manifest(program.model), Store()
+    if manifest.renderer not in ("framed", "solid"):
+        raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
+    if manifest.lifting != "exact":
+        raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
+    network, digest = load_arrays(program.model, program.weights)
+    program.check_weights(digest)
+    elements = (*form.shapes, *form.paints) if form else program.elements
+    albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
+    geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "title": title,
+        "canvas": program.canvas,
+        "dimension": manifest.dimension,
+        "model": {
+            "name": manifest.name,
+            "summary": manifest.summary,
+            "weights": digest,
+            "measured": _measured(manifest),
+        },
+        "shapes": [*geometries, *shapes_of(elements, store)],
+        "materials": [
+            {"name": name, "albedo": row[:3].tolist(), "medium": float(row[3]) if len(row) > 3 else 0.0}
+            for name, row in zip(manifest.materials, albedo.astype(np.float64), strict=True)
+        ],
+        "paints": paints_of(elements, store),
+        "program": {
+            "rows": rows_of(program, manifest, network.codes, network.material_codes),
+            "stage": program.stage and stage_of(program.stage),
+            "background": program.background,
+        },
+        "form": form and form.data,
+        "params": form.params if form else [],
+        "fixed": form.fixed if form else [],
+        "animation": form and animation and {**animation.model_dump(), "frames": animation.frames},
+        "source": [{"name": name, "text": text} for name, text in source],
+        "licences": [
+            {"name": element.name, "text": credit} for element in elements if (credit := credit_of([element]))
+        ],
+    }
+    if isinstance(network, FramedArrays):
+        data |= plane.shader(network, store)
+    elif isinstance(network, SolidArrays):
+        data |= solid.shader(network, store)
+    data["alt"] = alternative(data)
+    return View(data, store.bytes())
+
+
+def _measured(manifest: Manifest) -> dict[str, Any]:
+    """How far the model is from the exact picture on the scenes of its own set."""
+    figures = manifest.measured.get("sets", {}).get(manifest.set)
+    if figures is None:
+        return {}
+    cap = manifest.measured.get("psnr_cap_db")
+    return {"cap": cap, **{key: figures[key] for key in ("scenes", "psnr", "flip")}}
+
+
+MOST_TITLE: Final = 200
+_POLICY: Final = (
+    "default-src 'none'; script-src '{loader}' '{code}'; style-src '{style}'; img-src data: blob:; "
+    "base-uri 'none'; form-action 'none'"
+)
+_SLOT: Final = re.compile(r"\[\[(\w+)\]\]")
+_COMMENT: Final = re.compile(r"^ *(?:/\*\*.*?\*/|//[^\n]*)\n", re.MULTILINE | re.DOTALL)
+
+
+def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
+    """An HTML file that draws a view; nothing in it comes from elsewhere, and its policy allows nothing to.
+
+    Args:
+        view: what it shows.
+        still: a WebP for browsers without WebGL2 or JavaScript.
+        embedded: leave out heading, sources and licences, for a frame in another page.
+    """
+    data = view.data
+    width, height = data["canvas"]
+    sizes = f":root{{--aspect:{width / height:.6f};--controls:{control_rows(view)}rem}}\n"
+    style = sizes + web("controls.css") + web("page.css")
+    code, loader = f"{_COMMENT.sub('', script())}\nopenPage();\n", web("loader.js")
+    alt = escape(plain(data["alt"]))
+    drawn = base64.b64encode(still).decode()
+    image = '<i id="still"></i>'
+    if still:
+        image = f'<img id="still" src="data:image/webp;base64,{drawn}" alt="{alt}">'
+    parts = {
+        "policy": escape(_POLICY.format(loader=_digest(loader), code=_digest(code), style=_digest(style))),
+        "version": escape(version("scenelang")),
+        "title": escape(plain(data["title"])[:MOST_TITLE] or "scene"),
+        "style": style,
+        "kind": "embedded" if embedded else "whole",
+        "still": image,
+        "width": str(width),
+        "height": str(height),
+        "alt": alt,
+        "model": told(data["model"]),
+        "view": packed(view.message().encode()),
+        "code": packed(code.encode()),
+        "loader": loader,
+    }
+    return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
+
+
+def control_rows(view: View) -> int:
+    """About how high the controls of a view are, in rem."""
+    data = view.data
+    fixed = {one["name"] for one in data["fixed"]}
+    live = [param for param in data["params"] if param["name"] not in fixed]
+    told = sum("label" in param for param in live)
+    timeline, camera = bool(data["animation"]), bool(data["dimension"] == 3)
+    return ceil(2.5 * len(live) + 1.5 * told + 2 * len(fixed) + 3 * bool(live) + 3 * timeline + 6 * camera)
+
+
+def plain(text: str) -> str:
+    """A text whose controls, marks of direction among them, are written out, such as ⟨U+202E⟩."""
+    hidden = ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
+    return "".join(f"⟨U+{ord(c):04X}⟩" if unicodedata.category(c) in hidden else c for c in text)
+
+
+def told(model: dict[str, Any]) -> str:
+    """What the page says of its model, as HTML."""
+    name, summary = (f"<bdi>{escape(plain(model[key]))}</bdi>" for key in ("name", "summary"))
+    line = f"Drawn by the neural network {name} ({summary})"
+    figures = model.get("measured") or {}
+    if "flip" in figures:
+        line += (
+            f", which on {figures['scenes']} random scenes was {figures['psnr']:.1f} dB (PSNR, counted up to "
+            f"{figures['cap']:g}) and {figures['flip']:.4f} (mean FLIP) from the exact picture"
+        )
+    return f"{line}."
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+PROGRAM: Final = ".safetensors"
+STILL_SIDE: Final = {2: 960, 3: 480}
+"""Pixels along the longer side of a still picture; solids take longer."""
+_QUALITIES: Final = (80, 60, 40, 20)  # of WebP, until it has few enough bytes
+_MOST_STILL: Final = 40_000  # bytes
+_FRAME_PX: Final = (360, 640)  # width of a frame in a notebook, at least and at most
+_MOST_TEXT: Final = 20_000  # of a Scene, whose text nobody wrote
+
+
+def export(
+    source: str | os.PathLike[str] | Scene | Program,
+    out: str | os.PathLike[str],
+    *,
+    params: Mapping[str, Any] | None = None,
+    size: tuple[int, int] | None = None,
+    model: str | None = None,
+    root: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+) -> None:
+    """Write an HTML page that draws a scene in any browser with WebGL2 and asks for nothing else.
+
+    Args:
+        source: a scene's file, whose params the page can change and whose animation it plays; or a compiled
+            Program's (.safetensors), a Scene or a Program, which are as they are.
+        out: the page.
+        params: values for a file's params that the page starts from; as for `scenelang.load`.
+        size: canvas in pixels instead of the scene's; the picture keeps its aspect.
+        model: draw with this model instead of the one that the scene names.
+        root: folder that imports cannot leave; by default the file's.
+        title: of the page; by default the name of the file.
+
+    Raises:
+        SceneError: the scene has errors.
+        ProgramError: the file is not a Program, or no page can draw its model.
+        RenderError: the model has no weights here.
+        ValueError: an argument says something of a file where there is none, or of a scene where there is a
+            Program.
+        OSError: a file cannot be read, or the page cannot be written.
+    """
+    given: Source | Scene | Program
+    path = None if isinstance(source, Scene | Program) else Path(source)
+    if path is None or path.suffix == PROGRAM:
+        if params or root is not None:
+            raise ValueError("params and root are for files of scenes")
+        given = source if isinstance(source, Scene | Program) else load_program(Path(source))
+        if isinstance(given, Scene):
+            given = (given if size is None else given.sized(size)).of_model(model)
+        elif size is not None or model is not None:
+            raise ValueError("size and model are for scenes; a program is compiled for its own")
+    else:
+        given = Source(path, params=params, model=model, root=root, size=size)
+    name = "" if path is None else path.stem
+    view, program = viewed(given, name if title is None else title)
+    write_output(out, page(view, still=still(program)).encode())
+
+
+def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]:
+    """The view of a scene or a Program, and the Program that it shows first; raises as `export`."""
+    if isinstance(source, Program):
+        return scene_view(source, None, None, title=title), source
+    evaluation = None
+    if isinstance(source, Scene):
+        scene: Scene | None = source
+    else:
+        found = Diagnostics()
+        evaluation = source.evaluation(found)
+        scene = evaluation.run(0)[0]
+        if scene is None or found.errors:
+            raise SceneError(found)
+    assert scene is not None
+    program = compile_scene(scene)
+    return scene_view(program, scene, evaluation, title=title), program
+
+
+def scene_view(
+    program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
+) -> View:
+    """The view of a compiled scene.
+
+    Args:
+        program: what the page shows first.
+        scene: what it was compiled from, where there is one.
+        evaluation: of the text of that scene, after the run that gave it, where there is one.
+        title: of the page.
+    """
+    source: list[tuple[str, str]] = []
+    form = None
+    if evaluation is not None:
+        form = form_of(evaluation, load_manifest(program.model), program.elements)
+        first = evaluation.sources[0].name
+        own = [text for text in evaluation.sources if not library.holds(text)]
+        source = [(_shown(text.name, first), text.text) for text in own]
+    elif scene is not None and len(text := scene.to_nsg()) <= _MOST_TEXT:
+        source = [(f"{title or 'scene'}.nsg", text)]
+    animation = None if scene is None else scene.animation
+    return view_of(program, title=title, source=source, form=form, animation=animation)
+
+
+def still(program: Program) -> bytes:
+    """A picture of a Program as WebP, large enough that what is small in it can be read."""
+    side = STILL_SIDE[2 if program.stage is None else 3] / max(program.canvas)
+    width, height = (max(1, round(side * length)) for length in program.canvas)
+    return _packed(render(replace(program, canvas=(width, height))).to_pil())
+
+
+def frame(value: Scene | Program, picture: Image) -> str:
+    """The viewer of a Scene or a Program as HTML for a notebook, in a frame that may run scripts alone.
+
+    Args:
+        picture: of the value, for browsers that cannot draw it.
+
+    Returns:
+        Nothing where no page can draw its model.
+    """
+    program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
+    try:
+        view = scene_view(program, scene, None)
+    except ProgramError:
+        return ""
+    small = picture.to_pil().reduce(-(-max(program.canvas) // STILL_SIDE[2]))
+    text = escape(page(view, still=_packed(small), embedded=True))
+    width = max(_FRAME_PX[0], min(_FRAME_PX[1], program.canvas[0]))
+    height = round(width * program.canvas[1] / program.canvas[0]) + 16 * control_rows(view)
+    title = escape(plain(view.data["alt"]))
+    return (
+        f'<iframe sandbox="allow-scripts" title="{title}" srcdoc="{text}" '
+        f'width="{width}" height="{height}" style="border: 0; max-width: 100%"></iframe>'
+    )
+
+
+def _packed(picture: PIL.Image.Image) -> bytes:
+    for quality in _QUALITIES:
+        data = io.BytesIO()
+        picture.save(data, "WEBP", quality=quality, method=6)
+        if data.tell() <= _MOST_STILL:
+            break
+    return data.getvalue()
+
+
+def _shown(name: str, first: str) -> str:
+    """What a page calls a file: by its place beside the scene's, and of others only their names."""
+    place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
+    return Path(name).name if place.startswith("../") else place

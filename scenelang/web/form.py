@@ -1,0 +1,621 @@
+"""Scenes as forms: their own program as JSON, for the evaluator that runs in a page.
+
+A scene without mistakes is taken for granted. What the page's model does not have is ``["no", why]``, which
+matters where it runs: it may stand in a branch that is never taken.
+
+A form is what is left of the syntax trees of a scene's files without places and what is never used, with
+names resolved. An expression is a number, a boolean, or a list of a word and its operands; a statement is a
+list likewise; a block is a list of statements. ``["g", slot]`` is a variable of a file, and ``["v", hops,
+slot]`` one of the call so many definitions further out. ``web/evaluate.js`` has what each word means.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from scenelang.assets.element import Element
+from scenelang.assets.records import Record, deep_stack
+from scenelang.assets.textures import load_textures
+from scenelang.compiler.manifest import Manifest
+from scenelang.language import tree
+from scenelang.language import tree as nodes
+from scenelang.language.builder import FileContext, Place
+from scenelang.language.evaluation import Evaluation
+from scenelang.language.expressions import prepare
+from scenelang.language.scene import Color, Matrix, Object, Scale, Translate
+from scenelang.language.scene_data import Brought, objects_of
+from scenelang.language.statements import BROUGHT
+from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
+from scenelang.language.words import (
+    ANIMATED,
+    FUNCTIONS,
+    LANGUAGE,
+    OPERATIONS,
+    SETTINGS,
+    SOLID_TRANSFORMS,
+    STAGE,
+    TRANSFORMS,
+)
+
+Json = Any
+
+
+@dataclass(slots=True, eq=False)
+class Frame:
+    """The slots of a call of a function or a module; slot 0 holds the call around it."""
+
+    outer: Frame | None
+    size: int = 1
+
+
+@dataclass(slots=True, eq=False)
+class Scope:
+    """The names of a block, and the block around it; without a frame its slots are those of files."""
+
+    frame: Frame | None = None
+    parent: Scope | None = None
+    names: dict[str, Bound] = field(default_factory=dict)
+
+    def find(self, name: str) -> Bound | None:
+        """What a name stands for, qualified or not."""
+        alias, dot, rest = name.partition(".")
+        scope: Scope | None = self
+        while scope is not None and alias not in scope.names:
+            scope = scope.parent
+        found = None if scope is None else scope.names[alias]
+        return found.inside.names.get(rest) if dot and found is not None and found.inside else found
+
+
+@dataclass(slots=True, eq=False)
+class Bound:
+    """What a name stands for.
+
+    Args:
+        kind: as of `scenelang.language.session.Binding`.
+        scope: where it was defined.
+        node: the statement of a fn or module.
+        inside: the names of an imported file.
+        file: that file.
+        at: place of a fn or module among all that are called.
+        uses: what it needs of the names of files.
+        element: what a Scene calls a geometry of a file of elements.
+    """
+
+    kind: str
+    scope: Scope
+    slot: int = 0
+    node: Any = None
+    inside: Scope | None = None
+    file: FileContext | None = None
+    at: int = -1
+    uses: list[Bound] = field(default_factory=list)
+    element: str = ""
+
+
+@dataclass(slots=True)
+class Line:
+    """A statement of a file, what it defines, and what it needs of the names of files."""
+
+    form: Json
+    bound: Bound | None
+    uses: list[Bound]
+
+
+class Names(ABC):
+    """Writes the statements of a scene's files as far as names go.
+
+    Attributes:
+        slots: how many all files have.
+        calls: fns and modules that are called.
+        params: each one's full name, statement, file and what its name stands for.
+        lengths: what ``canvas`` and ``animate`` need of the names of files.
+    """
+
+    def __init__(self) -> None:
+        self.slots = 0
+        self.calls: list[Json] = []
+        self.uses: list[Bound] = []
+        self.params: list[tuple[str, nodes.Param, FileContext, Bound]] = []
+        self.lengths: dict[str, list[Bound]] = {"canvas": [], "animate": []}
+
+    @abstractmethod
+    def expression(self, expr: nodes.Expr, scope: Scope) -> Json:
+        """An expression."""
+
+    @abstractmethod
+    def statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> Json:
+        """A statement in a kind of block; None where it does nothing when it runs."""
+
+    def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
+        """A block in a scope of its own."""
+        scope = Scope(around.frame, around)
+        bodies = self._declare(block.statements, scope)
+        made = [self.statement(stmt, scope, kind) for stmt in block.statements]
+        for bound in bodies:
+            self._body(bound)
+            self.uses += bound.uses
+        return [form for form in made if form is not None]
+
+    def file(self, context: FileContext, tree: nodes.File, scope: Scope, imported: bool) -> list[Line]:
+        """A file's statements; of an imported one what it brings."""
+        statements = [s for s in tree.statements if not imported or isinstance(s, BROUGHT)]
+        self._declare(statements, scope)
+        lines: list[Line] = []
+        for stmt in statements:
+            self.uses = []
+            if isinstance(stmt, nodes.Import):
+                lines += self._import(stmt, context, scope)
+            elif isinstance(stmt, nodes.Let | nodes.Param):
+                form = self.statement(stmt, scope, "file")
+                bound = scope.names[stmt.name.text]
+                bound.uses = self.uses
+                lines.append(Line(form, bound, self.uses))
+                if isinstance(stmt, nodes.Param):
+                    full = context.prefix + stmt.name.text
+                    form[2] = full
+                    self.params.append((full, stmt, context, bound))
+            elif form := self.statement(stmt, scope, "file"):
+                lines.append(Line(form, None, self.uses))
+            if isinstance(stmt, nodes.Call) and stmt.name.text in self.lengths:
+                self.lengths[stmt.name.text] += self.uses
+        return lines
+
+    def _import(self, stmt: nodes.Import, context: FileContext, scope: Scope) -> list[Line]:
+        brought = context.scope.names[stmt.alias.text].value
+        inside = Scope()
+        bound = scope.names[stmt.alias.text] = Bound("import", scope, inside=inside, file=brought)
+        tree = context.loader.parsed.get(brought.path)
+        if tree is not None:
+            return self.file(brought, tree, inside, imported=True)
+        for name, binding in brought.scope.names.items():
+            inside.names[name] = Bound("element", inside, file=bound.file, element=binding.value)
+        return []
+
+    def reached(self, roots: Iterable[Bound]) -> set[int]:
+        """Identities of all names of files that something needs; writes what of it is called."""
+        seen: dict[int, Bound] = {}
+        stack = list(roots)
+        while stack:
+            bound = stack.pop()
+            if id(bound) not in seen:
+                seen[id(bound)] = bound
+                if bound.at >= 0 and self.calls[bound.at] is None:
+                    self._body(bound)
+                stack += bound.uses
+        return set(seen)
+
+    def _declare(self, statements: Sequence[nodes.Stmt], scope: Scope) -> list[Bound]:
+        found = []
+        for stmt in statements:
+            if isinstance(stmt, nodes.Fn | nodes.Module):
+                kind = "fn" if isinstance(stmt, nodes.Fn) else "module"
+                scope.names[stmt.name.text] = bound = Bound(kind, scope, node=stmt)
+                found.append(bound)
+        return found
+
+    def _body(self, bound: Bound) -> None:
+        """Write a fn or module: size of its calls, defaults, and what it is."""
+        at, stmt = self._called(bound), bound.node
+        around, self.uses = self.uses, bound.uses
+        frame = Frame(bound.scope.frame, 1 + len(stmt.params))
+        inside, defaults = Scope(frame, bound.scope), []
+        for slot, param in enumerate(stmt.params, 1):
+            defaults.append(None if param.default is None else self.expression(param.default, inside))
+            inside.names[param.name.text] = Bound("argument", inside, slot)
+        self.calls[at] = made = [0, defaults]
+        if isinstance(stmt, nodes.Fn):
+            made.append(self.expression(stmt.body, inside))
+        else:
+            made.append(self.block(stmt.body, inside, "group"))
+        made[0] = frame.size
+        self.uses = around
+
+    def _called(self, bound: Bound) -> int:
+        if bound.at < 0:
+            bound.at = len(self.calls)
+            self.calls.append(None)
+        return bound.at
+
+    def slot(self, scope: Scope) -> int:
+        """A new slot."""
+        if scope.frame is None:
+            self.slots += 1
+            return self.slots - 1
+        scope.frame.size += 1
+        return scope.frame.size - 1
+
+    def hops(self, scope: Scope, to: Scope) -> int:
+        """How many calls further out the slots of another scope are; -1 for those of files."""
+        hops, frame = 0, scope.frame
+        while frame is not to.frame:
+            assert frame is not None
+            hops, frame = hops + 1, frame.outer
+        return -1 if frame is None else hops
+
+    def value(self, bound: Bound, scope: Scope) -> Json:
+        """A variable."""
+        if bound.scope.frame is None:
+            self.uses.append(bound)
+            return ["g", bound.slot]
+        return ["v", self.hops(scope, bound.scope), bound.slot]
+
+    def call(self, bound: Bound, args: Sequence[nodes.Argument], scope: Scope) -> list[Json]:
+        """Place of a definition, hops to where it stands, and the arguments."""
+        if bound.scope.frame is None:
+            self.uses.append(bound)
+        given = bind([param.name.text for param in bound.node.params], args)
+        return [self._called(bound), self.hops(scope, bound.scope), self.given(given, scope)]
+
+    def given(self, values: Iterable[nodes.Expr | None], scope: Scope) -> list[Json]:
+        """Arguments, None where one is left out."""
+        return [None if value is None else self.expression(value, scope) for value in values]
+
+
+def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[nodes.Expr | None]:
+    """The argument of each parameter, None where it is left out."""
+    bound: dict[str, nodes.Expr] = {}
+    for at, arg in enumerate(args or ()):
+        bound[params[at] if arg.name is None else arg.name.text] = arg.value
+    return [bound.get(name) for name in params]
+
+
+_VALUES: Final = ("let", "param", "argument", "loop")
+
+
+class Lacking(Exception):
+    """The page's model does not have what is named; the message says what."""
+
+
+class Writer(Names):
+    """Writes a scene's statements.
+
+    Args:
+        context: of the scene's file, prepared.
+        manifest: the model that draws the page.
+        elements: what rows name first.
+
+    Attributes:
+        shapes, paints: elements that rows name.
+    """
+
+    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
+        super().__init__()
+        self.manifest, listed = manifest, list(elements)
+        self.files = {file.name: file.zoo for file in context.session.elements.values()}
+        self.brought = Brought.of(tuple(context.session.elements.values()))
+        self.textures = load_textures()
+        self.shapes = [element for element in listed if not element.material]
+        self.paints = [element for element in listed if element.material]
+
+    # ------------------------------------------------------------ expressions
+
+    def expression(self, expr: tree.Expr, scope: Scope) -> Json:
+        """An expression: a number, a boolean, or a word and what it works on."""
+        match expr:
+            case tree.Number():
+                return [expr.unit, plain(expr.value)] if expr.unit else plain(expr.value)
+            case tree.Bool():
+                return expr.value
+            case tree.String():
+                return ["'", expr.value]
+            case tree.Color():
+                return ["#", *(round(255 * part) for part in expr.rgb)]
+            case tree.Vector():
+                return ["[", *self.given(expr.items, scope)]
+            case tree.Range():
+                ends = self.given((expr.start, expr.stop, expr.step), scope)
+                return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]
+            case tree.NameRef():
+                return self._name(expr.name.text, scope)
+            case tree.Unary():
+                inner = self.expression(expr.operand, scope)
+                negative = expr.op == "-" and type(inner) in (int, float) and inner
+                return -inner if negative else [f"{expr.op}1", inner]
+            case tree.Binary():
+                return [expr.op, self.expression(expr.left, scope), self.expression(expr.right, scope)]
+            case tree.Conditional():
+                return ["?", *self.given((expr.condition, expr.then, expr.otherwise), scope)]
+            case tree.CallExpr():
+                return self._function(expr, scope)
+            case tree.Index():
+                return ["@", self.expression(expr.value, scope), self.expression(expr.index, scope)]
+            case tree.Member():
+                return self._member(expr, scope)
+            case tree.MaterialExpr():
+                return self._material(expr, scope)
+        raise TypeError(f"no form of {expr.__class__.__name__}")
+
+    def _name(self, name: str, scope: Scope) -> Json:
+        bound = scope.find(name)
+        if bound is not None:
+            return self.value(bound, scope)
+        if name in ANIMATED:
+            return ["t", [*ANIMATED].index(name)]
+        value = CONSTANTS[name]
+        if isinstance(value, Vec):
+            return ["[", *map(plain, value.items)]
+        return ["none"] if value is None else value
+
+    def _member(self, expr: tree.Member, scope: Scope) -> Json:
+        alias = scope.find(expr.value.name.text) if isinstance(expr.value, tree.NameRef) else None
+        if alias is not None and alias.inside is not None:
+            return self.value(alias.inside.names[expr.name.text], scope)
+        return [".", self.expression(expr.value, scope), COMPONENTS[expr.name.text]]
+
+    def _function(self, expr: tree.CallExpr, scope: Scope) -> Json:
+        name, bound = expr.name.text, scope.find(expr.name.text)
+        if bound is not None:
+            return ["call", *self.call(bound, expr.args, scope)]
+        word = FUNCTIONS[name]
+        args = [arg.value for arg in expr.args] if word.variadic else bind(word.params, expr.args)
+        return [name, *self.given(args, scope)]
+
+    # ------------------------------------------------------------ materials
+
+    def _material(self, written: tree.MaterialExpr | tree.MaterialUse, scope: Scope) -> Json:
+        """``["material", place of how it is lit, place of its colours or -1, block]``."""
+        try:
+            lit, paint = self._look(written.name.text, written.shading, scope)
+        except Lacking as lacking:
+            return ["no", str(lacking)]
+        ops = [] if written.body is None else self.block(written.body, scope, "material")
+        return ["material", self.manifest.materials.index(lit), paint, ops]
+
+    def _look(self, name: str, shading: tree.Name | None, scope: Scope) -> tuple[str, int]:
+        alias, dot, rest = name.partition(".")
+        lit = self.manifest.materials[0] if shading is None else shading.text
+        paint = -1
+        if dot:
+            file = scope.find(alias)
+            assert file is not None
+            assert file.file is not None
+            paint = self._element(self.brought.materials[file.file.materials[rest]], self.paints, name)
+        elif name in self.textures:
+            paint = self._element(self.textures[name], self.paints, name)
+        else:
+            lit = name
+        if lit not in self.manifest.materials:
+            raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
+        return lit, paint
+
+    def _element(self, element: Element, known: list[Element], name: str) -> int:
+        if element not in known and element.kind not in self.manifest.elements:
+            raise Lacking(f"model `{self.manifest.name}` does not draw `{name}`")
+        if element not in known:
+            known.append(element)
+        return known.index(element)
+
+    # ------------------------------------------------------------ statements
+
+    def statement(self, stmt: tree.Stmt, scope: Scope, kind: str) -> Json:
+        """A statement in a kind of block; None where it does nothing when it runs."""
+        match stmt:
+            case tree.Let():
+                value = self.expression(stmt.value, scope)
+                return [*self._define(stmt.name, "let", scope), value]
+            case tree.Param():
+                given = self.given((stmt.default, stmt.range), scope)
+                return ["param", self._define(stmt.name, "param", scope)[1], stmt.name.text, *given]
+            case tree.For():
+                items, inside = self.expression(stmt.iterable, scope), Scope(scope.frame, scope)
+                target = self._define(stmt.variable, "loop", inside)
+                return ["for", *target, items, self.block(stmt.body, inside, kind)]
+            case tree.If():
+                test, then = self.expression(stmt.condition, scope), self.block(stmt.then, scope, kind)
+                other = stmt.otherwise
+                if isinstance(other, tree.If):
+                    return ["if", test, then, [self.statement(other, scope, kind)]]
+                return ["if", test, then, [] if other is None else self.block(other, scope, kind)]
+            case tree.Node():
+                inner = "chain" if stmt.kind == "chain" else "group"
+                return ["node", stmt.kind, self._width(stmt, scope), self.block(stmt.body, scope, inner)]
+            case tree.Combined():
+                width, child = self._width(stmt, scope), self.statement(stmt.child, scope, kind)
+                return ["join", stmt.op, width, child]
+            case tree.MaterialUse():
+                return ["use", self._material(stmt, scope)]
+            case tree.Call():
+                return self._headed(stmt, scope, kind)
+        return None
+
+    def _define(self, name: tree.Name, kind: str, scope: Scope) -> list[Json]:
+        """Whether a name's slot is one of files, and which."""
+        slot = self.slot(scope)
+        scope.names[name.text] = Bound(kind, scope, slot)
+        return ["g" if scope.frame is None else "v", slot]
+
+    def _width(self, stmt: tree.Node | tree.Combined, scope: Scope) -> Json:
+        return self.given(bind(("k",), stmt.args), scope)[0]
+
+    def _headed(self, stmt: tree.Call, scope: Scope, kind: str) -> Json:
+        name = stmt.name.text
+        bound = None if name in LANGUAGE else scope.find(name)
+        worn = bound is not None and bound.kind in _VALUES and stmt.args is None
+        if name in SETTINGS and not worn and (bound is None or bound.kind != "module"):
+            return self._setting(stmt, scope)
+        if name in LANGUAGE:
+            return self._move(stmt, scope, kind == "material")
+        body = None if stmt.body is None else self.block(stmt.body, scope, "object")
+        if bound is None:
+            if name not in self.manifest.geometries:
+                return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
+            return ["object", self.manifest.geometries.index(name), body or []]
+        if bound.kind == "module":
+            return ["module", *self.call(bound, stmt.args or (), scope), body or []]
+        if bound.element:
+            return self._brought(stmt, bound.element, body or [])
+        ops = [] if stmt.body is None else self.block(stmt.body, scope, "material")
+        return ["use", self.value(bound, scope), *([ops] if ops else [])]
+
+    def _setting(self, stmt: tree.Call, scope: Scope) -> Json:
+        name, word = stmt.name.text, SETTINGS[stmt.name.text]
+        args = self.given(bind(word.params, stmt.args), scope)
+        if name in STAGE and self.manifest.dimension == 2:
+            return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
+        return None if name == "canvas" else [name, *args]
+
+    def _move(self, stmt: tree.Call, scope: Scope, inks: bool) -> Json:
+        name, args = stmt.name.text, stmt.args or ()
+        table = OPERATIONS if inks else TRANSFORMS
+        if name not in table:
+            return ["no", f"`{name}` does not stand here"]
+        if name in SOLID_TRANSFORMS and self.manifest.dimension == 2:
+            return ["no", f"`{name}` leaves the plane"]
+        if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
+            return ["move", "even", self.expression(args[0].value, scope)]
+        return ["move", name, *self.given(bind(table[name].params, args), scope)]
+
+    # ------------------------------------------------------------ elements
+
+    def _brought(self, stmt: tree.Call, called: str, body: Json) -> Json:
+        """A geometry of a file of elements, or a ready group."""
+        alias, _, name = called.partition(".")
+        try:
+            if stmt.args is None:
+                return ["object", self._shape(called), body]
+            zoo = self.files[alias]
+            assert zoo is not None
+            return ["parts", [self._part(part) for part in objects_of(zoo, alias, name)], body]
+        except Lacking as lacking:
+            return ["no", str(lacking)]
+
+    def _shape(self, called: str) -> int:
+        element = self.brought.geometries[called]
+        return len(self.manifest.geometries) + self._element(element, self.shapes, called)
+
+    def _part(self, part: Object) -> Json:
+        """One object of a group, as its statement."""
+        lines: list[Json] = []
+        for move in part.transforms:
+            if isinstance(move, Matrix):
+                lines.append(["move", "matrix", ["[", *(["[", *map(plain, row)] for row in move.rows)]])
+            elif isinstance(move, Scale):
+                lines.append(["move", "even", plain(move.x)])
+            elif isinstance(move, Translate):
+                lines.append(["move", "translate", *map(plain, (move.x, move.y, move.z))])
+        if part.material is not None:
+            name = part.material.name
+            element = self.brought.materials.get(name)
+            paint = -1 if element is None else self._element(element, self.paints, name)
+            lit = self.manifest.materials[0] if element is not None else name
+            inks = [op.rgb for op in part.material.ops if isinstance(op, Color)]
+            ops = [["move", "color", ["[", *map(plain, rgb)]] for rgb in inks]
+            if lit not in self.manifest.materials:
+                raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
+            lines.append(["use", ["material", self.manifest.materials.index(lit), paint, ops]])
+        return ["object", self._shape(part.geometry), lines]
+
+
+def plain(number: float) -> float:
+    """The same number, short in JSON."""
+    return int(number) if float(number).is_integer() and abs(number) < 1e15 else float(number)
+
+
+_KINDS: Final = {float: "number", Angle: "angle", Time: "time", bool: "bool", str: "string"}
+_WHY: Final = {
+    "canvas": "the size of the canvas depends on it",
+    "animate": "the length of the animation depends on it",
+}
+_LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
+
+
+class Form(Record):
+    """A scene's form and what belongs to it in a view.
+
+    Args:
+        data: JSON for ``evaluateForm``.
+        params: JSON of params that matter to the picture: their values, in radians and seconds, and ranges.
+        fixed: names of those that no page can change, and why.
+        shapes, paints: elements that rows name by their places, shapes behind the model's geometries.
+    """
+
+    data: Json
+    params: list[Json]
+    fixed: list[Json]
+    shapes: tuple[Element, ...]
+    paints: tuple[Element, ...]
+
+
+def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> Form:
+    """The form of a scene that was evaluated without errors.
+
+    Args:
+        evaluation: after a run, whose values params start from.
+        manifest: the model that draws the page.
+        elements: those of the Program of that run; they come first among shapes and paints, in their order.
+    """
+    writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
+    with deep_stack():
+        lines = writer.file(evaluation.context, evaluation.file, Scope(), imported=False)
+        needed = writer.reached(bound for line in lines if line.bound is None for bound in line.uses)
+        for word, uses in writer.lengths.items():
+            reached = writer.reached(uses)
+            reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
+    data = {
+        "model": manifest.name,
+        "dimension": manifest.dimension,
+        "body": [line.form for line in lines if line.bound is None or id(line.bound) in needed],
+        "animates": evaluation.animates,
+        "slots": writer.slots,
+        "calls": writer.calls,
+        "plain": 0,
+        "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
+        "geometries": manifest.geometries,
+        "spatial": [int(paint.dimension == 3) for paint in writer.paints],
+        "blends": manifest.any_blend,
+        "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
+    }
+    shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]
+    return Form(
+        data,
+        [param_data(name, stmt, file) for name, stmt, file, _ in shown],
+        [{"name": name, "reason": reason} for name, reason in reasons.items()],
+        tuple(writer.shapes),
+        tuple(writer.paints),
+    )
+
+
+def param_data(name: str, stmt: tree.Param, file: FileContext) -> dict[str, Any]:
+    """What a page has to know of a param to offer it."""
+    value = file.env[file.scope.names[stmt.name.text].slot]
+    data: dict[str, Any] = {"name": name, "kind": _kind(value, stmt.default), "value": _json(value)}
+    if stmt.range is not None:
+        allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
+        if isinstance(allowed, Vec):
+            data["choices"] = _json(allowed)
+        elif isinstance(allowed, RangeValue):
+            data |= _bounds(allowed)
+    if isinstance(value, Angle | Time):
+        units = (node.unit for node in tree.walk(stmt.default) if isinstance(node, tree.Number))
+        data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")
+    if label := _LABEL.match(stmt.span.source.text, (stmt.range or stmt.default).span.end):
+        data["label"] = label[1].strip()
+    return data
+
+
+def _bounds(allowed: RangeValue) -> dict[str, Any]:
+    """The least and the greatest value; a stepped range may go downwards, and need not reach its end."""
+    if allowed.step is None:
+        bounds = {"low": allowed.start, "high": allowed.stop}
+        return {**bounds, "exclusive": True} if allowed.exclusive else bounds
+    ends = sorted((allowed.start, allowed.at(max(0, allowed.count() - 1))))
+    return {"low": ends[0], "high": ends[1], "step": abs(allowed.step)}
+
+
+def _kind(value: Any, default: tree.Expr) -> str:
+    if not isinstance(value, Vec):
+        return _KINDS[value.__class__]
+    colours = isinstance(default, tree.Color) or (
+        isinstance(default, tree.CallExpr) and default.name.text in ("rgb", "hsv")
+    )
+    return "color" if colours else "vector"
+
+
+def _json(value: Any) -> Json:
+    if isinstance(value, Vec):
+        return [_json(item) for item in value.items]
+    return value if isinstance(value, bool | str) else unpack(value)[0]

@@ -1,0 +1,447 @@
+"""One page that is open, and what all pages of a server share."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+from collections.abc import Callable, Collection, Coroutine
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from scenelang.assets.files import read_json
+from scenelang.drawing.how import usable_cores
+from scenelang.language.limits import MAX_BYTES
+from scenelang.web.folder import (
+    MOST_SIDE,
+    Changed,
+    Files,
+    Folder,
+    Journal,
+    Json,
+    Refused,
+    id_of,
+    in_unit,
+    string_of,
+    text_of,
+    whole_of,
+    wishes,
+)
+from scenelang.web.jobs import Answer
+from scenelang.web.pool import LIMITS_S, Jobs, Pool, Slot, Took
+
+log = logging.getLogger("scenelang.play")
+
+
+class Page(Protocol):
+    """A page that is open."""
+
+    @property
+    def names(self) -> Collection[str]:
+        """The files that it shows."""
+
+    def tell(self, message: Json | str) -> None:
+        """Send it a message."""
+
+    def changed(self, name: str, text: str | None, disk: str | None) -> None:
+        """Tell it what a file holds now."""
+
+    def imported(self, path: Path) -> None:
+        """Show again what imports a file that has changed."""
+
+
+class Play:
+    """What all pages share.
+
+    Args:
+        folder: the scenes.
+        first: the one to show at first.
+        journal: keeps what is not saved.
+    """
+
+    def __init__(self, folder: Folder, first: str | None = None, journal: Journal | None = None) -> None:
+        self.folder, self.first = folder, first
+        self.journal = journal if journal is not None else Journal()
+        most = max(3, usable_cores())
+        self.quick = Pool(most)  # pictures that are looked at while typing
+        self.views = Pool(most, nice=5)  # which stand back for them
+        self.slow = Pool(2, nice=10)
+        self.store = Files()
+        self.pages: set[Page] = set()
+        self.reading = asyncio.Lock()
+        """Held from reading or writing a file to telling pages of it: what is older is told first."""
+        self._tasks: set[asyncio.Future[Any]] = set()
+        self._listed: list[str] | None = None
+
+    def later(self, work: Coroutine[Any, Any, Any]) -> None:
+        """Do something beside all else."""
+
+        def ended(task: asyncio.Future[Any]) -> None:
+            self._tasks.discard(task)
+            if not task.cancelled() and (error := task.exception()) is not None:
+                log.error("%r", error)
+
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(ended)
+
+    async def close(self) -> None:
+        """End whatever goes on."""
+        for task in list(self._tasks):
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for pool in (self.quick, self.views, self.slow):
+            await pool.close()
+
+    async def files(self) -> Json:
+        """The message that lists what there is."""
+        self._listed = await asyncio.to_thread(self.folder.names)
+        return {
+            "kind": "files",
+            "files": self._listed,
+            "examples": _examples(),
+            "folder": self.folder.path.name,
+            "open": self.first if self.first is not None else next(iter(self._listed), None),
+            "uri": f"{self.folder.path.as_uri()}/",
+            "most": {"bytes": MAX_BYTES, "side": MOST_SIDE},
+        }
+
+    async def refresh(self) -> None:
+        """Tell all pages what there is, if that has changed."""
+        before = self._listed
+        message = await self.files()
+        if self._listed != before:
+            for page in self.pages:
+                page.tell(message)
+
+    async def write(self, name: str, text: str, base: str | None, page: Page) -> str:
+        """Write a file for a page, and tell the others; the file's digest. Raises as `Folder.write`."""
+        async with self.reading:
+            disk = await asyncio.to_thread(self.folder.write, name, text, base)
+            for other in self.pages:
+                if other is not page:
+                    other.changed(name, text, disk)
+                other.imported(self.folder.path / name)
+            if self._listed is not None and name not in self._listed:
+                await self.refresh()
+            return disk
+
+    def keep(self, path: Path, text: str, saved: str, disk: str | None) -> None:
+        """Keep a text that is not saved; where it is, forget what was kept."""
+        try:
+            if text == saved:
+                self.journal.drop(path)
+            else:
+                self.journal.keep(path, text, disk)
+        except OSError as error:
+            log.warning("unsaved text is not kept: %s", error)
+
+
+def _examples() -> list[str]:
+    """Scenes that come with the page."""
+    folder = files("scenelang").joinpath("web/editor/examples")
+    found = folder.iterdir() if folder.is_dir() else ()
+    return sorted(place.name for place in found if place.name.endswith(".nsg"))
+
+
+live_log = logging.getLogger("scenelang.play")
+FILES: Final = {
+    "png": "image/png",
+    "gif": "image/gif",
+    "webp": "image/webp",
+    "apng": "image/apng",
+    "html": "text/html",
+    "nsg": "text/plain",
+}
+KEEP_S: Final = 0.5  # between two keepings of an unsaved text
+MOST_WAITING: Final = 1 << 26  # characters for a page that does not read
+MOST_OPEN: Final = 100
+
+
+class Open:
+    """A file that the page shows."""
+
+    def __init__(self, path: Path, text: str, disk: str | None) -> None:
+        self.path = path
+        self.text, self.version = text, 0  # of the page
+        self.saved, self.disk = text, disk  # what the file held when the page was last told
+        self.base = disk  # digest of what the text is an edit of
+        self.wanted: frozenset[Path] = frozenset()  # files that it imports
+        self.angles: frozenset[str] = frozenset()  # params in radians
+        self.keeping: asyncio.TimerHandle | None = None
+
+
+class Live:
+    """A page's connection."""
+
+    def __init__(self, play: Play, socket: WebSocket) -> None:
+        self._play, self._socket = play, socket
+        self.open: dict[str, Open] = {}
+        self._out: asyncio.Queue[str] = asyncio.Queue()
+        self._waiting = 0  # characters of what is to be sent
+        self._over = asyncio.Event()
+        self._jobs = Jobs(self.tell)
+
+    @property
+    def names(self) -> Collection[str]:
+        """The files that the page shows."""
+        return self.open.keys()
+
+    async def run(self) -> None:
+        """Answer the page until it is gone."""
+        await self._socket.accept()
+        tasks = [asyncio.create_task(work) for work in (self._write(), self._read(), self._over.wait())]
+        try:
+            self.tell(await self._play.files())
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._jobs.close()
+            for task in tasks:
+                task.cancel()
+            for name in list(self.open):
+                self._keep(name)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await self._socket.close()
+
+    def tell(self, message: Json | str) -> None:
+        """Send a message as soon as those before are sent; a page that does not read is given up."""
+        text = message if isinstance(message, str) else json.dumps(message)
+        self._waiting += len(text)
+        if self._waiting > MOST_WAITING:
+            self._over.set()
+        else:
+            self._out.put_nowait(text)
+
+    async def _write(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                text = await self._out.get()
+                await self._socket.send_text(text)
+                self._waiting -= len(text)
+
+    async def _read(self) -> None:
+        while True:
+            try:
+                text = await self._socket.receive_text()
+            except (WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
+                return
+            await asyncio.sleep(0)  # whatever is to be sent goes first, though there may be more to read
+            message: Json = {}
+            try:
+                given = read_json(text.encode("utf-8"))
+                message = given if isinstance(given, dict) else {}
+                await self._answer(message)
+            except (Refused, OSError) as error:
+                self._trouble(message, str(error))
+            except (ValueError, RecursionError) as error:
+                self._trouble(message, f"not a message: {error}")
+            except Exception as error:
+                live_log.exception("internal error")
+                self._trouble(message, f"internal error: {error!r}")
+
+    def _trouble(self, message: Json, why: str) -> None:
+        id, file = message.get("id"), message.get("file")
+        id = id if isinstance(id, int | str | None) else None
+        self.tell(
+            {"kind": "error", "id": id, "file": file if isinstance(file, str) else None, "message": why}
+        )
+
+    async def _answer(self, message: Json) -> None:
+        kind = string_of(message, "kind")
+        if kind not in _ANSWERS:
+            raise ValueError(f"unknown kind `{kind[:40]}`")
+        await _ANSWERS[kind](self, message)
+
+    # ------------------------------------------------------------ texts
+
+    async def _open(self, message: Json) -> None:
+        name = string_of(message, "file")
+        path = self._play.folder.place(name)
+        if name not in self.open and len(self.open) >= MOST_OPEN:
+            raise Refused(f"more than {MOST_OPEN} open files")
+        kept = await asyncio.to_thread(self._play.journal.find, path)
+        async with self._play.reading:
+            text, disk = await asyncio.to_thread(self._play.folder.read, name)
+        known = self.open.get(name)
+        if known is None:
+            known = self.open[name] = Open(path, text or "", disk)
+        unsaved = None
+        if kept is not None and kept.text != text:
+            unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds}
+        known.saved, known.disk = text or "", disk
+        if not known.version:
+            known.text, known.base = text or "", disk
+        said = {"file": name, "text": text, "version": known.version, "disk": disk}
+        self.tell({"kind": "text", **said, "origin": "open", "unsaved": unsaved})
+        self._view(name)
+
+    async def _edit(self, message: Json) -> None:
+        name, known = self._known(message)
+        known.text, known.version = text_of(message), whole_of(message, "version", 1, 1 << 53)
+        self._jobs.cancel(lambda slot, id, file: file == name and slot[0] not in ("file", "view"))
+        if known.keeping is None:
+            known.keeping = asyncio.get_running_loop().call_later(KEEP_S, self._keep_later, name)
+        for other in [name, *(k for k, o in self.open.items() if known.path in o.wanted)]:
+            self._view(other)
+
+    async def _save(self, message: Json) -> None:
+        name, known = self._known(message)
+        base = message.get("base")
+        if not isinstance(base, str | None):
+            raise ValueError("`base` is neither a text nor null")
+        text, version = text_of(message), whole_of(message, "version", 0, 1 << 53)
+        said = {"file": name, "version": version}
+        try:
+            # the page is not told of what it has written itself
+            disk = await self._play.write(name, text, base, self)
+        except Changed as change:
+            self.tell({"kind": "conflict", **said, "text": change.text, "disk": change.disk})
+            return
+        known.saved, known.disk, known.base = text, disk, disk
+        if version >= known.version:
+            known.text = text
+        self._keep(name)
+        self.tell({"kind": "saved", **said, "disk": disk})
+
+    async def _discard(self, message: Json) -> None:
+        name, known = self._known(message)
+        self._unkeep(known)
+        known.text, known.base = known.saved, known.disk
+        await asyncio.to_thread(self._play.journal.drop, known.path)
+        self._view(name)
+
+    async def _close(self, message: Json) -> None:
+        name, _ = self._known(message)
+        self._keep(name)
+        self._jobs.cancel(lambda slot, id, file: file == name)
+        del self.open[name]
+
+    async def _rename(self, message: Json) -> None:
+        name, to = string_of(message, "file"), string_of(message, "to")
+        await asyncio.to_thread(self._play.folder.rename, name, to)
+        if (known := self.open.pop(name, None)) is not None:
+            self._unkeep(known)
+            self._play.journal.drop(known.path)
+            known.path = self._play.folder.place(to)
+            self.open[to] = known
+            self._keep(to)
+        await self._play.refresh()
+
+    def _known(self, message: Json) -> tuple[str, Open]:
+        name = string_of(message, "file")
+        if name not in self.open:
+            raise Refused(f"`{name[:80]}` is not open")
+        return name, self.open[name]
+
+    def _keep_later(self, name: str) -> None:
+        known = self.open.get(name)
+        if known is not None:
+            known.keeping = None
+            self._play.later(
+                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
+            )
+
+    def _keep(self, name: str) -> None:
+        """Keep what is not saved of a file, now."""
+        known = self.open[name]
+        self._unkeep(known)
+        if known.version:
+            self._play.keep(known.path, known.text, known.saved, known.base)
+
+    def _unkeep(self, known: Open) -> None:
+        if known.keeping is not None:
+            known.keeping.cancel()
+            known.keeping = None
+
+    def changed(self, name: str, text: str | None, disk: str | None) -> None:
+        """Tell the page that a file of its is another one on the disk."""
+        known = self.open.get(name)
+        if known is None or known.disk == disk:
+            return
+        clean = known.text == known.saved
+        known.saved, known.disk = text or "", disk
+        said = {"file": name, "text": text, "version": known.version, "disk": disk}
+        self.tell({"kind": "text", **said, "origin": "disk", "unsaved": None})
+        if clean:
+            known.text, known.base = known.saved, disk
+            self._view(name)
+
+    def imported(self, path: Path) -> None:
+        """Show again what imports a file that has changed."""
+        for name, known in self.open.items():
+            if path in known.wanted:
+                self._view(name)
+
+    # ------------------------------------------------------------ jobs
+
+    def _view(self, name: str) -> None:
+        version = self.open[name].version
+
+        def found(answer: Answer) -> None:
+            known = self.open.get(name)
+            if known is not None:
+                known.wanted = frozenset(map(Path, answer.head["wanted"]))
+                known.angles = frozenset(answer.head.get("angles", known.angles))
+
+        message = {"kind": "view", "file": name, "version": version}
+        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, found)
+
+    async def _draw(self, message: Json) -> None:
+        name, known = self._known(message)
+        id, by = id_of(message), string_of(message, "by")
+        if by not in LIMITS_S or by == "view":
+            raise ValueError(f"`by` is `{by[:40]}`")
+        said = {"kind": "figures" if by == "figures" else "picture", "id": id, "file": name}
+        said |= {"version": known.version, "by": by}
+        job = {"do": by, "message": said, **wishes(message)}
+        self._start((by, ""), id, name, job, self._play.quick if by == "network" else self._play.slow)
+
+    async def _download(self, message: Json) -> None:
+        name, known = self._known(message)
+        id, kind = id_of(message), string_of(message, "as")
+        if kind not in FILES:
+            raise ValueError(f"`as` is `{kind[:40]}`")
+        stem = Path(name).name.removesuffix("nsg") + ("png" if kind == "apng" else kind)
+
+        def made(answer: Answer) -> None:
+            key = self._play.store.put(stem, FILES[kind], answer.data)
+            url = f"download?key={key}"
+            self.tell({"kind": "ready", "id": id, "url": url, "name": stem, "bytes": len(answer.data)})
+
+        if kind == "nsg":
+            made(Answer(known.text.encode()))
+            return
+        job = {"do": "file", "as": kind, "message": {}, **wishes(message)}
+        self._start(("file", str(id)), id, name, job, self._play.slow, made)
+
+    async def _stop(self, message: Json) -> None:
+        wanted = id_of(message)
+        self._jobs.cancel(lambda slot, id, file: id == wanted and id is not None)
+
+    def _start(self, slot: Slot, id: Any, name: str, job: Json, pool: Pool, done: Took | None = None) -> None:
+        """Do a job of a file as the page has it."""
+        known, root = self.open[name], self._play.folder.root
+        job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
+        job["params"] = {k: in_unit(v) if k in known.angles else v for k, v in job["params"].items()}
+        job["path"], job["root"] = str(known.path), None if root is None else str(root)
+        job["texts"] = {
+            str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
+        }
+        self._jobs.start(slot, id, name, job, pool, done)
+
+
+_ANSWERS: Final[dict[str, Callable[[Live, Json], Coroutine[Any, Any, None]]]] = {
+    "open": Live._open,
+    "edit": Live._edit,
+    "save": Live._save,
+    "discard": Live._discard,
+    "close": Live._close,
+    "rename": Live._rename,
+    "draw": Live._draw,
+    "download": Live._download,
+    "cancel": Live._stop,
+}

@@ -1,0 +1,433 @@
+"""`scenelang play`: a local page that edits scenes and shows them.
+
+The page is on this machine, and so is whatever else the browser shows. Another site's page can send requests
+here, and by a name that it has point at 127.0.0.1 even read the answers, but knows no token, cannot choose
+the ``Host`` of a name that is not its own, and cannot hide its ``Origin``.
+
+**Addresses.** Everything lies below ``http://127.0.0.1:PORT/TOKEN/``, so the page uses relative addresses
+(``static/play.js``, ``live``, ``lsp``, ``download?key=…``) and names the token nowhere; behind an address at
+the root ``?token=TOKEN`` does too. Of every request the token, the ``Host`` (a name of this machine) and the
+``Origin`` are checked; a websocket must have an origin.
+
+- ``GET ./``: ``web/play.html``, in which ``__NONCE__`` is replaced by that of its content policy: scripts
+  come from ``static/`` alone, a ``<style>`` needs the nonce (of CodeMirror: ``EditorView.cspNonce``),
+  pictures may be ``data:`` and ``blob:``, nothing comes from elsewhere, and the page has no ``style="…"`` and
+  no inline script.
+- ``GET static/NAME``: a file of ``web/``; ``static/viewer/NAME``: one of the viewer's, a module as it is
+  written; ``static/examples/NAME.nsg``: a scene to start from.
+- ``GET download?key=KEY``: a file that was made, once.
+
+**A websocket of JSON texts, ``live``.** Names of files are relative to the folder, with ``/``. ``version`` is
+the page's number of a text, at least 1, and grows; answers carry that of the text that they are of. ``disk``
+is a digest of what the file held when it was last read or written; null where there is no file. The page
+says:
+
+- ``{kind: "open", file}``: answered by ``text``, then ``view``.
+- ``{kind: "edit", file, version, text}``: the text of an open file; answered by ``view``.
+- ``{kind: "save", file, version, text, base}``: write it, if the file still is as when its ``disk`` was
+  ``base`` (null: there is none); answered by ``saved`` or ``conflict``.
+- ``{kind: "discard", file}``: forget what was not saved. ``{kind: "close", file}``: it is not shown any more.
+- ``{kind: "rename", file, to}``: answered by ``files``.
+- ``{kind: "draw", id, file, params, frame, size, by}``: ``by`` is ``network``, ``reference``, ``difference``
+  or ``figures``; answered by one of ``picture``, ``figures``, ``cancelled``, ``error``. ``params`` maps names
+  to numbers (an angle's is in radians), booleans, vectors as lists, or texts as behind ``-D``; those left out
+  have their defaults. ``size`` is ``[width, height]``, null for the scene's own.
+- ``{kind: "download", id, file, as, params, frame, size}``: ``as`` is ``png``, ``gif``, ``webp``, ``apng``,
+  ``html`` or ``nsg``; answered by ``progress`` …, then ``ready``.
+- ``{kind: "cancel", id}``: a drawing or a download. A newer drawing by the same means cancels the older, and
+  an edit cancels drawings of the text before.
+
+The server says:
+
+- ``{kind: "files", files, examples, folder, open, uri, most: {bytes, side}}``: at first and after changes.
+  ``folder`` is its name, ``open`` the file to show first or null, ``uri`` the folder's for ``lsp``, with a
+  ``/`` at its end.
+- ``{kind: "text", file, text, version, disk, origin, unsaved}``: ``origin`` is ``open``, or ``disk`` where
+  the file has changed there (``text`` null: it is gone). ``version`` is that of the last edit, 0 before any.
+  ``unsaved`` is null or ``{text, disk, seconds}``: what was not saved when page or server ended, so long ago.
+- ``{kind: "saved", file, version, disk}``: which is not told back as a ``text``.
+- ``{kind: "conflict", file, version, text, disk}``: nothing was written, as the file holds ``text``; the same
+  save with ``base: disk`` overwrites it.
+- ``{kind: "view", file, version, view, problems: [{code, severity, message, line, column}], ms}``: ``view``
+  is a text (`View.message`), null where the scene has errors, or where the last problem, a warning, says why
+  no page draws it, as the network still does.
+- ``{kind: "picture", id, file, version, by, png, size, ms, …}``: ``png`` in base64; ``ms`` by stage. A
+  difference is three pictures in a row, with ``psnr``, ``ssim`` and ``flip``.
+- ``{kind: "figures", id, file, version, model, objects, rows, canvas, ms, psnr, ssim, flip}``: null where the
+  package that measures it is missing.
+- ``{kind: "progress", id, done}``: of a download, in [0, 1]. ``{kind: "ready", id, url, name, bytes}``: fetch
+  it.
+- ``{kind: "cancelled", id}``: by a newer one, by the page or by an edit.
+- ``{kind: "error", id, file, message}``: of one message of the page; ``id`` and ``file`` may be null.
+
+**A websocket of JSON-RPC, ``lsp``**, a message a text: `scenelang lsp` in a process of its own. Addresses of
+files are below ``uri``; messages with others are refused. The folder and the root of imports are the
+server's, whatever ``initialize`` says.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import ipaddress
+import logging
+import mimetypes
+import re
+import secrets
+import socket
+import threading
+import webbrowser
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qs, quote
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
+from watchfiles import Change, DefaultFilter, awatch
+
+from scenelang.web.folder import Refused
+from scenelang.web.language import Languages
+from scenelang.web.live import Live, Play
+
+LOCAL: Final = ("localhost", "127.0.0.1", "::1")
+HEADERS: Final = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+_NOTHING: Final = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+_REFUSED: Final = "Refused: open the address that `scenelang play` has printed.\n"
+
+
+def policy(nonce: str, host: str) -> str:
+    """The content policy of the page; ``host`` is its own, with the port."""
+    return (
+        f"{_NOTHING}; script-src 'self'; style-src 'self' 'nonce-{nonce}'; img-src 'self' data: blob:; "
+        f"connect-src 'self' ws://{host}"
+    )
+
+
+class Guard:
+    """Lets requests through that have the token, come from the page itself and name this machine.
+
+    Args:
+        app: what answers; the token is taken off its paths.
+        token: what the page's address holds.
+        hosts: names by which this machine may be called, besides those of its loopback.
+        anywhere: any number of an address is a name of it: it serves others too.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, hosts: Iterable[str] = (), anywhere: bool = False) -> None:
+        self._app, self._token, self._anywhere = app, token, anywhere
+        self._hosts = {*LOCAL, *(host.lower() for host in hosts)}
+        self._once: str | None = secrets.token_urlsafe(16)
+
+    @property
+    def once(self) -> str:
+        """A path that leads to the page once: a browser's command line, which others may read, gets this."""
+        return f"/open/{self._once}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+
+        async def answer(message: Message) -> None:
+            if message["type"] in ("http.response.start", "websocket.accept"):
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers[name] = value
+                headers.setdefault("Content-Security-Policy", _NOTHING)
+            await send(message)
+
+        if self._knows(scope):
+            path, query = scope["path"], parse_qs(scope["query_string"].decode("latin-1"))
+            first, _, rest = path.removeprefix("/").partition("/")
+            if self._once and _same(path, self.once):
+                self._once = None
+                await RedirectResponse(f"/{self._token}/", 303)(scope, receive, answer)
+                return
+            if _same(first, self._token) and path != f"/{first}":
+                inner = {**scope, "path": f"/{rest}", "raw_path": None}
+                await self._app(inner, receive, answer)
+                return
+            if _same(first, self._token) or (path == "/" and _same(query.get("token", [""])[0], self._token)):
+                await RedirectResponse(f"/{self._token}/", 303)(scope, receive, answer)
+                return
+            if _same(query.get("token", [""])[0], self._token):
+                await self._app(scope, receive, answer)
+                return
+        if scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await PlainTextResponse(_REFUSED, 403)(scope, receive, answer)
+
+    def _knows(self, scope: Scope) -> bool:
+        """Whether a request names this machine and no other page sent it."""
+        headers = Headers(scope=scope)
+        host, origin, site = headers.getlist("host"), headers.getlist("origin"), headers.get("sec-fetch-site")
+        if len(host) != 1 or not self._is_here(host[0]) or len(origin) > 1:
+            return False
+        if scope["type"] == "websocket" and not origin:
+            return False
+        if site not in (None, "same-origin", "none"):
+            return False
+        return not origin or origin[0].lower() == f"http://{host[0].lower()}"
+
+    def _is_here(self, host: str) -> bool:
+        """Whether a ``Host`` is a name of this machine; the port is in the origin."""
+        name, _, port = host.lower().rpartition(":") if not host.endswith("]") else (host, "", "")
+        name = name if port.isascii() and port.isdigit() else host.lower()
+        name = name[1:-1] if name.startswith("[") and name.endswith("]") else name
+        if name in self._hosts:
+            return True
+        try:
+            return self._anywhere and bool(ipaddress.ip_address(name))
+        except ValueError:
+            return False
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two texts are the same, in a time that does not tell how much of them is."""
+    return secrets.compare_digest(one.encode("utf-8", "replace"), other.encode())
+
+
+def is_loopback(host: str) -> bool:
+    """Whether nobody but this machine reaches an address."""
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        return False
+    return all(ipaddress.ip_address(str(place[4][0]).partition("%")[0]).is_loopback for place in found)
+
+
+watch_log = logging.getLogger("scenelang.play")
+STEP_MS: Final = 30  # a change is told once nothing has changed for so long
+PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle of being written
+SLOW_MS: Final = 1000  # between two looks where the system gives no notice
+
+
+class _Filter(DefaultFilter):
+    """Not what is hidden, and no temporary files of ours."""
+
+    def __call__(self, change: Change, path: str) -> bool:
+        return not Path(path).name.startswith(".") and super().__call__(change, path)
+
+
+async def watch(play: Play, stop: asyncio.Event) -> None:
+    """Tell pages of changes until ``stop``."""
+    await asyncio.to_thread(play.folder.names)  # which finds whether it is large
+    for polling in (False, True):
+        try:
+            changes = awatch(
+                play.folder.path,
+                watch_filter=_Filter(),
+                debounce=300,
+                step=STEP_MS,
+                stop_event=stop,
+                recursive=not play.folder.is_large and not polling,
+                force_polling=polling or None,
+                poll_delay_ms=SLOW_MS,
+            )
+            async for found in changes:
+                play.later(_tell(play, {Path(path) for _, path in found}))
+            return
+        except (OSError, RuntimeError) as error:
+            watch_log.warning("the system does not tell of changes: %s", error)
+
+
+async def _tell(play: Play, paths: set[Path]) -> None:
+    names = {name for path in paths if (name := play.folder.name_of(path)) is not None}
+    for name in names:
+        if any(name in page.names for page in play.pages):
+            await _reread(play, name)
+    for page in play.pages:
+        for path in paths:
+            page.imported(path)
+    if names or any(path.is_dir() or not path.exists() for path in paths):
+        await play.refresh()
+
+
+async def _reread(play: Play, name: str) -> None:
+    for patient in (False, True):
+        async with play.reading:
+            try:
+                text, disk = await asyncio.to_thread(play.folder.read, name)
+            except Refused as error:
+                watch_log.warning("%s", error)
+                return
+            if text or patient:
+                for page in play.pages:
+                    page.changed(name, text, disk)
+                return
+        await asyncio.sleep(PATIENCE_S)
+
+
+MOST_PAGES: Final = 8
+_KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".nsg": "text/plain"}
+_STATIC: Final = re.compile(r"(?:(viewer|examples)/)?([A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)+)")
+_FROM: Final = {None: "web/editor", "viewer": "web/viewer", "examples": "web/editor/examples"}
+
+
+def make_app(play: Play) -> Starlette:
+    """The server, without a guard; while it runs processes wait for jobs and the folder is watched."""
+
+    languages = Languages(play.folder)
+
+    async def page(request: Request) -> Response:
+        nonce = secrets.token_urlsafe(16)
+        text = files("scenelang").joinpath("web/editor/play.html").read_text("utf-8")
+        headers = {"Content-Security-Policy": policy(nonce, request.headers["host"])}
+        return Response(text.replace("__NONCE__", nonce), media_type="text/html", headers=headers)
+
+    async def download(request: Request) -> Response:
+        found = play.store.take(request.query_params.get("key", ""))
+        if found is None:
+            return PlainTextResponse("There is no such file any more.\n", 404)
+        name, kind, data = found
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}
+        return Response(data, media_type=kind, headers=headers)
+
+    async def live(socket: WebSocket) -> None:
+        connection = Live(play, socket)
+        play.pages.add(connection)
+        try:
+            await connection.run()
+        finally:
+            play.pages.discard(connection)
+
+    @contextlib.asynccontextmanager
+    async def running(_: Starlette) -> AsyncIterator[None]:
+        stop = asyncio.Event()
+        play.quick.start()
+        play.views.start()
+        languages.start()
+        play.later(asyncio.to_thread(play.journal.tidy))
+        play.later(watch(play, stop))
+        try:
+            yield
+        finally:
+            stop.set()
+            await languages.close()
+            await play.close()
+
+    routes = [
+        Route("/", page),
+        Route("/static/{name:path}", _static),
+        Route("/download", download),
+        WebSocketRoute("/live", _few(live)),
+        WebSocketRoute("/lsp", _few(languages.serve)),
+    ]
+    return Starlette(routes=routes, lifespan=running)
+
+
+async def _static(request: Request) -> Response:
+    """A file of the package."""
+    found = _STATIC.fullmatch(request.path_params["name"])
+    place = files("scenelang").joinpath(_FROM[found[1]], found[2]) if found is not None else None
+    if place is None or not place.is_file():
+        return PlainTextResponse("There is no such file.\n", 404)
+    kind = _KINDS.get(Path(place.name).suffix) or mimetypes.guess_type(place.name)[0]
+    return Response(place.read_bytes(), media_type=kind or "application/octet-stream")
+
+
+def _few(answer: Callable[[WebSocket], Awaitable[None]]) -> Callable[[WebSocket], Awaitable[None]]:
+    """What refuses a connection where there are `MOST_PAGES` already."""
+    count = 0
+
+    async def counted(socket: WebSocket) -> None:
+        nonlocal count
+        if count >= MOST_PAGES:
+            await socket.close(1013, f"more than {MOST_PAGES} pages")
+            return
+        count += 1
+        try:
+            await answer(socket)
+        finally:
+            count -= 1
+
+    return counted
+
+
+PORT: Final = 8766
+MOST_MESSAGE: Final = 1 << 25
+"""Bytes of a message of the page: the largest text, each character of which may be escaped."""
+_LEAVE_S: Final = 2
+
+
+class PortTaken(OSError):
+    """The port that was asked for cannot be had."""
+
+
+def listen(host: str, port: int | None) -> socket.socket:
+    """A listening socket: on the port, or on `PORT` or any other that is free.
+
+    Raises:
+        PortTaken: it cannot be had.
+        OSError: there is no such address here.
+    """
+    wanted = (PORT, 0) if port is None else (port,)
+    for number in wanted:
+        try:
+            family = socket.getaddrinfo(host, number, type=socket.SOCK_STREAM)[0][0]
+            return socket.create_server((host, number), family=family)
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise OSError(error.errno, f"cannot listen on `{host}`: {error.strerror or error}") from None
+            if number == wanted[-1]:
+                reason = "is in use" if error.errno == errno.EADDRINUSE else "may not be used"
+                raise PortTaken(error.errno, f"port {number} of {host} {reason}") from None
+    raise AssertionError
+
+
+def serve(
+    play: Play, host: str, port: int | None, *, browser: bool, say: Callable[[str], None] = print
+) -> None:
+    """Serve until Ctrl-C, which is raised again when everything has ended.
+
+    Args:
+        host: an address or name of this machine.
+        port: None for any.
+        browser: open the page.
+        say: told the address.
+
+    Raises:
+        OSError: as `listen`.
+    """
+    token = secrets.token_urlsafe(32)
+    with listen(host, port) as listener:
+        number = listener.getsockname()[1]
+        local = is_loopback(host)
+        hosts = () if local else (host, socket.gethostname())
+        guard = Guard(make_app(play), token, hosts, anywhere=not local)
+        name = host if local or host not in ("0.0.0.0", "::", "") else LOCAL[1]
+        name = f"[{name}]" if ":" in name else name
+        config = uvicorn.Config(
+            guard,
+            log_level=logging.WARNING,
+            access_log=False,  # which would hold the token
+            server_header=False,
+            http="h11",
+            ws="websockets-sansio",
+            ws_max_size=MOST_MESSAGE,
+            ws_per_message_deflate=False,
+            lifespan="on",
+            timeout_graceful_shutdown=_LEAVE_S,
+        )
+        say(f"http://{name}:{number}/{token}/")
+        if browser:
+            address = f"http://{name}:{number}{guard.once}"
+            threading.Timer(0.3, webbrowser.open, (address,)).start()
+        uvicorn.Server(config).run(sockets=[listener])

@@ -1,0 +1,147 @@
+"""The solid network for the page's shader: its layers as GLSL, its numbers as one array.
+
+Each shape's decoder and each token's cell is prepared here, as a renderer would: weights linear in a code,
+gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The rest
+of the shader, the same for every network, are the files of `FILES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from scenelang.compiler.groups import INTERSECT, SUBTRACT
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
+from scenelang.drawing.arrays import Smooth
+from scenelang.drawing.neural.network import TOKENS
+from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
+from scenelang.drawing.solid.passes import SLACK
+from scenelang.web.arrays import Store, web
+
+FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
+"""Of ``web/``, one behind the other."""
+_CONSTANTS: Final = {
+    "EMPTY": EMPTY,
+    "RADIUS": RADIUS,
+    "EXTINCTION": EXTINCTION,
+    "FADE": FADE,
+    "NEAREST": NEAREST,
+    "LIFT": LIFT,
+    "AMBIENT_EVEN": AMBIENT[0],
+    "AMBIENT_UP": AMBIENT[1],
+}
+
+
+def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
+    """The parts ``shader`` and ``network`` of a view."""
+    config, decoders = network.config, [network.decoder(code) for code in network.codes]
+    paint, kind, width = config.paint_lines, config.kind_lines, config.width
+    kinds = [*(network.cell(token, BLEND) for token in range(TOKENS))]
+    kinds += [network.cut(token, BLEND) for token in (SUBTRACT, INTERSECT)]
+    cells = np.concatenate([_cell(each[-1]) for each in kinds])
+    cells[TOKENS * (2 + paint + kind) :].reshape(2, -1, 4)[:, 2:] = 0.0, 0.0, -1.0, 0.0  # colours are kept
+    sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
+    parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
+    parts += [f"const int {name} = {value};" for name, value in sizes.items()]
+    parts += [
+        f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
+    ]
+    parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
+    return {
+        "shader": {"source": "".join(map(web, FILES)).replace("//network//", "\n".join(parts))},
+        "network": {
+            "cells": store.add(cells.astype(np.float32).reshape(-1)),
+            "boxes": store.add(
+                np.array([network.box(layers) for layers in decoders], np.float32).reshape(-1)
+            ),
+            "geometries": len(decoders),
+            "blend": BLEND,
+            "slack": SLACK,
+            "far": RADIUS,
+            "products": width * (width + 4) + 2 * (1 + paint + kind),
+        },
+    }
+
+
+def _cell(cell: Cell) -> np.ndarray:
+    """A cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
+    lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
+    return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
+
+
+def _gates(paint: int, kind: int) -> str:
+    """GLSL of the cell's gates, of lines behind the place ``at``; distances in widths of the usual blend."""
+
+    def largest(first: int, count: int) -> str:
+        gates = [f"dot(cells[at + {first + i}].xyz, vec3(d, before, 1.0))" for i in range(count)]
+        found = gates[0]
+        for gate in gates[1:]:
+            found = f"max({found}, {gate})"
+        return f"return clamp({found}, 0.0, 1.0);"
+
+    parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
+    head = "(int at, float d, float before)"
+    return "".join(_function(f"float {name}{head}", [largest(*lines)]) for name, lines in parts.items())
+
+
+def _decoders(decoders: Sequence[Smooth], sloped: bool) -> str:
+    """GLSL of the decoders, those of shapes that a scene shows; if sloped with their gradients.
+
+    Weights are literals: compilers make three times as much of these as of uniforms.
+    """
+    lines = []
+    for shape, layers in enumerate(decoders):
+        body = [f"    {line}" for line in _decoder(layers, sloped)]
+        lines += [f"#ifdef SHAPE_{shape}", f"  if (shape == {shape}) {{", *body, "  }", "#endif"]
+    head = f"float decoder(int shape, vec3 q{', out vec3 g' if sloped else ''}) {{"
+    return "\n".join([head, *(["  g = vec3(0.0);"] if sloped else []), *lines, "  return EMPTY;", "}"])
+
+
+def _decoder(layers: Smooth, sloped: bool) -> list[str]:
+    """Statements that return a decoder's answer, its units four by four."""
+    lines, inputs = [], ["q.x", "q.y", "q.z"]
+    quads = -(-len(layers[0][1]) // 4)
+    padded = [_padded(w, b, 4 * quads) for w, b in layers]
+    for (w, b), name in zip(padded[:-1], "ab", strict=True):
+        for k in range(quads):
+            four = slice(4 * k, 4 * k + 4)
+            terms = [f"{x} * {_four(w[four, i])}" for i, x in enumerate(inputs)]
+            x, s = f"{name}{k}", f"{name}{k}s"
+            lines.append(f"vec4 {x} = {' + '.join([_four(b[four]), *terms])};")
+            lines.append(f"vec4 {s} = 1.0 / (1.0 + exp(-{x}));")
+            if sloped:  # the derivative of x s
+                lines.append(f"vec4 {x}d = {s} * (1.0 + {x} * (1.0 - {s}));")
+            lines.append(f"{x} *= {s};")
+        inputs = [f"{name}{k}.{axis}" for k in range(quads) for axis in "xyzw"]
+    (w1, _), (w2, _), (w3, b3) = padded
+    if sloped:
+        lines += [f"b{k}d *= {_four(w3[0, 4 * k : 4 * k + 4])};" for k in range(quads)]
+        back = [", ".join(_back(w2[:, 4 * k + j], "b") for j in range(4)) for k in range(quads)]
+        lines += [f"a{k}d *= vec4({four});" for k, four in enumerate(back)]
+        lines.append(f"g = vec3({', '.join(_back(w1[:, j], 'a') for j in range(3))});")
+    last = [f"dot(b{k}, {_four(w3[0, 4 * k : 4 * k + 4])})" for k in range(quads)]
+    return [*lines, f"return {' + '.join([repr(float(b3[0])), *last])};"]
+
+
+def _padded(w: np.ndarray, b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (width, inputs or width) and biases (width,) with zeros for units that a layer lacks."""
+    inputs = 3 if w.shape[1] == 3 else width
+    full, bias = np.zeros((width, inputs)), np.zeros(width)
+    full[: len(w), : w.shape[1]], bias[: len(b)] = w, b
+    return full, bias
+
+
+def _back(column: np.ndarray, name: str) -> str:
+    """What a layer's gradients give to an input, by its weights there."""
+    fours = column.reshape(-1, 4)
+    return " + ".join(f"dot({_four(four)}, {name}{k}d)" for k, four in enumerate(fours))
+
+
+def _four(numbers: np.ndarray) -> str:
+    return f"vec4({', '.join(f'{number:.9g}' for number in numbers)})"
+
+
+def _function(head: str, lines: Sequence[str]) -> str:
+    return "\n".join([f"{head} {{", *(f"  {line}" for line in lines), "}", ""])

@@ -1,0 +1,286 @@
+"""Weights, checkpoints and manifests that mean harm: an error in words, soon and in bounded memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from fuzz.tensors import mutate
+from lab.training.checkpoint import load_tensors
+from scenelang.assets.tensors import TensorError, read_tensors
+from scenelang.compiler import manifest as manifests
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.weights import ModelError, codes_of, open_weights, weights_path
+from scenelang.drawing.neural.files import framed_arrays
+from scenelang.drawing.neural.load import load_network
+from tests.cli.conftest import Folder
+from tests.lab.conftest import run
+
+SHAPES = load_manifest("shapes2d")
+DATA = weights_path("shapes2d").read_bytes()
+
+
+def outer(data: bytes = DATA) -> dict[str, Any]:
+    """The safetensors header."""
+    (length,) = struct.unpack("<Q", data[:8])
+    return json.loads(data[8 : 8 + length])  # type: ignore[no-any-return]
+
+
+def joined(header: dict[str, Any] | bytes, length: int | None = None) -> bytes:
+    """The shipped weights behind another header."""
+    (old,) = struct.unpack("<Q", DATA[:8])
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return struct.pack("<Q", len(text) if length is None else length) + text + DATA[8 + old :]
+
+
+def tensor(name: str, **change: Any) -> bytes:
+    header = outer()
+    header[name] = {**header[name], **change}
+    return joined(header)
+
+
+def arrays(**change: np.ndarray | None) -> bytes:
+    """The shipped weights with other tensors, well-formed."""
+    kept = {key: value for key, value in {**load(DATA), **change}.items() if value is not None}
+    return save(kept, metadata=outer()["__metadata__"])
+
+
+def network(**change: Any) -> bytes:
+    """The shipped weights whose header names other sizes."""
+    header = outer()
+    told = json.loads(header["__metadata__"]["scenelang"])
+    told["config"]["network"].update(change)
+    header["__metadata__"]["scenelang"] = json.dumps(told)
+    return joined(header)
+
+
+def twice() -> bytes:
+    text = json.dumps(outer()).encode()
+    again = json.dumps(outer()["codes"]).encode()
+    return joined(text[:-1] + b', "codes": ' + again + b"}")
+
+
+CODES = load(DATA)["codes"]
+HARM = {
+    "nothing": b"",
+    "a few bytes": b"\0" * 7,
+    "a header of 2^63 bytes": joined(outer(), length=1 << 63),
+    "a header longer than the file": joined(outer(), length=len(DATA)),
+    "a header of 2 MB": joined(b" " * (2 << 20)),
+    "deep brackets": joined(b"[" * 500_000),
+    "no JSON": joined(b"{]"),
+    "not an object": joined(b"[1]"),
+    "a key given twice": twice(),
+    "overlapping offsets": tensor("codes", data_offsets=outer()["material_codes"]["data_offsets"]),
+    "offsets beyond the file": tensor("codes", data_offsets=[0, 1 << 40]),
+    "offsets in the wrong order": tensor("codes", data_offsets=[64, 0]),
+    "negative offsets": tensor("codes", data_offsets=[-64, 0]),
+    "a negative shape": tensor("codes", shape=[-4, -4]),
+    "a huge shape": tensor("codes", shape=[1 << 40, 1 << 40]),
+    "a shape that overflows": tensor("codes", shape=[1 << 62, 4]),
+    "a shape of text": tensor("codes", shape="4, 4"),
+    "an unknown type": tensor("codes", dtype="F31"),
+    "an offset too many": tensor("codes", data_offsets=[0, 64, 64]),
+    "offsets of a shape too large": tensor("codes", shape=[4, 5]),
+    "a side of true": tensor("codes", shape=[True, 16]),
+    "forty sides": tensor("codes", shape=[4, 4, *[1] * 40]),
+    "a tensor with more to say": tensor("codes", strides=[4, 1]),
+    "a tensor without a type": joined({**outer(), "codes": {"shape": [4, 4], "data_offsets": [0, 64]}}),
+    "a tensor with a name to hide": joined({"\x1b[2J" if k == "codes" else k: v for k, v in outer().items()}),
+    "metadata of others": joined({**outer(), "__metadata__": {**outer()["__metadata__"], "format": "pt"}}),
+    "no metadata": joined({k: v for k, v in outer().items() if k != "__metadata__"}),
+    "metadata that are a list": joined({**outer(), "__metadata__": ["scenelang"]}),
+    "metadata that are a number": joined({**outer(), "__metadata__": {"scenelang": 1}}),
+    "a header of another format": joined({**outer(), "__metadata__": {"scenelang": '{"format": 2}'}}),
+    "a header of format true": joined({**outer(), "__metadata__": {"scenelang": '{"format": true}'}}),
+    "a header that says a thing twice": joined(
+        {**outer(), "__metadata__": {"scenelang": '{"format": 1, "format": 1}'}}
+    ),
+    "cut short": DATA[:-100],
+    "too long": DATA + b"\0" * 100,
+    "no codes": arrays(codes=None),
+    "codes of another type": arrays(codes=CODES.astype(np.float64)),
+    "codes of too few shapes": arrays(codes=CODES[:3]),
+    "codes without rows": arrays(codes=CODES.reshape(-1)),
+    "codes a number too long": arrays(codes=np.zeros((4, 5), np.float32)),
+    "codes a number too short": arrays(material_codes=np.zeros((1, 11), np.float32)),
+    "codes that are not numbers": arrays(codes=np.full_like(CODES, np.nan)),
+    "codes without end": arrays(codes=np.full_like(CODES, np.inf)),
+}  # fmt: skip
+OF_THE_NETWORK = {
+    "a parameter that is not a number": arrays(bump=np.full_like(load(DATA)["bump"], np.nan)),
+    "a parameter of another type": arrays(bump=load(DATA)["bump"].astype(np.float16)),
+    "a parameter too many": arrays(extra=CODES),
+    "a parameter too few": arrays(bump=None),
+    "a parameter of another shape": arrays(bump=np.zeros((4, 9), np.float32)),
+    "a network without a size": network(decoder_width=None),
+    "a network of no size": network(decoder_width=0),
+    "a network of negative size": network(features=-1),
+    "a network of a huge decoder": network(decoder_width=1024),
+    "a network of a huge cell": network(features=1024, state=1024),
+    "a network of true size": network(state=True),
+    "a network with a size unknown": network(depth=3),
+    "a network of an earlier version": network(cell_width=16),
+}
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_codes(name: str) -> None:
+    with pytest.raises(ModelError):
+        codes_of(SHAPES, HARM[name])
+
+
+@pytest.mark.parametrize("name", [*HARM, *OF_THE_NETWORK])
+def test_networks(name: str) -> None:
+    for load_with in (load_network, framed_arrays):
+        with pytest.raises(ModelError) as caught:
+            load_with({**HARM, **OF_THE_NETWORK}[name], SHAPES)
+        assert str(caught.value)
+
+
+def test_weights_of_an_earlier_version_are_called_that() -> None:
+    with pytest.raises(ModelError, match="earlier framed renderer"):
+        load_network(network(cell_width=16), SHAPES)
+
+
+def test_the_shipped_weights_are_none_of_these() -> None:
+    assert codes_of(SHAPES, DATA).geometry.keys() == set(SHAPES.geometries)
+    load_network(arrays(), SHAPES)
+    assert open_weights(DATA).header["model"] == "shapes2d"
+
+
+def test_messages_name_the_place() -> None:
+    for name, words in (
+        ("a huge shape", "tensor `codes` has no shape"),
+        ("codes without end", "tensor `codes` holds numbers that are not finite"),
+        ("codes a number too long", "tensor `codes` is float32 [4, 5]; 4 rows of 4 floats are needed"),
+        ("offsets of a shape too large", "tensor `codes` is F32 [4, 5], which does not take 64 bytes"),
+        ("a key given twice", "the list of tensors: the key `codes` is given twice"),
+    ):
+        with pytest.raises(ModelError) as caught:
+            codes_of(SHAPES, HARM[name])
+        assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming"])
+@pytest.mark.parametrize(
+    "extra", ["codes", "renderer.more", "lifting.more", "lifting.geometry.affine.layers.3.weight"]
+)
+def test_tensors_that_nothing_asks_for(name: str, extra: str) -> None:
+    manifest, data = load_manifest(name), weights_path(name).read_bytes()
+    header = open_weights(data).header
+    made = save({**load(data), extra: np.zeros(3, np.float32)}, metadata={"scenelang": json.dumps(header)})
+    lifting, network = partial(codes_of, manifest, made), partial(load_network, made, manifest)
+    with pytest.raises(ModelError):
+        (lifting if extra.startswith("lifting") else network)()
+
+
+def test_what_is_taken_is_what_safetensors_takes() -> None:
+    """Files damaged at random are refused, or hold what another reader of them finds."""
+    random, taken = Random(4), 0
+    for _ in range(400):
+        data = mutate(DATA, random)
+        try:
+            found = read_tensors(data, len(DATA) * 2).arrays(finite=False)
+        except TensorError:
+            continue
+        try:
+            known = load(data)
+        except SafetensorError as error:
+            pytest.fail(f"taken, where safetensors says: {error}")
+        taken += 1
+        assert found.keys() == known.keys()
+        for key, array in found.items():
+            np.testing.assert_array_equal(array, known[key])
+    assert 40 < taken < 360
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing", "a header of 2^63 bytes", "cut short", "deep brackets", "no codes"]
+)
+def test_commands_say_so(folder: Folder, name: str) -> None:
+    Path("bad.safetensors").write_bytes(HARM[name])
+    result = run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("Error: ")
+
+
+@pytest.mark.parametrize("name", HARM)
+def test_checkpoints(tmp_path: Path, name: str) -> None:
+    """What the file says is tested against the training later; here nothing may break."""
+    path = tmp_path / "checkpoint.safetensors"
+    path.write_bytes(HARM[name])
+    if name.startswith(("codes", "no codes")):  # numbers that are not finite too: those of a training may be
+        load_tensors(path)
+        return
+    with pytest.raises(ModelError):
+        load_tensors(path)
+
+
+MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"format": 2}, {"unknown": 1}, {"name": None}, {"name": 3}, {"name": 'a"b'}, {"dimension": 4},
+        {"dimension": True}, {"dimension": "2"}, {"geometries": "star"}, {"geometries": ["../star"]},
+        {"geometries": ["star", "star"]}, {"geometries": [1]}, {"materials": []}, {"renderer": "../../x"},
+        {"lifting": "a/b"}, {"limits": {"canvas": 1e300}},
+        {"limits": {"canvas": -1}}, {"limits": {"canvas": 1 << 60}}, {"limits": [1]},
+        {"trained": {"twirl": [2]}},
+        {"trained": {"twirl": [2, 1]}}, {"trained": {"twirl": ["a", "b"]}},
+        {"trained": {"twirl": [0, 1e308]}},
+        {"trained": 3}, {"measured": []}, {"name": "../x"}, {"name": ".."}, {"name": "a/b"},
+        {"name": "a" * 101},
+        {"set": "../../x"}, {"set": "C:x"}, {"set": "a\\b"}, {"set": ""}, {"limits": {"depth": 3}},
+        {"limits": {"canvas": 8193}}, {"limits": {"inner_warps": 3}}, {"limits": {"canvas": True}},
+        {"trained": {"shear": [0, 1]}}, {"measured": {"sets": {"shapes2d": {"flip": 10**400}}}},
+        {"measured": {"sets": {"shapes2d": {"flip": "0"}}}}, {"summary": "x" * (1 << 20)},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_manifests(change: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        Manifest.from_json(json.dumps({**MANIFEST, **change}))
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "null", "{", "[" * 100_000, '{"format": 1, "format": 1}', '{"format": NaN}']
+)
+def test_no_manifests(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        Manifest.from_json(text)
+
+
+def test_a_manifest_cannot_point_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "manifest.json").write_text(json.dumps({**MANIFEST, "name": "shapes2d"}))
+    monkeypatch.setattr(manifests, "ROOT", tmp_path)
+    with pytest.raises(ValueError, match="calls itself"):
+        load_manifest("good")
+
+
+def test_a_manifest_that_never_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(manifests, "ROOT", tmp_path)
+    for name in ("pipe", "large"):
+        (tmp_path / name).mkdir()
+    os.mkfifo(tmp_path / "pipe" / "manifest.json")
+    with pytest.raises(OSError, match="not a regular file"):
+        load_manifest("pipe")
+    with (tmp_path / "large" / "manifest.json").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(ValueError, match="more than"):
+        load_manifest("large")

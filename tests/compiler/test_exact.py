@@ -1,0 +1,197 @@
+"""Lifted vectors against products of their matrices and against points carried back step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenelang.compiler.chain import Levels
+from scenelang.compiler.lifting import (
+    OTHERS,
+    PLANE_LAYOUT,
+    SOLID_LAYOUT,
+    WIDTH,
+    Layout,
+    Parts,
+    affine_matrix,
+    leaf_vector,
+    lift_colours,
+    lift_many,
+    warp_matrix,
+)
+from scenelang.compiler.steps import Affine, Rows, Step, Warp
+from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.arrays_torch import TORCH
+from scenelang.drawing.exact.field import carry_back, distance_scale
+from scenelang.drawing.neural.frames import Frames
+
+CODE = (0.5, -1.0, 2.0, 3.0)
+
+
+def random_rows(rng: np.random.Generator) -> Rows:
+    a = rng.uniform(-1, 1, (3, 4))
+    a[:, :3] += np.eye(3) * 1.5
+    return tuple(a.ravel().tolist())
+
+
+def random_levels(rng: np.random.Generator, inner: int, outer: int, strength: float = 1.0) -> Levels:
+    def warps(count: int) -> tuple[Warp, ...]:
+        return tuple(
+            Warp(
+                float(rng.uniform(-strength, strength)),
+                (float(rng.uniform(-strength, strength)), float(rng.uniform(-strength, strength))),
+            )
+            for _ in range(count)
+        )
+
+    return Levels(warps(inner), random_rows(rng), warps(outer), random_rows(rng))
+
+
+def steps_of(levels: Levels) -> tuple[Step, ...]:
+    return (*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine))
+
+
+def matrices(levels: Levels, layout: Layout = PLANE_LAYOUT) -> list[np.ndarray]:
+    """The matrices of a chain, nearest the leaf first: g = M_n … M_1 leaf_vector(code)."""
+    return [
+        *(warp_matrix(w, layout.places.inner, layout) for w in levels.inner),
+        affine_matrix(levels.middle, layout.places.middle, layout),
+        *(warp_matrix(w, layout.places.outer, layout) for w in levels.outer),
+        affine_matrix(levels.affine, layout.places.frame, layout),
+    ]
+
+
+SIZES = [(i, o) for i in range(PLANE_LAYOUT.inner + 1) for o in range(PLANE_LAYOUT.outer + 1)]
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+def test_vector_is_the_product_of_matrices(inner: int, outer: int) -> None:
+    levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
+    g = leaf_vector(CODE)
+    for matrix in matrices(levels):
+        g = matrix @ g
+    np.testing.assert_allclose(lift_many([levels], [CODE])[0], g, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int) -> None:
+    rng = np.random.default_rng(100 + inner * 10 + outer)
+    levels = random_levels(rng, inner, outer)
+    p = rng.uniform(-2, 2, (2, 50))
+    frames, objects = Frames(lift_many([levels], [CODE])), np.zeros(50, int)
+    want = np.array(carry_back(steps_of(levels), p))
+    found, radius = frames.blocks(objects, p, np.zeros(50))
+    np.testing.assert_allclose(found, want, rtol=1e-9, atol=1e-9)
+    assert not radius.any()
+    # in float32, angles are off by as much as they are large
+    off = 1e-6 * (1 + abs(want).max()) * (1 + abs(frames.numbers).max()) ** 2
+    short = p.astype(np.float32)
+    np.testing.assert_allclose(frames.local(NUMPY, objects, short), want, rtol=0, atol=off)
+    np.testing.assert_allclose(frames.local(TORCH, objects, torch.from_numpy(short)), want, rtol=0, atol=off)
+    assert frames.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
+
+
+@pytest.mark.parametrize("objects", [[0, 1, 2], [2], [2, 2, 2, 1]], ids=str)
+def test_objects_of_different_chains_are_carried_together(objects: list[int]) -> None:
+    """Steps that only few, or most, of them have."""
+    levels = [random_levels(np.random.default_rng(i), *size) for i, size in enumerate(SIZES[:3])]
+    p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
+    found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
+    for i, at in enumerate(objects):
+        np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+@pytest.mark.parametrize("size", [0.02, 0.5])
+def test_discs_are_carried_into_discs(inner: int, outer: int, size: float) -> None:
+    rng = np.random.default_rng(3 * inner + outer)
+    levels = random_levels(rng, inner, outer)
+    p = rng.uniform(-2, 2, (2, 400))
+    angle, share = rng.uniform(0, 2 * np.pi, 400), np.sqrt(rng.uniform(0, 1, 400))
+    near = p + size * share * np.stack([np.cos(angle), np.sin(angle)])
+    frames = Frames(lift_many([levels], [CODE]))
+    q, radius = frames.blocks(np.zeros(400, int), p, np.full(400, size))
+    assert (np.hypot(*(np.array(carry_back(steps_of(levels), near)) - q)) <= radius * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("strength", [1.0, 1e-3])
+@pytest.mark.parametrize(("inner", "outer"), [(0, 0), (1, 0), (2, 3), (0, 2)])
+def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
+    inner: int, outer: int, strength: float
+) -> None:
+    rng = np.random.default_rng(inner + outer)
+    levels = random_levels(rng, inner, outer, strength)
+    frames = Frames(lift_many([levels], [CODE]))
+    x, y = rng.uniform(-4, 4, (2, 20000))
+    step = 1e-5
+    qx, qy = carry_back(steps_of(levels), (x, y))
+    for dx, dy in ((step, 0.0), (0.0, step)):
+        rx, ry = carry_back(steps_of(levels), (x + dx, y + dy))
+        speed = np.hypot(rx - qx, ry - qy) / step
+        near = np.hypot(qx, qy) <= 1
+        assert near.any()
+        assert speed[near].max() <= frames.growth * (1 + 1e-3)
+
+
+@pytest.mark.parametrize(("inner", "outer"), SIZES)
+@pytest.mark.parametrize("radius", [1.0, 3.0])
+def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:
+    rng = np.random.default_rng(7 * inner + outer)
+    levels = random_levels(rng, inner, outer)
+    frames = Frames(lift_many([levels], [CODE]))
+    (xmin, ymin), (xmax, ymax) = (corner[:, 0] for corner in frames.boxes(np.array([radius])))
+    x, y = rng.uniform(-2, 2, (2, 20000)) * max(xmax - xmin, ymax - ymin)
+    within = np.hypot(*carry_back(steps_of(levels), (x, y))) <= radius
+    outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
+    assert within.any()
+    assert not (within & outside).any()
+
+
+def test_lengths_of_chains_do_not_matter() -> None:
+    """A hundred affine matrices one after the other leave what their product leaves."""
+    rng = np.random.default_rng(5)
+    g, total = leaf_vector(CODE), np.eye(4)
+    for _ in range(100):
+        angle, (u, v) = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1, 2)
+        step = np.eye(4)
+        step[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        step[:2, 3] = u, v
+        total = step @ total
+        g = matrices(Levels(affine=tuple(step[:3].ravel().tolist())))[-1] @ g
+    whole = lift_many([Levels(affine=tuple(total[:3].ravel().tolist()))], [CODE])[0]
+    np.testing.assert_allclose(g, whole, atol=1e-12)
+
+
+def test_material_vector_multiplies_the_albedo() -> None:
+    parts = PLANE_LAYOUT.unpack(lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0])
+    assert parts.rgb.tolist() == [0.2, 0.4, 0.6]
+    assert parts.material.tolist() == [*range(12)]
+    assert parts.texture.tolist() == [1, 0, 0, 0, 1, 0]
+
+
+@pytest.mark.parametrize("layout", [PLANE_LAYOUT, SOLID_LAYOUT], ids=["plane", "solid"])
+def test_parts_come_out_as_they_went_in_and_share_no_place(layout: Layout) -> None:
+    sizes = [np.arange(WIDTH)[at].shape for at in layout.places]
+    parts = Parts(*[np.random.default_rng(1).random((5, *size)) for size in sizes])
+    packed = layout.pack(5, **parts._asdict())
+    for name, value in layout.unpack(packed)._asdict().items():
+        assert (value == getattr(parts, name)).all(), name
+        assert np.shares_memory(value, packed) or not value.size
+    free = [layout.places.rgb.start + at for at in OTHERS]
+    assert (packed[:, free] == 0).all()
+    used = WIDTH - len(OTHERS) - (layout.dimension == 2)
+    assert np.count_nonzero(packed[0]) == sum(value[0].size for value in parts) == used
+
+
+def test_a_layout_of_space_lifts_as_its_matrices_do() -> None:
+    """Frames of three rows of four numbers: the same code, another layout."""
+    layout = SOLID_LAYOUT
+    levels = random_levels(np.random.default_rng(3), 2, 2)
+    g = leaf_vector(CODE, layout)
+    for matrix in matrices(levels, layout):
+        g = matrix @ g
+    np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
+    for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
+        map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
+        np.testing.assert_allclose(g[slot].reshape(3, 4) @ map_, np.eye(4)[:3], atol=1e-12)

@@ -1,0 +1,188 @@
+"""The algebra of chains, by evaluating both sides in floats."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from math import cos, hypot, sin
+
+import pytest
+
+from scenelang.compiler import steps as affine
+from scenelang.compiler.chain import Levels, LevelsError, merged, normal, split_levels
+from scenelang.compiler.graph import Move
+from scenelang.compiler.spaces import PLANE, SPACES
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp
+
+
+def back(steps: list[Step], x: float, y: float) -> tuple[float, float]:
+    """A world point carried back through a chain, by the definition."""
+    for step in reversed(steps):
+        if isinstance(step, Warp):
+            a = step.twirl * hypot(x, y) + step.bend[0] * x + step.bend[1] * y
+            x, y = cos(a) * x + sin(a) * y, -sin(a) * x + cos(a) * y
+        else:
+            a, b, _, u, c, d, _, v, *_ = step.rows
+            x, y, det = x - u, y - v, a * d - b * c
+            x, y = (d * x - b * y) / det, (a * y - c * x) / det
+    return x, y
+
+
+def random_step(rng: random.Random) -> Step:
+    kind = rng.randrange(8)
+    k = rng.uniform(-1.5, 1.5)
+    if kind == 0:
+        return Warp(k, (0.0, 0.0))
+    if kind <= 2:
+        return Warp(rng.choice([0.0, k]), (rng.uniform(-1, 1), rng.choice([0.0, k])))
+    if kind == 3:
+        return Affine(affine.rotation(k))
+    if kind == 4:
+        return Affine(affine.scaling(-1.3, 1.3))
+    if kind == 5:
+        return Affine(affine.scaling(0.7, 0.7))
+    if kind == 6:
+        return Affine(affine.translation(k, -k))
+    return Affine(affine.compose(affine.shearing("xy", 0.3), affine.scaling(0.6, 1.2)))
+
+
+def same(first: list[Step], second: list[Step], rng: random.Random) -> None:
+    for _ in range(20):
+        x, y = rng.uniform(-1.5, 1.5), rng.uniform(-1.5, 1.5)
+        assert back(first, x, y) == pytest.approx(back(second, x, y), abs=1e-9)
+
+
+def steps_of(moves: tuple[Move, ...]) -> list[Step]:
+    return [move.step for move in moves]
+
+
+def test_a_warp_without_bend_merges_with_the_one_after_it() -> None:
+    rng = random.Random(1)
+    inner, outer = Warp(0.7, (0.0, 0.0)), Warp(-1.1, (0.4, 0.2))
+    together = steps_of(normal([Move(inner), Move(outer)], PLANE))
+    assert together == [Warp(0.7 - 1.1, (0.4, 0.2))]
+    same([inner, outer], together, rng)
+
+
+def test_bends_do_not_merge() -> None:
+    bends = [Move(Warp(0.0, (0.5, 0.0))), Move(Warp(0.0, (0.5, 0.0)))]
+    assert len(normal(bends, PLANE)) == 2
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_similarities_trade_places_with_warps(mirror: float) -> None:
+    rng = random.Random(2)
+    rows = affine.compose(affine.rotation(0.8), affine.scaling(0.4 * mirror, 0.4))
+    chain: list[Step] = [Affine(rows), Warp(0.9, (0.5, -0.3))]
+    carried = steps_of(normal(map(Move, chain), PLANE))
+    assert isinstance(carried[0], Warp)
+    assert carried[0].twirl == pytest.approx(mirror * 0.4 * 0.9)
+    same(chain, carried, rng)
+
+
+def test_normal_form_keeps_the_map_and_is_one() -> None:
+    rng = random.Random(3)
+    for _ in range(400):
+        chain = [random_step(rng) for _ in range(rng.randrange(9))]
+        short = normal(map(Move, chain), PLANE)
+        same(chain, steps_of(short), rng)
+        same(chain, steps_of(merged(map(Move, chain))), rng)
+        assert normal(short, PLANE) == short
+        assert len(short) <= len(chain)
+
+
+def test_zero_and_opposite_warps_vanish() -> None:
+    zero = Move(Warp(0.0, (0.0, 0.0)))
+    there, again = Move(Warp(0.5, (0.0, 0.0))), Move(Warp(-0.5, (0.0, 0.0)))
+    grow, shrink = Move(Affine(affine.scaling(2, 2))), Move(Affine(affine.scaling(0.5, 0.5)))
+    assert normal([zero], PLANE) == ()
+    assert normal([grow, there, again, shrink], PLANE) == ()
+
+
+LIMITS = {"inner_warps": 2, "outer_warps": 3}
+STRETCH = Affine(affine.scaling(0.5, 0.8))
+BENT = Warp(0.2, (0.3, 0.0))
+
+
+@pytest.mark.parametrize("warps", range(6))
+def test_levels_of_one_run(warps: int) -> None:
+    levels = split_levels([BENT] * warps + [STRETCH], LIMITS)
+    assert levels == Levels((BENT,) * min(warps, 2), IDENTITY, (BENT,) * max(warps - 2, 0), STRETCH.rows)
+
+
+def test_levels_of_two_runs() -> None:
+    levels = split_levels([BENT, STRETCH, BENT, BENT, STRETCH], LIMITS)
+    assert levels == Levels((BENT,), STRETCH.rows, (BENT, BENT), STRETCH.rows)
+    assert split_levels([STRETCH, BENT], LIMITS) == Levels((), STRETCH.rows, (BENT,), IDENTITY)
+    assert split_levels([], LIMITS) == Levels()
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        [BENT] * 6,
+        [BENT] * 3 + [STRETCH, BENT],
+        [BENT, STRETCH] + [BENT] * 4,
+        [BENT, STRETCH, BENT, STRETCH, BENT],
+        [STRETCH, BENT, STRETCH, BENT, STRETCH],
+    ],
+)
+def test_levels_that_do_not_fit(steps: list[Step]) -> None:
+    with pytest.raises(LevelsError):
+        split_levels(steps, LIMITS)
+
+
+def test_levels_keep_the_map() -> None:
+    rng = random.Random(4)
+    kept = 0
+    while kept < 60:
+        chain = [random_step(rng) for _ in range(rng.randrange(7))]
+        try:
+            levels = split_levels(steps_of(normal(map(Move, chain), PLANE)), LIMITS)
+        except LevelsError:
+            continue
+        kept += 1
+        flat = [*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine)]
+        same(chain, flat, rng)
+
+
+def test_stretches_agree_with_numpy() -> None:
+    import numpy as np
+
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        matrix = rng.normal(size=(3, 4))
+        rows: Rows = tuple(matrix.ravel().tolist())
+        for size in (2, 3):
+            values = np.linalg.svd(matrix[:size, :size], compute_uv=False)
+            assert SPACES[size].stretches(rows) == pytest.approx((values[-1], values[0]), rel=1e-9)
+    assert SPACES[3].stretches(affine.scaling(3, 3, 3)) == pytest.approx((3, 3))
+
+
+def test_rotation_about_any_axis_fixes_it() -> None:
+    rows = affine.rotation(1.1, (1.0, 2.0, -0.5))
+    for i, value in enumerate((1.0, 2.0, -0.5)):
+        assert sum(a * b for a, b in zip(rows[4 * i : 4 * i + 3], (1.0, 2.0, -0.5), strict=True)) == (
+            pytest.approx(value)
+        )
+    quarter = affine.rotation(1.5707963267948966, (0.0, 3.0, 0.0))
+    assert [quarter[2], quarter[8]] == pytest.approx([1, -1])
+
+
+@pytest.mark.parametrize(
+    ("rows", "usable"),
+    [
+        (affine.scaling(1, 1e-11), True),
+        (affine.scaling(1, 1e-13), False),
+        (affine.scaling(1e-20, 1e-20), True),
+        (affine.scaling(1e-31, 1e-31), False),
+        (affine.scaling(1e31, 1e31), False),
+        (affine.scaling(0, 0), False),
+        (replace(Affine(affine.scaling(1e-20, 1e-20)), rows=affine.translation(1e29, 0)).rows, True),
+        ((0.1, 0.2, 0, 0, 0.3, 0.6, 0, 0, 0, 0, 1, 0), False),
+        ((float("nan"), 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0), False),
+        ((1, 0, 0, float("inf"), 0, 1, 0, 0, 0, 0, 1, 0), False),
+    ],
+)
+def test_what_is_singular(rows: Rows, usable: bool) -> None:
+    assert PLANE.usable(rows) is usable

@@ -1,0 +1,322 @@
+"""The framed renderer against a slow loop, and what its shortcuts may leave out: pixels, objects, frames."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.neural.draw import Drawing, Kept, draw
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.load import load_model
+from tests.compiler.random_scenes import blob_scene, random_scene
+from tests.drawing.slow import Slow, sample_points, scale, way_back
+from tests.pictures import Array, premultiplied
+
+SLOW = Slow()
+EQUAL = 2e-3
+"""Of a channel: float32 against float64 on an outline that is a few hundredths of a pixel wide."""
+BLENDED = 0.04
+"""Of a channel: what one look at a pixel's centre misses of a colour that runs across the pixel."""
+
+
+def leaf(geometry: str, colour: str, moves: str) -> str:
+    return f"{geometry} {{ material flat {{ color({colour}); }} {moves} }}"
+
+
+SMALL = " ".join(
+    leaf(
+        "star",
+        f"hsv({i / 60}, 1, 1)",
+        f"scale({0.03 + 0.002 * (i % 9)}); rotate({29 * i}deg); translate("
+        f"{0.2 * (i % 10) + 0.013 * (i // 10) - 0.9}, {0.31 * (i // 10) + 0.007 * (i % 10) - 0.8});",
+    )
+    for i in range(60)
+)
+PARTS = (
+    ("square", "#e04020", "scale(0.6, 0.4); rotate(20deg);"),
+    ("star", "#30b050", "scale(0.5); translate(0.3, 0.2);"),
+    ("pentagon", "#fff", "scale(0.3); translate(-0.4, 0.1);"),
+    ("triangle", "#2050d0", "scale(0.5, 0.9); rotate(-70deg); translate(0, -0.3);"),
+)
+LEAVES = [leaf(*part) for part in PARTS]
+BENT = "twirl(1.4); bend(-0.7); scale(1.2, 0.7); rotate(1rad); translate(0.2, 0); bend(0.6); twirl(0.5);"
+
+
+def deformed(before: str, after: str) -> str:
+    return " ".join(leaf(geometry, colour, f"{before} {moves} {after}") for geometry, colour, moves in PARTS)
+
+
+SCENES = {
+    "unions": " ".join(LEAVES),
+    "subtract": "subtract { " + " ".join(LEAVES) + " }",
+    "intersect": "intersect { " + " ".join(LEAVES[:2]) + " } " + leaf("pentagon", "#fff", "scale(0.3);"),
+    "smooth": "smooth { " + " ".join(LEAVES) + " }",
+    "smooth after a cut": f"smooth {{ subtract {{ {LEAVES[0]} {LEAVES[1]} }} {LEAVES[2]} {LEAVES[3]} }}",
+    "deformed": deformed(BENT, ""),
+    "deformed blends": "smooth { " + deformed("", "twirl(0.8); bend(0.5);") + " }",
+    # where blends' errors add up: a pixel holds an outline that is told to be more than half a pixel away
+    "blends upon blends": "smooth { "
+    "pentagon { scale(0.24, 0.55); rotate(44deg); translate(-0.26, 0.36); } "
+    "star { scale(0.47, 0.60); rotate(243deg); translate(-0.16, -0.36); } "
+    "pentagon { scale(0.13, 0.33); rotate(36deg); translate(-0.24, -0.50); } "
+    "triangle { scale(0.51, 0.56); rotate(63deg); translate(-0.02, -0.17); } "
+    "triangle { scale(0.22, 0.14); rotate(218deg); translate(-0.21, 0.35); } "
+    "square { scale(0.38, 0.59); rotate(168deg); translate(-0.19, 0.23); } }",
+    "small": SMALL,
+    "blends of small": f"smooth {{ {SMALL} }}",
+    "thin": leaf("star", "#fff", "scale(1, 0.02);") + leaf("square", "#ff0", "scale(0.01, 2); rotate(6deg);"),
+    "large": leaf("square", "#456", "scale(3e9);") + LEAVES[1],
+    "far from the leaf": "star { translate(400, 0); scale(0.9); translate(-360, 0.1); }",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=["torch", "numpy"])
+def network(request: pytest.FixtureRequest):
+    return load_model("shapes2d").framed if request.param == "torch" else load_arrays("shapes2d").network
+
+
+def program(scene: nsg.Scene | str, canvas: tuple[int, int] = (36, 28)) -> Program:
+    scene = nsg.loads(scene) if isinstance(scene, str) else scene
+    return compile_scene(scene.model_copy(update={"canvas": canvas, "background": None}))
+
+
+def drawn(network, p: Program, **options: object) -> tuple[Array, Drawing]:
+    drawing = draw(network, p, **options)
+    return premultiplied(np.asarray(drawing.image)), drawing
+
+
+def random_programs(make, count: int) -> list[Program]:
+    found = []
+    for seed in range(10_000):
+        try:
+            p = program(make(seed), (24, 26))
+        except nsg.SceneError:
+            continue
+        if len(p) > 1 and not p.extended and np.ptp(SLOW.picture(p.vectors, p.tokens, (12, 13))) > 0.2:
+            found.append(p)
+        if len(found) == count:
+            break
+    return found
+
+
+def assert_draws(network, p: Program) -> None:
+    """Sampled four times everywhere the loop's picture; adaptively the same, but for running colours."""
+    exact = SLOW.picture(p.vectors, p.tokens, p.canvas)
+    assert np.ptp(exact) > 0.2
+    everywhere, _ = drawn(network, p, samples="four")
+    np.testing.assert_allclose(everywhere, exact, rtol=0, atol=EQUAL)
+    some, _ = drawn(network, p)
+    np.testing.assert_allclose(some, exact, rtol=0, atol=BLENDED if 1 in p.tokens else EQUAL)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_loop_draws_the_same(network, name: str) -> None:
+    assert_draws(network, program(SCENES[name], (56, 40) if name == "blends upon blends" else (36, 28)))
+
+
+def test_the_loop_draws_random_scenes_the_same(network) -> None:
+    for p in random_programs(random_scene, 8) + random_programs(blob_scene, 8):
+        assert_draws(network, p)
+
+
+def test_over_a_background_and_as_straight_alpha(network) -> None:
+    p = program(SCENES["unions"])
+    exact = SLOW.picture(p.vectors, p.tokens, p.canvas)
+    over, blue = (
+        np.asarray(draw(network, dataclasses.replace(p, background=b)).image) for b in (None, (0, 0.5, 1))
+    )
+    np.testing.assert_allclose(blue, exact[..., :3] + (1 - exact[..., 3:]) * [0, 0.5, 1], rtol=0, atol=EQUAL)
+    covered = exact[..., 3] > 0.2
+    straight = exact[covered][:, :3] / exact[covered][:, 3:]
+    np.testing.assert_allclose(over[covered][:, :3], straight, rtol=0, atol=5 * EQUAL)
+
+
+def test_a_blend_shows_lines_between_colours_that_are_no_outlines(network) -> None:
+    """Between two squares the nearer one's colour counts; a third one blends over the gap."""
+    sides = [
+        leaf("square", c, f"scale(0.3); translate({x}, 0);") for c, x in (("#f00", -0.34), ("#0f0", 0.35))
+    ]
+    p = program(
+        f"chain {{ {' '.join(sides)} smooth {leaf('square', '#fff', 'scale(0.2); translate(0, 0.26);')} }}"
+    )
+    found, drawing = drawn(network, p)
+    assert 0 < drawing.refined < drawing.met / 2
+    np.testing.assert_allclose(found, drawn(network, p, samples="four")[0], rtol=0, atol=0.01)
+
+
+def test_without_refining_a_pixel_is_its_centre(network) -> None:
+    for name in ("unions", "smooth", "small"):
+        p = program(SCENES[name])
+        points = sample_points(p.canvas).mean(2).reshape(-1, 2)
+        state, shown, _ = SLOW.at(p.vectors, p.tokens, points)
+        clear = (np.abs(state) > 1e-4).reshape(p.canvas[::-1])
+        exact = np.concatenate([shown, np.ones((len(shown), 1))], 1) * (state < 0)[:, None]
+        hard, drawing = drawn(network, p, samples="one")
+        np.testing.assert_allclose(hard[clear], exact.reshape(hard.shape)[clear], rtol=0, atol=EQUAL)
+        assert drawing.refined == 0
+        assert 0 < drawing.pairs < len(p) * len(points)
+
+
+def reached(p: Program, points: Array, pad: float, more: float) -> Array:
+    """Which points (..., 2) each union of a program without deformations has to meet, (N, ...).
+
+    Those in its leaf's disc and a fiftieth around it, for what is learned, or in reach of a blend of 2 k.
+    """
+    blends_after = np.cumsum((p.tokens == 1)[::-1])[::-1]
+    found = []
+    for v, blends in zip(p.vectors.astype(np.float64), blends_after, strict=True):
+        length = np.hypot(*way_back(v, points.reshape(-1, 2)).T).reshape(points.shape[:-1])
+        found.append(length <= 1.02 + more + ((0.3 + more if blends else 0) + pad) / scale(v))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", ["unions", "smooth", "small", "blends upon blends", "large"])
+def test_objects_are_met_where_they_reach_and_nowhere_else(network, name: str) -> None:
+    p = program(SCENES[name], (40, 32))  # whole blocks
+    points, px = sample_points(p.canvas), 2 / min(p.canvas)
+    centres = points.mean(2)
+    once, some = (drawn(network, p, **o)[1] for o in ({"samples": "one"}, {}))
+    everything = drawn(network, p, samples="four", skip=False)[1]
+    assert everything.pairs == len(p) * points[..., 0].size
+    assert everything.refined == everything.met == centres[..., 0].size
+    assert once.met == some.met <= reached(p, centres, 12 * px, 0).any(0).sum()
+    state, _, alone = SLOW.at(p.vectors, p.tokens, centres.reshape(-1, 2))
+    samples = SLOW.samples(p.vectors, p.tokens, p.canvas)
+    assert once.refined == 0
+    changes = np.ptp(samples[..., 3], axis=2) > 0.01
+    assert changes.sum() <= some.refined <= some.met
+    assert some.refined <= (np.abs([state, *alone]).min(0) < px).sum()
+
+
+def test_a_cut_is_met_where_something_was_drawn(network) -> None:
+    cut = program(f"subtract {{ {leaf('square', '#fff', 'scale(0.2);')} star {{ scale(3); }} }}")
+    only = program(leaf("square", "#fff", "scale(0.2);"))
+    whole, alone = (drawn(network, p, samples="four")[1] for p in (cut, only))
+    assert whole.met <= alone.met
+    assert whole.pairs <= 2 * alone.pairs
+    assert not drawn(network, cut)[0].any()
+
+
+def test_tiles_are_whole_rows_of_blocks(network) -> None:
+    """Each is told when it is done; parts of a picture are those of the whole, whatever their size."""
+    p = program(SCENES["unions"], (36, 112))
+    one, drawing = drawn(network, p)
+    for options, count in (
+        ({"tile": 36}, 14), ({"tile": 1}, 14), ({"tile": 36 * 56}, 2), ({"tile": 36 * 112}, 1),
+        ({"split": 3}, 3), ({"threads": 2}, 2), ({"threads": 2, "split": 1}, 1),
+        ({"threads": 3, "split": 7}, 7), ({}, 1),
+    ):  # fmt: skip
+        told: list[float] = []
+        by: set[int] = set()
+
+        def progress(share: float, told: list[float] = told, by: set[int] = by) -> None:
+            told.append(share)
+            by.add(threading.get_ident())
+
+        parts, again = drawn(network, p, progress=progress, **options)
+        assert (threading.get_ident() in by) == (options.get("threads", 1) == 1 or count == 1)
+        assert sorted(told) == pytest.approx([(i + 1) / count for i in range(count)])
+        np.testing.assert_allclose(parts, one, rtol=0, atol=1e-6)
+        assert (again.pairs, again.refined, again.met) == (drawing.pairs, drawing.refined, drawing.met)
+
+
+def test_what_stays_is_taken_over(network) -> None:
+    """Frames drawn after one another are those drawn alone, to the last bit; equal tiles cost nothing."""
+
+    def frame(x: float, colour: str = "#fff", size: int = 112) -> Program:
+        moving = leaf("star", colour, f"scale(0.2); translate({x}, 0.7);")
+        return program(f"{moving} {leaf('square', '#08f', 'scale(0.2); translate(0, -0.6);')}", (112, size))
+
+    kept = Kept()
+    whole = [drawn(network, p, split=8)[1].pairs for p in (frame(0), frame(0.3))]
+    frames = [
+        frame(0),
+        frame(0),
+        frame(0.3),
+        frame(0.3, "#f00"),
+        frame(0.3, "#f00", 128),
+        frame(-0.3, "#f00", 128),
+    ]
+    costs, met = [], []
+    for p in frames:
+        alone, _ = drawn(network, p, split=8)
+        again, drawing = drawn(network, p, split=8, kept=kept)
+        np.testing.assert_array_equal(again, alone)
+        costs.append(drawing.pairs)
+        met.append((drawing.met, drawing.refined))
+    # what draws otherwise takes nothing over and leaves what is kept
+    assert drawn(network, frames[-1], split=8, kept=kept, samples="four")[1].refined > 0
+    assert drawn(network, frames[-1], split=8, kept=kept)[1].pairs == 0
+    assert costs[:2] == [whole[0], 0]
+    assert met[1] == (0, 0)
+    assert 0 < costs[2] < 0.75 * whole[1]  # the square's tiles are those of before
+    assert costs[3] == costs[2]
+    assert 0 < costs[5] < 0.75 * costs[4]
+
+
+def test_what_reaches_everywhere_is_not_taken_over(network) -> None:
+    """An intersection changes tiles that its leaf is far from; other tiles, or another count of them, too."""
+    kept = Kept()
+    for y, split in ((-0.6, 4), (0.6, 4), (0.6, 9), (-0.6, 9), (-0.6, 4)):
+        p = program(f"intersect {{ square {{ scale(1.2); }} star {{ scale(0.3); translate(0, {y}); }} }}")
+        alone, _ = drawn(network, p, split=split)
+        np.testing.assert_array_equal(drawn(network, p, split=split, kept=kept)[0], alone)
+
+
+@pytest.mark.parametrize("shift", np.linspace(0, 0.2, 9))
+def test_a_tile_is_drawn_again_when_something_comes_near(network, shift: float) -> None:
+    """Objects that move in and out of rows by parts of a pixel, past the edges of tiles."""
+    kept = Kept()
+    for y in (0.4, 0.4 - shift):
+        p = program(leaf("star", "#fff", f"scale(0.12); translate(0.1, {y});") + LEAVES[0], (40, 40))
+        np.testing.assert_array_equal(
+            drawn(network, p, split=20, kept=kept)[0], drawn(network, p, split=20)[0]
+        )
+
+
+@pytest.mark.parametrize(
+    ("at", "numbers"),
+    [
+        (slice(5, 11), 0.0),  # a frame without an inverse
+        (slice(5, 11), (1, 0, 0, 2, 0, 0)),
+        (slice(20, 26), (1, 0, 0, 2, 0, 0)),
+        (slice(5, 11), (3e31, 0, 0, 0, 3e31, 0)),  # one that float32 cannot follow
+        (slice(5, 11), (3e-32, 0, 0, 0, 3e-32, 0)),
+        (slice(5, 11), (3e-32, 0, 0, 0, 1, 0)),
+        (slice(11, 12), 2e31),
+        (slice(45, 46), np.nan),  # a colour that is not a number, of one object among others
+        (slice(5, 6), np.nan),
+    ],
+)
+def test_vectors_that_nobody_can_draw(network, at: slice, numbers: object) -> None:
+    p = program(SCENES["unions"])
+    vectors = p.vectors.copy()
+    vectors[1, at] = numbers
+    object.__setattr__(p, "vectors", vectors)  # a Program itself refuses what is not a number
+    with pytest.raises(ProgramError):
+        draw(network, p)
+
+
+@pytest.mark.parametrize(
+    ("at", "numbers"),
+    [
+        (slice(5, 11), (1e30, 0, 0, 0, 1e30, 0)),
+        (slice(5, 11), (1e-30, 0, 0, 0, 1e-30, 0)),
+        (slice(5, 11), (1e-30, 0, 0, 0, 1e30, 0)),
+        (slice(5, 11), (1e-24, 0, 1e15, 0, 1e-24, 0)),
+        (slice(5, 14), (1, 0, 1e25, 0, 1, 1e25, 0.5, 1, 0)),
+    ],
+)
+def test_vectors_at_the_edge_of_what_can_be_drawn(network, at: slice, numbers: tuple[float, ...]) -> None:
+    p = program(LEAVES[0])
+    vectors = p.vectors.copy()
+    vectors[0, at] = numbers
+    for skip in (True, False):
+        edge = dataclasses.replace(p, vectors=vectors)
+        assert np.isfinite(drawn(network, edge, skip=skip)[0]).all()

@@ -1,0 +1,282 @@
+"""Groups in the plane: the stack of states against the fold by recursion, and pictures of any tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from lab.sets.plane import SETS, random_scene
+from scenelang.compiler.groups import (
+    BEGINS,
+    ENDS,
+    INTERSECT,
+    OPERATOR,
+    SMOOTH,
+    SUBTRACT,
+    UNION,
+    Groups,
+    felt,
+    read_groups,
+    token_fault,
+    token_name,
+    widths_of,
+)
+from scenelang.compiler.program import Program, ProgramError, parse_program, program_bytes
+from scenelang.drawing.metrics import psnr
+from scenelang.drawing.neural.coverage import Coverage
+from scenelang.drawing.neural.draw import draw
+from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.meetings import Pairs, meetings_of
+from tests.groups import folded, random_tokens
+
+RNG = np.random.default_rng
+NETWORK = load_arrays("shapes2d").network
+
+
+def stars(count: int, tokens: list[int], widths: np.ndarray | None = None) -> Program:
+    """A Program of so many objects, joined as tokens say."""
+    text = "square { scale(0.3); material flat { color(#d33); } } " * count
+    program = nsg.compile(nsg.loads(text), model="shapes2d", without=("drop_hidden",))
+    vectors = program.vectors.copy()
+    if widths is not None:
+        vectors[:, Field(NETWORK, vectors, program.tokens).layout.places.width] = widths
+    return replace(program, tokens=np.array(tokens, np.int8), vectors=vectors)
+
+
+def met(rng: np.random.Generator, groups: Groups, columns: int, share: float) -> np.ndarray:
+    """Which rows columns meet (columns, N): of a group that is intersected the first row, if any."""
+    kept = rng.random((columns, len(groups.tokens))) < share
+    for group in np.flatnonzero(groups.joins == INTERSECT)[::-1]:
+        kept[:, groups.rows[group]] |= kept[:, (groups.path == group).any(1)].any(1)
+    return kept
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_states_are_those_of_the_recursion(seed: int) -> None:
+    """Columns that meet some of the rows, at random distances; what a column does not meet has no effect."""
+    rng, count = RNG(seed), 10
+    tokens = random_tokens(rng, count)
+    raw = np.array(tokens) & OPERATOR
+    given = np.where(raw > 0, rng.choice([0.0, 0.1, 0.3], count), 0.0)
+    program = stars(count, tokens, given)
+    field = Field(NETWORK, program.vectors, program.tokens)
+    columns = 400
+    block, row = np.nonzero(met(rng, field.groups, columns, 0.6))
+    never = np.zeros(len(block), bool)
+    meetings, _ = meetings_of(Pairs(block, row, never, never, np.full(len(block), np.inf)))
+    d = rng.normal(0, 0.25, (count, columns))
+    own = meetings.pairs.object, meetings.columns[meetings.places()]
+    memory = field.fold(meetings, d[own][None, None].astype(np.float32))
+    colours = np.asarray(field.colours).T
+    kept = np.zeros((count, columns), bool)
+    kept[row, block] = True
+    close = seen = 0
+    for at, column in enumerate(meetings.columns.tolist()):
+        rows = [np.array([v]) for v in d[:, column]], [c[None] for c in colours]
+        state = folded(*rows, tokens, given.tolist(), kept[:, column].tolist())
+        found = float(memory[0, 0, at])
+        if state is None:
+            assert found > 0.9
+            continue
+        wanted = float(state[0][0])
+        if abs(wanted) < 0.6:
+            seen += 1
+            close += abs(found - wanted) < 4e-3
+        else:
+            assert np.sign(found) == np.sign(wanted)
+    assert seen > 0.5 * columns
+    assert close > 0.995 * seen
+
+
+def test_a_group_begins_with_its_first_row_as_it_is() -> None:
+    """However far that is: farther than what stands for nothing, too."""
+    program = stars(3, [UNION, INTERSECT | BEGINS, SUBTRACT | 1 << ENDS])
+    field = Field(NETWORK, program.vectors, program.tokens)
+    meetings, _ = meetings_of(Pairs.of(np.zeros(3, np.intp), np.arange(3)))
+    d = np.array([0.2, 3.0, 0.5], np.float32)
+    assert field.fold(meetings, d[None, None])[0, 0, 0] == pytest.approx(3.0, abs=0.01)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_point_breaks_intervals_through_groups(seed: int) -> None:
+    """Distances within their intervals, folded by the field itself, all rows and those that are left."""
+    rng, blocks = RNG(seed), 150
+    tokens = random_tokens(rng, 8)
+    program = stars(8, tokens, rng.choice([0.0, 0.2], 8) * (np.array(tokens) & OPERATOR > 0))
+    field = Field(NETWORK, program.vectors, program.tokens)
+    block, row = np.nonzero(met(rng, field.groups, blocks, 0.7))
+    never = np.zeros(len(block), bool)
+    meetings, source = meetings_of(Pairs(block, row, never, never, np.full(len(block), np.inf)))
+    middle = (rng.normal(0, 0.3, len(block)) * rng.choice([0.05, 1], len(block))).astype(np.float32)[source]
+    rise = (10 ** rng.uniform(-4, -0.3, len(block))).astype(np.float32)
+    told = field.proved(meetings, middle, rise)
+    low, high = told.picture
+    assert 0.03 < told.shut.mean() < 0.97
+    left = ~told.shut
+    back = np.argsort(source)
+    fewer, origin = meetings_of(
+        Pairs(block, row, told.open[back], never, np.full(len(block), 1.0)).take(np.flatnonzero(left[back]))
+    )
+    for _ in range(30):
+        d = middle + rise * rng.choice([-1, 1, 0, float(rng.uniform(-1, 1))], len(block))
+        d = d.astype(np.float32)
+        whole = np.asarray(field.picture(field.fold(meetings, d[None, None])))[0]
+        assert (whole >= low - 1e-5).all()
+        assert (whole <= high + 1e-5).all()
+        some = d[back][np.flatnonzero(left[back])][origin]
+        part = np.asarray(field.picture(field.fold(fewer, some[None, None])))[0]
+        at = np.searchsorted(np.sort(meetings.columns), fewer.columns)
+        place = np.argsort(meetings.columns)[at]
+        np.testing.assert_allclose(part, whole[:, place], rtol=0, atol=2e-4)
+
+
+def test_pictures_of_any_tree() -> None:
+    """The exact picture of each; torch draws the same, and so do tiles without what is ruled out."""
+    torch, found = load_model("shapes2d").framed, []
+    for seed in range(12):
+        scene = random_scene(RNG([7, seed]), SETS["trees"]).sized((96, 96))
+        program = nsg.compile(scene)
+        image = np.asarray(draw(NETWORK, program).image)
+        other = np.asarray(draw(torch, program).image)
+        assert abs(image - other).mean() < 2e-4
+        found.append(psnr(image, np.asarray(nsg.render(scene, backend="reference")), 50))
+    assert np.mean(found) > 45
+    assert min(found) > 33
+
+
+def test_owners_are_those_of_the_reference() -> None:
+    wrong = total = 0
+    for seed in range(6):
+        scene = random_scene(RNG([9, seed]), SETS["trees"]).sized((64, 64))
+        program = nsg.compile(scene)
+        field = Field(NETWORK, program.vectors, program.tokens)
+        rows = Coverage(field).owners((64, 64), range(64))
+        numbers = np.array([0, *program.numbers])[rows]
+        exact = nsg.render_outputs(scene, ["object"], backend="reference").object
+        total += (exact > 0).sum()
+        wrong += ((numbers != exact) & (exact > 0)).sum()
+    assert wrong < 0.02 * total
+
+
+def test_widths_of_cuts_are_seen() -> None:
+    scene = (
+        "subtract{} {{ square {{ scale(0.8); }} star {{ scale(0.5); }} material flat {{ color(#000); }} }}"
+    )
+    sharp, rounded = (nsg.loads(scene.format(k)) for k in ("", "(k = 0.3)"))
+    a, b = (np.asarray(nsg.render(s)) for s in (sharp, rounded))
+    exact = np.asarray(nsg.render(rounded, backend="reference"))
+    assert psnr(b, exact, 60) > psnr(a, exact, 60) + 15
+
+
+# ---------------------------------------------------------------- tokens
+
+
+@pytest.mark.parametrize(
+    "tokens",
+    [[4], [1], [0, 8], [0, 4], [0, -1], [0, -128], [0, 4, 16], [8], [0, *[4] * 16, 120, 8]],
+)
+def test_forged_tokens_are_refused(tokens: list[int]) -> None:
+    assert token_fault(np.array(tokens, np.int8)) is not None
+    with pytest.raises(ProgramError, match=r"token|group"):
+        stars(len(tokens), tokens)
+
+
+def test_fifteen_groups_are_open_at_most() -> None:
+    tokens = np.array([0, *[4] * 15, 15 << ENDS], np.int8)
+    assert token_fault(tokens) is None
+    assert read_groups(tokens).deepest == 15
+
+
+def test_a_program_with_groups_is_format_4_and_comes_back() -> None:
+    for tokens, widths, kind in (
+        ([0, 2, 0], [0, 0, 0], 1),
+        ([0, 2 | BEGINS, 3 | 1 << ENDS], [0, 0, 0], 4),
+        ([0, 2, 0], [0, 0.2, 0], 4),
+        ([0, 1, 0], [0, 0.2, 0], 1),
+    ):
+        program = stars(3, tokens, np.array(widths))
+        data = program_bytes(program)
+        assert rf"\"format\":{kind},".encode() in data
+        again = parse_program(data)
+        assert again.digest() == program.digest()
+        assert again.extended == (kind == 4)
+
+
+def test_names_of_tokens() -> None:
+    assert [token_name(t) for t in (0, 2 | BEGINS, 3 | 2 << ENDS)] == ["union", "subtract (", "intersect ))"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_how_far_rows_matter_is_the_same_for_flat_streams_by_either_way(seed: int) -> None:
+    rng, count = RNG(seed), 8
+    tokens = rng.integers(0, 4, count)
+    tokens[0] = 0
+    widths = widths_of(tokens, rng.random(count) * (rng.random(count) < 0.4))
+    none = np.zeros(0, np.intp)
+    flat = Groups(tokens, np.zeros(count, bool), np.zeros((count, 0), np.intp), 0 * tokens, none, none)
+    around = flat._replace(path=np.full((count, 1), -1))
+    for one, other in zip(felt(flat, widths), felt(around, widths), strict=True):
+        np.testing.assert_allclose(one, other)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_rows_matter_no_farther_than_is_said(seed: int) -> None:
+    """A leaf that is moved from its level to anywhere beyond changes no sign, nor any colour inside."""
+    rng, count = RNG([5, seed]), 7
+    tokens = random_tokens(rng, count)
+    raw = np.array(tokens) & OPERATOR
+    given = np.where(raw > 0, rng.choice([0.0, 0.1, 0.3], count), 0.0)
+    seen = felt(read_groups(np.array(tokens, np.int8)), widths_of(raw, given))
+    colours = [rng.uniform(0, 1, (1, 3)) for _ in range(count)]
+    for row in np.flatnonzero(~seen.everywhere):
+        near = rng.normal(0, 0.3, (count, 400))
+        near[row] = seen.total[row] + rng.uniform(0, 0.5, 400) + 1e-9
+        far = near.copy()
+        far[row] = 50.0
+        states = [
+            folded(list(d), [np.tile(c, (400, 1)) for c in colours], tokens, given.tolist())
+            for d in (near, far)
+        ]
+        (d, c), (e, f) = states  # type: ignore[misc]
+        assert ((d < 0) == (e < 0)).all()
+        inside = d < 0
+        np.testing.assert_allclose(c[inside], f[inside], rtol=0, atol=1e-9)
+        if (raw[: row + 1] == SMOOTH).any():
+            continue
+
+
+def test_what_is_cut_out_of_a_rounded_operand_matters_everywhere() -> None:
+    """In a n (b - c) with a width, c changes how deep inside b points are, which a's edge is rounded by."""
+    groups = read_groups(np.array([UNION, INTERSECT | BEGINS, SUBTRACT | 1 << ENDS], np.int8))
+    assert felt(groups, np.array([0.0, 0.1, 0.0])).everywhere.tolist() == [False, True, True]
+    assert felt(groups, np.zeros(3)).everywhere.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("anchored", [True, False])
+def test_what_is_intersected_is_taken_where_nothing_of_the_group_is_near(
+    anchored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A group's later rows may hide its first one in a block, and be out of reach in a smaller one."""
+    scene = nsg.loads(
+        "canvas(256, 256); intersect { square { scale(1.2); material flat { color(#36c); } } union {"
+        " star { scale(0.5); translate(0.6, -0.6); } pentagon { scale(0.45); translate(-0.4, 0.3); }"
+        " triangle { scale(0.4); translate(-0.5, -0.5); } star { scale(0.3); translate(0.2, 0.6); } } }"
+    )
+    program = nsg.compile(scene)
+    field = Field(NETWORK, program.vectors, program.tokens)
+    monkeypatch.setattr("scenelang.drawing.neural.coverage.ENOUGH", 0)
+    if not anchored:
+        field.reach = np.where(
+            np.isinf(field.reach) & (field.tokens == 0) & ~field.groups.first, 1.02, field.reach
+        )
+    white = np.ones(3, np.float32)
+    pruned, whole = (
+        Coverage(field, skip=skip).tile((256, 256), range(256), "four", white).picture
+        for skip in (True, False)
+    )
+    assert (abs(pruned - whole).max() < 1 / 255) == anchored

@@ -1,0 +1,147 @@
+"""Pictures drawn by numpy: the same as torch's, small ones alone, chosen by the Program alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import Program
+from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.small import MOST_MS, choose_drawer, draw_small, work_ms
+from scenelang.drawing.torch_backend import draw_program, open_model
+from scenelang.language.evaluation import Source
+from scenelang.output.frames import Clip
+from scenelang.output.painting import Painter
+from tests.compiler.random_scenes import blob_scene, random_scene
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
+STEP = 1 / 255
+STAR = "star { scale(0.4); twirl(1); }"
+CLOUD = "smooth { for (i in 0..<400) { star { scale(0.9); rotate(1turn * rand(i)); } } }"
+
+
+def program(text: str, **changes: object) -> Program:
+    return compile_scene(nsg.loads(text).model_copy(update=changes))
+
+
+def assert_same(p: Program, **options: str) -> None:
+    """The two libraries' pictures, as they go into files too.
+
+    Of solids a pixel in 2,000 may just be sampled four times by one library and not by the other.
+    """
+    by_torch = draw_program(p, open_model(p.model), threads=1, **options).image  # type: ignore[arg-type]
+    by_numpy = draw_small(p, **options).image  # type: ignore[arg-type]
+    assert by_numpy.dtype == by_torch.dtype
+    assert by_numpy.shape == by_torch.shape
+    steps, apart = (1, 0.0) if p.stage is None else (2, 1 / 2000)
+    assert (np.abs(by_numpy - by_torch).max(2) > steps * STEP).mean() <= apart
+    levels = np.abs(by_numpy.to_uint8().astype(int) - by_torch.to_uint8())
+    assert (levels.max(2) > steps).mean() <= apart
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_look_the_same(path: Path) -> None:
+    scene = nsg.load(path)
+    assert_same(compile_scene(scene.model_copy(update={"canvas": (101, 75)})))
+
+
+def test_random_scenes_look_the_same() -> None:
+    """All tokens, deformations, transparency, odd canvases, every way to sample."""
+    seen: set[int] = set()
+    for seed in range(60):
+        scene = (random_scene if seed % 3 else blob_scene)(seed)
+        try:
+            canvas = (33 + seed % 7, 29 + seed % 5)
+            background = None if seed % 2 else (0.1, 0.6, 0.9)
+            p = compile_scene(scene.model_copy(update={"canvas": canvas, "background": background}))
+        except nsg.SceneError:
+            continue
+        seen |= set((p.tokens & 3).tolist())
+        assert_same(p, samples=("adaptive", "four", "one")[seed % 3])
+    assert seen == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "background(none);",
+        "star { scale(3e9); }",
+        "star { scale(1, 1e-3); rotate(1rad); }",
+        f"smooth {{ {STAR} {STAR} }}",
+    ],
+)
+@pytest.mark.parametrize("model", ["shapes2d", "shapes2d-w8"])
+def test_odd_scenes_look_the_same(text: str, model: str) -> None:
+    assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text), model=model))
+
+
+def test_the_same_bytes_each_time_and_in_any_company() -> None:
+    p, other = program(STAR, canvas=(64, 64)), program("square;" + STAR, canvas=(64, 64))
+    first = nsg.render(p)
+    nsg.render(other)
+    assert np.array_equal(nsg.render(p), first)
+    assert np.array_equal(draw_small(p).image, first)
+
+
+def test_small_work_is_numpy_s() -> None:
+    small, wide, many = program(STAR), program(STAR, canvas=(8000, 6000)), program(CLOUD)
+    assert choose_drawer(small).library == "numpy"
+    assert choose_drawer(wide).library == choose_drawer(many).library == "torch"
+    assert work_ms(small) < MOST_MS < min(work_ms(wide), work_ms(many))
+    assert work_ms(small, "one") < work_ms(small) < work_ms(program(STAR, canvas=(512, 512)))
+    assert work_ms(wide, "four") > work_ms(wide)
+    for library, why in (choose_drawer(small), choose_drawer(many)):
+        assert f"about {work_ms(small if library == 'numpy' else many):,.0f} ms of work" in why
+
+
+def test_a_named_device_is_torch_s() -> None:
+    small = program(STAR)
+    assert choose_drawer(small, "cpu") == ("torch", "asked for by device cpu")
+    assert choose_drawer(small, "cuda").library == "torch"
+    assert np.array_equal(
+        nsg.render(small, device="cpu", threads=1),
+        draw_program(small, open_model("shapes2d"), threads=1).image,
+    )
+
+
+def test_networks_of_whole_pictures_are_torch_s() -> None:
+    scene = nsg.loads("canvas(32, 32); star;")
+    assert choose_drawer(compile_scene(scene, model="shapes2d-streaming")).library == "torch"
+    with pytest.raises(RenderError, match="unknown model `none`"):
+        choose_drawer(Program(**{**_fields(program(STAR)), "model": "none"}))
+
+
+def _fields(p: Program) -> dict[str, object]:
+    return {name: getattr(p, name) for name in p.__dataclass_fields__}
+
+
+def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
+    """A single picture's and an animation's frame are kept apart; each repeats."""
+    path = tmp_path / "a.nsg"
+    path.write_text("canvas(48, 48);" + STAR)
+    painter = Painter(Clip(Source(path)), How(threads=1))
+    single, frame = (painter.prepare(painter.clip.shot(0), single=s) for s in (True, False))
+    assert single.key != frame.key
+    assert single.place == "numpy"
+    assert frame.place != "numpy"
+    assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
+    alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
+    assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"
+
+
+@pytest.mark.parametrize("device", ["auto", "cpu"])
+def test_what_is_loaded(device: str) -> None:
+    code = (
+        "import sys, scenelang as nsg\n"
+        f"nsg.render(nsg.loads('star;'), device={device!r})\n"
+        "print('torch' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{device == 'cpu'}\n"

@@ -1,0 +1,110 @@
+"""What names stand for, held against the evaluator, and what is in sight of the cursor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenelang.editors.context import cursor_at
+from scenelang.language import expressions, tree
+from scenelang.language.builder import Place
+from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
+from scenelang.language.evaluation import Source
+from scenelang.language.lexer import Report, Tokens, scan
+from scenelang.language.parser import parse
+from scenelang.language.resolve import Names
+from scenelang.language.session import Binding
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
+SHADOWS = """
+let a = 1;
+fn f(b, c = b * a) = b + c + a + g(b);
+fn g(a) = a;
+module m(a, at = [a, a]) {
+  let b = a;
+  for (i in 0..<b) { let a = i; square { scale(a + b); translate(at); } }
+  square { scale(a); let a = 2; rotate(a * 1deg); }
+}
+if (a == 1) { let a = 5; m(a); } else { m(a, at = [a, f(a)]); }
+for (a in [a, a + 1]) { m(a); }
+"""
+
+
+def tokens_of(text: str) -> Tokens:
+    source = SourceFile("a.nsg", text.replace("|", ""))
+    return scan(source, Report(source))
+
+
+@pytest.mark.parametrize("text", [SHADOWS, *(path.read_text("utf-8") for path in EXAMPLES)])
+def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every variable that the evaluator resolves in this file is resolved to the same place."""
+    source = SourceFile("main.nsg", text)
+    resolved: list[tuple[tree.Name, Span]] = []
+    original = expressions.value_of
+
+    def watched(name: tree.Name, binding: Binding, place: Place) -> object:
+        if name.span.source is source and binding.span is not None and "." not in name.text:
+            resolved.append((name, binding.span))
+        return original(name, binding, place)
+
+    monkeypatch.setattr(expressions, "value_of", watched)
+    file = parse(source, Diagnostics())
+    Source(tree=file, root=EXAMPLES[0].parent).scene(Diagnostics())
+    names = Names(file)
+    assert resolved or text is not SHADOWS
+    for name, place in resolved:
+        use = names.at(name.span.start)
+        assert use is not None
+        assert use.symbol is not None, name
+        assert use.symbol.span == place, name
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "head"),
+    [
+        ("|", "file", ""),
+        ("group { | }", "group", "group"),
+        ("group { for (i in 0..3) { | } }", "group", "group"),
+        ("chain { smooth star { | } }", "object", "star"),
+        ("chain { square; | }", "chain", "chain"),
+        ("subtract { | }", "group", "subtract"),
+        ("module m(a) { if (a) { } else { | } }", "group", "module"),
+        ("square { material flat { | } }", "material", "material"),
+        ("let m = material flat { | };", "material", "let"),
+        ("let m = 1; square { m { | } }", "material", "m"),
+        ("m(1) { | }", "object", "m"),
+        ("square { group { a } | ", "object", "square"),
+    ],
+)
+def test_the_kind_of_block_is_read_off_tokens(text: str, kind: str, head: str) -> None:
+    offset = text.index("|")
+    block = cursor_at(tokens_of(text), offset, frozenset({"m"}) if "let m" in text else frozenset()).block
+    assert (block.kind, block.head) == (kind, head)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "index", "named", "given"),
+    [
+        ("f(|", "f", 0, None, ()),
+        ("f(1, g(2, 3), |", "f", 2, None, ()),
+        ("f(1, g(2, |", "g", 1, None, ()),
+        ("f(a = 1, b = |", "f", 1, "b", ("a",)),
+        ("f([1, 2, |], 3", "f", 0, None, ()),
+        ("lib.f(1, |", "lib.f", 1, None, ()),
+        ("square { scale(0.5, | ); }", "scale", 1, None, ()),
+    ],
+)
+def test_the_call_around_the_cursor(
+    text: str, name: str, index: int, named: str | None, given: tuple[str, ...]
+) -> None:
+    offset = text.index("|")
+    call = cursor_at(tokens_of(text), offset).call
+    assert call is not None
+    assert (call.name, call.index, call.named, call.given) == (name, index, named, frozenset(given))
+
+
+def test_parentheses_that_call_nothing_are_no_call() -> None:
+    for text in ("if (|", "let a = (1 + |", "fn f(|", "for (i in |"):
+        offset = text.index("|")
+        assert cursor_at(tokens_of(text), offset).call is None

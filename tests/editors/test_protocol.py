@@ -1,0 +1,287 @@
+"""The protocol itself: the life of a session, encodings, cancelling, texts in step, nothing that crashes."""
+
+from __future__ import annotations
+
+import io
+import json
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenelang.editors.server import Incoming, Settings
+from scenelang.editors.workspace import MAX_TEXT
+from tests.editors.client import PATIENCE_S, Client, Json
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    client = Client()
+    yield client
+    client.kill()
+
+
+def test_shutdown_then_exit_ends_with_0(client: Client) -> None:
+    assert client.stop() == 0
+    assert b"Traceback" not in b"".join(client.stderr)
+
+
+def test_exit_without_shutdown_ends_with_1(client: Client) -> None:
+    client.notify("exit", None)
+    assert client.process.wait(PATIENCE_S) == 1
+
+
+def test_the_end_of_input_ends_the_server(client: Client) -> None:
+    assert client.process.stdin is not None
+    client.process.stdin.close()
+    client.process.wait(PATIENCE_S)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+def test_positions_count_what_was_agreed_on(encoding: str) -> None:
+    client = Client(encoding=encoding)
+    try:
+        assert client.capabilities["positionEncoding"] == encoding
+        uri = client.open("untitled:a", ASTRAL)
+        (found,) = (d for d in client.diagnostics(uri) if d["code"] == "E0204")
+        assert client.shown(uri, found["range"]) == "squar"
+        (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+        assert client.shown(uri, colour["range"]) == "#d33"
+        at = ASTRAL.index("𝄞𝄞") + 1
+        client.change(uri, at, at + 1, "é𝄞x")
+        client.change(uri, 0, 0, "𝄞")
+        (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+        assert client.shown(uri, colour["range"]) == "#d33"
+    finally:
+        client.kill()
+
+
+def test_lines_end_as_the_protocol_says(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\r\nlet b = 2;\rlet c = #d33;\n")
+    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert colour["range"]["start"] == {"line": 2, "character": 8}
+    client.replace(uri, "let a = \u2028#d33;\x0b\nlet b = #d33;\n")
+    found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert [c["range"]["start"] for c in found] == [{"line": 0, "character": 9}, {"line": 1, "character": 8}]
+
+
+def test_places_outside_the_text_are_its_ends(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    far = {"line": 1000, "character": 1000}
+    params: Json = {"textDocument": {"uri": uri}, "position": far}
+    for method in ("hover", "completion", "definition", "signatureHelp", "documentHighlight"):
+        client.request(f"textDocument/{method}", params)
+    version = {"uri": uri, "version": 2}
+    change = {"range": {"start": far, "end": far}, "text": "let b = #d33;\n"}
+    client.notify("textDocument/didChange", {"textDocument": version, "contentChanges": [change]})
+    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
+    assert colour["range"]["start"] == {"line": 1, "character": 8}
+
+
+def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:
+    document = {"textDocument": {"uri": "file:///nowhere/at/all.nsg"}}
+    at = {**document, "position": {"line": 0, "character": 0}}
+    assert client.request("textDocument/hover", at) is None
+    assert client.request("textDocument/documentSymbol", document) == []
+    assert (
+        client.request(
+            "textDocument/formatting", {**document, "options": {"tabSize": 2, "insertSpaces": True}}
+        )
+        is None
+    )
+    change = {"textDocument": {**document["textDocument"], "version": 2}, "contentChanges": [{"text": "x"}]}
+    client.notify("textDocument/didChange", change)
+    client.notify("textDocument/didClose", document)
+    client.notify("some/unknownNotification", {})
+    assert "unknownRequest" in client.refused("some/unknownRequest", {})
+    assert client.stop() == 0
+
+
+@pytest.mark.parametrize("method", ["hover", "completion", "definition"])
+@pytest.mark.parametrize(
+    "place", [{"line": -1, "character": 0}, {"line": 0, "character": 1 << 40}, None, "x"]
+)
+def test_positions_that_are_none_are_refused(lasting: Client, method: str, place: Any) -> None:
+    uri = lasting.open("untitled:a", "let a = 1;\n")
+    params = {"textDocument": {"uri": uri}, "position": place}
+    assert "Invalid" in lasting.refused(f"textDocument/{method}", params)
+
+
+def test_a_second_initialization_is_refused(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    params = {"processId": None, "rootUri": None, "capabilities": {}}
+    assert "initialized already" in client.refused("initialize", params)
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+@pytest.mark.parametrize("length", [b"100000000", b"9" * 30, b"9" * 5000])
+def test_a_message_that_is_too_long_is_refused(client: Client, length: bytes) -> None:
+    """However much of it comes, the next one is read."""
+    assert client.process.stdin is not None
+    for body in (b"", b'{"jsonrpc": "2.0", "id": 1}', b"x" * 100_000):
+        client.process.stdin.write(b"Content-Length: " + length + b"\r\n\r\n" + body)
+        client.process.stdin.flush()
+        assert client.answer(None)["error"]["code"] == -32600
+        assert "unknownRequest" in client.refused("some/unknownRequest", {})
+    assert client.stop() == 0
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 100), st.integers(0, 2), st.sampled_from([b"", b"\n", b"\r\n", b"Content-Length: 1"]))
+def test_the_next_message_is_found(cut: int, chunks: int, end: bytes) -> None:
+    """Wherever the pieces end in which the one before is passed over; lines stay short."""
+    chunk = 1 << 16
+    body = b"x" * max(0, chunks * chunk - cut) + end
+    said: list[None] = []
+    data = b"Content-Length: 1234567890\r\n\r\n" + body + b"Content-Length: 2\r\n\r\n{}"
+    incoming = Incoming(io.BytesIO(data), lambda: said.append(None))
+    while (line := incoming.readline()) != b"Content-Length: 2\r\n":
+        assert line
+        assert len(line) <= chunk + 64
+    assert incoming.readline() == b"\r\n"
+    assert incoming.read(2) == b"{}"
+    assert incoming.readline() == b""
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize(
+    "pause", [1e300, 10**400, float("nan"), float("inf"), -1, 60_001, True, False, "7", None]
+)
+def test_a_pause_that_is_none_is_the_usual_one(pause: Any) -> None:
+    assert Settings.read({"debounceMs": pause}) == Settings()
+    assert Settings.read({"debounceMs": 60_000}).debounce_ms == 60_000
+
+
+def test_a_cancelled_request_is_answered_all_the_same(client: Client) -> None:
+    uri = client.open("untitled:a", "let a = 1;\n")
+    request = client.start("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+    client.notify("$/cancelRequest", {"id": request})
+    answer = client.answer(request)
+    assert "result" in answer or answer["error"]["code"] == -32800
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+HELD = """
+import sys, time
+from collections.abc import Iterator
+from pathlib import Path
+from scenelang.cli.main import main
+from scenelang.lsp import server
+check, begun, gate = server.check, Path(sys.argv[1]), Path(sys.argv[2])
+def held(*given):
+    begun.touch()
+    while not gate.exists():
+        time.sleep(0.005)
+    return check(*given)
+server.check = held
+main(["lsp"])
+"""
+"""A server whose checks wait until a file is there."""
+
+
+def test_typing_goes_on_while_a_scene_is_evaluated(tmp_path: Path) -> None:
+    """The evaluation ends after the answers, whatever they take."""
+    begun, gate = tmp_path / "begun", tmp_path / "gate"
+    client = Client(options={"debounceMs": 0}, command=[sys.executable, "-c", HELD, str(begun), str(gate)])
+    try:
+        uri = client.open("untitled:a", "let a = 1;\nsquare { rotate(30); }\n")
+        assert client.next_diagnostics(uri) == []
+        end = time.monotonic() + PATIENCE_S
+        while not begun.exists():
+            assert time.monotonic() < end, "nothing is evaluated"
+            time.sleep(0.005)
+        client.change(uri, 0, 0, "let ;\n")
+        assert [d["code"] for d in client.next_diagnostics(uri)] == ["E0110"]
+        assert client.request("textDocument/completion", client.at(uri, "let a", 0))
+        client.change(uri, 0, 6, "// a\n")
+        assert client.next_diagnostics(uri) == []
+        gate.touch()
+        assert [d["code"] for d in client.diagnostics(uri)] == ["W0201", "E0302"]
+        versions = [found["version"] for found in client.published[uri]]
+        assert versions == [1, 2, 3, 3], "a check of a text that had changed was published"
+        assert client.stop() == 0
+    finally:
+        client.kill()
+
+
+def test_a_long_evaluation_is_dropped_when_its_text_has_changed() -> None:
+    client = Client(options={"debounceMs": 0})
+    try:
+        slow = "fn f(n) = n > 0 ? f(n - 1) + f(n - 2) : 0;\nlet a = f(23);\n"
+        slow += "for (i in 0..<300) { for (j in 0..<300) { square { scale(0.5); } } }\n"
+        uri = client.open("untitled:a", slow)
+        client.change(uri, 0, 0, "// a\n")
+        client.request("textDocument/completion", client.at(uri, "let a", 0))
+        client.replace(uri, "square { rotate(30); }\n")
+        assert [d["code"] for d in client.diagnostics(uri)] == ["E0302"]
+        assert client.stop() == 0
+    finally:
+        client.kill()
+
+
+def test_a_text_beyond_the_limit_is_refused_at_once(client: Client) -> None:
+    client.replace(client.open("untitled:a", "square { }\n"), "square { }\n" * (MAX_TEXT // 11 + 1))
+    uri = client.open("untitled:b", client.texts["untitled:a"])
+    for name in ("untitled:a", uri):
+        while [d["code"] for d in client.next_diagnostics(name)] != ["E0324"]:
+            pass
+    client.replace(uri, "squar { }\n")
+    assert [d["code"] for d in client.diagnostics(uri)] == ["E0204"]
+    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+
+
+def test_a_port_serves_as_well_as_pipes() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "scenelang", "lsp", "--tcp", str(port)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                connection = socket.create_connection(("127.0.0.1", port))
+                break
+            except OSError:
+                assert process.poll() is None, "the server ended"
+                assert time.monotonic() < end, "nobody listens"
+                time.sleep(0.05)
+        with connection, connection.makefile("rwb") as stream:
+            params = {"processId": None, "rootUri": None, "capabilities": {}}
+            message: Json = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params}
+            data = json.dumps(message).encode()
+            stream.write(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+            stream.flush()
+            length = 0
+            while line := stream.readline().strip():
+                if line.lower().startswith(b"content-length:"):
+                    length = int(line.split(b":")[1])
+            assert json.loads(stream.read(length))["result"]["serverInfo"]["name"] == "scenelang"
+    finally:
+        process.kill()
+        process.wait(PATIENCE_S)
+
+
+def test_many_documents_are_open_at_once() -> None:
+    client = Client(EXAMPLES)
+    try:
+        uris = [
+            client.open(path.as_uri(), path.read_text("utf-8")) for path in sorted(EXAMPLES.glob("*.nsg"))
+        ]
+        for uri in uris:
+            assert [d for d in client.diagnostics(uri) if d["severity"] == 1] == []
+            document = {"textDocument": {"uri": uri}}
+            assert client.request("textDocument/documentSymbol", document)
+            client.request("textDocument/semanticTokens/full", document)
+    finally:
+        client.kill()

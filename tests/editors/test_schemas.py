@@ -1,0 +1,214 @@
+"""The JSON Schemas say what the reader does: jsonschema judges examples, random scenes and random damage."""
+
+from __future__ import annotations
+
+import copy
+import json
+import random
+from contextlib import nullcontext
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+
+import scenelang as nsg
+from scenelang.compiler.manifest import ROOT, Manifest
+from scenelang.editors.dumps import SCHEMAS, scene_schema
+from scenelang.language.machine import render_json
+from scenelang.language.scene_json import to_readable_json
+from tests.strategies import scenes
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
+SCENE = Draft202012Validator(scene_schema())
+UNSAID = ("a singular matrix",)  # what a schema cannot say
+
+
+def reads(data: Any) -> bool:
+    """Whether the reader takes it; what no schema can say does not count."""
+    try:
+        nsg.Scene.from_json(json.dumps(data))
+    except nsg.SceneError as error:
+        return all(d.message.endswith(UNSAID) for d in error.diagnostics)
+    return True
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_schemas_are_schemas(kind: str) -> None:
+    schema = SCHEMAS[kind]()
+    Draft202012Validator.check_schema(schema)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert schema["$id"] == f"urn:scenelang:schema:{kind}:1"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_are_valid(path: Path) -> None:
+    scene = nsg.load(path)
+    for text in (scene.to_json(), to_readable_json(scene)):
+        SCENE.validate(json.loads(text))
+
+
+def test_every_property_says_its_kind() -> None:
+    """Every field has a type, a reference or a choice, and every node a description."""
+    for name, node in scene_schema()["$defs"].items():
+        assert node["description"], name
+        assert node["additionalProperties"] is False, name
+        for key, value in node["properties"].items():
+            assert {"type", "$ref", "enum", "const", "anyOf", "oneOf"} & value.keys(), f"{name}.{key}"
+    described = [
+        (name, key)
+        for name, node in scene_schema()["$defs"].items()
+        for key, value in node["properties"].items()
+        if value.get("type") == "number" and "description" not in value
+    ]
+    assert described == [("Animation", "seconds"), ("Shear", "k")]
+
+
+@settings(max_examples=30)
+@given(scenes)
+def test_what_scenes_write_is_valid(scene: nsg.Scene) -> None:
+    SCENE.validate(json.loads(scene.to_json()))
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Paths of all values in JSON data."""
+    found = [path]
+    if isinstance(value, dict):
+        for key in value:
+            found += places(value[key], (*path, key))
+    elif isinstance(value, list):
+        for at, item in enumerate(value):
+            found += places(item, (*path, at))
+    return found
+
+
+ODD = (
+    None,
+    True,
+    0,
+    1,
+    -1,
+    2.5,
+    256.0,
+    9000,
+    "",
+    "star",
+    "0.5",
+    "a b",
+    [],
+    {},
+    [0, 0, 0],
+    [1, 1, 1],
+    "union",
+)
+ODD += ([0, 0, 0, 1], "subtract", "scale", "rotate", "object", "group", {"kind": "flip"}, {"x": 1, "y": 1})
+
+
+def damaged(data: Any, rng: random.Random) -> Any:
+    """Data with one value replaced, taken away, added or moved."""
+    data = copy.deepcopy(data)
+    path = rng.choice(places(data)[1:])
+    holder = data
+    for key in path[:-1]:
+        holder = holder[key]
+    key = path[-1]
+    match rng.randrange(4):
+        case 0:
+            holder[key] = copy.deepcopy(rng.choice(ODD))
+        case 1:
+            del holder[key]
+        case 2 if isinstance(holder, dict):
+            holder[rng.choice(["x", "k", "kind", "op", "extra", "rgb", "children", "Kind"])] = rng.choice(ODD)
+        case 2:
+            holder.append(copy.deepcopy(rng.choice(ODD)))
+        case _:
+            other = data
+            for step in rng.choice(places(data)):
+                other = other[step]
+            holder[key] = copy.deepcopy(other)
+    return data
+
+
+@settings(max_examples=120)
+@given(scenes, st.integers(0, 2**32 - 1))
+def test_schema_and_reader_agree_on_damage(scene: nsg.Scene, seed: int) -> None:
+    data = damaged(json.loads(scene.to_json()), random.Random(seed))
+    said = [f"{error.json_path}: {error.message}" for error in SCENE.iter_errors(data)]
+    assert reads(data) == (not said), (said[:3], data)
+
+
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [
+        ('{"canvas": [256.0, 1e2]}', True),
+        ('{"canvas": [256.5, 1]}', False),
+        ('{"canvas": [true, 1]}', False),
+        ('{"version": true}', False),
+        ('{"version": 1.0}', True),
+        ('{"nodes": [{"geometry": "star"}]}', False),
+        ('{"nodes": [{"kind": "object", "geometry": "star", "transforms": [{"angle": 1}]}]}', False),
+        ('{"nodes": [{"kind": "chain", "children": [{"node": {"kind": "object", "geometry": "a"}}]}]}', True),
+        ('{"background": ["0", "0", "0"]}', False),
+        ('{"animation": {"seconds": 0, "fps": 24}}', False),
+        ('{"animation": {"seconds": 1, "fps": 24, "loop": 1}}', False),
+    ],
+)
+def test_schema_and_reader_agree(text: str, good: bool) -> None:
+    assert SCENE.is_valid(json.loads(text)) == good
+    assert reads(json.loads(text)) == good
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("*/manifest.json")), ids=lambda path: path.parent.name)
+def test_manifests_are_valid(path: Path) -> None:
+    Draft202012Validator(SCHEMAS["manifest"]()).validate(json.loads(path.read_text("utf-8")))
+
+
+def test_the_schema_of_manifests_names_their_fields() -> None:
+    assert {field.name for field in fields(Manifest)} | {"format"} == set(SCHEMAS["manifest"]()["properties"])
+
+
+@pytest.mark.parametrize(
+    ("change", "good"),
+    [
+        ({}, True),
+        ({"set": "shapes2d", "sizes": [[128, 96], [64, 64]], "white": True}, True),
+        ({"sizes": [[0, 64]]}, False),
+        ({"sizes": [[64]]}, False),
+        ({"sizes": [[64, 8193]]}, False),
+        ({"white": 1}, False),
+        ({"set": 1}, False),
+        ({"colour": "red"}, False),
+    ],
+    ids=str,
+)
+def test_schema_and_reader_agree_on_manifests(change: dict[str, object], good: bool) -> None:
+    data = {**json.loads((ROOT / "shapes2d" / "manifest.json").read_text("utf-8")), **change}
+    assert Draft202012Validator(SCHEMAS["manifest"]()).is_valid(data) == good
+    with nullcontext() if good else pytest.raises(ValueError, match=r"."):
+        Manifest.from_json(json.dumps(data))
+
+
+def test_diagnostics_are_valid() -> None:
+    validator = Draft202012Validator(SCHEMAS["diagnostics"]())
+    found = nsg.Diagnostics()
+    text = "square { scale(foo); rotate(30); } let a = 1 let b = [; subtract star {} strr {} let a = 2;"
+    for source in (
+        "square { rotate(30); }",
+        text,
+        'fn f(x) = f(x); let y = f(1); import "a.nsg" as a;',
+        "chain { subtract star { } }",
+    ):
+        with pytest.raises(nsg.SceneError):
+            nsg.loads(source, diagnostics=found)
+    data = json.loads(render_json(found))
+    assert len(data["diagnostics"]) >= 5
+    assert any(d["fix"] for d in data["diagnostics"])
+    assert any(d["labels"] for d in data["diagnostics"])
+    validator.validate(data)
+    with pytest.raises(nsg.SceneError) as caught:
+        nsg.Scene.from_json("[")
+    validator.validate(json.loads(render_json(caught.value.diagnostics)))
+    assert not validator.is_valid({"version": 1, "diagnostics": [{"code": "E0101"}]})

@@ -1,0 +1,302 @@
+"""The library that ships: what its shapes are, against closed forms, and how it is imported."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import random
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.compiler.compile import compile_scene
+from scenelang.language import library
+from scenelang.language.diagnostics import SourceFile, apply_fixes
+from scenelang.language.evaluation import Source
+from scenelang.language.foreign import SHAPES
+from tests.drawing import oracle
+
+Field = Callable[[float, float], float]
+ROUND, SHARP = 0.0025, 1e-6  # how near to an outline its closed form decides nothing
+IMPORT = 'import "std/shapes" as s; '
+
+
+def polygon(*corners: tuple[float, float]) -> Field:
+    return lambda x, y: oracle.polygon_distance(list(corners), x, y)
+
+
+def regular(n: int, *radii: float) -> Field:
+    turns = [math.tau * i / n for i in range(n)]
+    return polygon(
+        *[
+            (radii[i % len(radii)] * math.sin(a), radii[i % len(radii)] * math.cos(a))
+            for i, a in enumerate(turns)
+        ]
+    )
+
+
+def disc(r: float) -> Field:
+    return lambda x, y: math.hypot(x, y) - r
+
+
+def band(r: float, width: float) -> Field:
+    return lambda x, y: abs(math.hypot(x, y) - r + width / 2) - width / 2
+
+
+def sector(start: float, end: float) -> Field:
+    """Of less than half a turn, in degrees: to the left of one ray and to the right of the other."""
+    a, b = math.radians(start), math.radians(end)
+    return lambda x, y: max(x * math.sin(a) - y * math.cos(a), y * math.cos(b) - x * math.sin(b))
+
+
+def both(*fields: Field) -> Field:
+    return lambda x, y: max(f(x, y) for f in fields)
+
+
+def any_of(*fields: Field) -> Field:
+    return lambda x, y: min(f(x, y) for f in fields)
+
+
+def without(a: Field, b: Field) -> Field:
+    return lambda x, y: max(a(x, y), -b(x, y))
+
+
+def segment(ax: float, ay: float, bx: float, by: float, width: float) -> Field:
+    """A line with round ends."""
+    ex, ey = bx - ax, by - ay
+
+    def distance(x: float, y: float) -> float:
+        t = min(1.0, max(0.0, ((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey)))
+        return math.hypot(x - ax - t * ex, y - ay - t * ey) - width / 2
+
+    return distance
+
+
+def rounded(w: float, h: float, r: float) -> Field:
+    def distance(x: float, y: float) -> float:
+        p, q = abs(x) - w / 2 + r, abs(y) - h / 2 + r
+        return math.hypot(max(p, 0), max(q, 0)) + min(max(p, q), 0) - r
+
+    return distance
+
+
+BOX = polygon((-0.6, -0.3), (0.6, -0.3), (0.6, 0.3), (-0.6, 0.3))
+ARROW = any_of(
+    polygon((-0.6, -0.05), (0.42, -0.05), (0.42, 0.05), (-0.6, 0.05)),
+    polygon((0.6, 0), (0.4, 0.09), (0.4, -0.09)),
+)
+SHAPE_FIELDS = {
+    "rect(1.2, 0.6)": (BOX, SHARP),
+    "rect(0.8)": (polygon((-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)), SHARP),
+    "parallelogram([-0.5, -0.5], [0.9, 0.1], [0.2, 0.7])": (
+        polygon((-0.5, -0.5), (0.4, -0.4), (0.6, 0.3), (-0.3, 0.2)),
+        SHARP,
+    ),
+    "corners([-0.5, -0.5], [0.9, 0.1], [0.2, 0.7])": (
+        polygon((-0.5, -0.5), (0.9, 0.1), (0.2, 0.7)),
+        SHARP,
+    ),
+    "line([-0.5, -0.3], [0.4, 0.6], 0.2)": (
+        polygon(
+            *[
+                (x + 0.1 * dx / math.sqrt(2), y + 0.1 * dy / math.sqrt(2))
+                for x, y, dx, dy in (
+                    (-0.5, -0.3, 1, -1),
+                    (0.4, 0.6, 1, -1),
+                    (0.4, 0.6, -1, 1),
+                    (-0.5, -0.3, -1, 1),
+                )
+            ]
+        ),
+        SHARP,
+    ),
+    "arrow([-0.6, 0], [0.6, 0], 0.1, 0.2)": (ARROW, SHARP),
+    **{f"polygon({n}, 0.8)": (regular(n, 0.8), SHARP) for n in (3, 4, 5, 6, 7, 12)},
+    **{
+        f"star({n}, 0.9, {s})": (regular(2 * n, 0.9, 0.9 * s), SHARP)
+        for n in (3, 4, 5, 6, 9)
+        for s in (0.3, 0.9)
+    },
+    "disc(0.7)": (disc(0.7), ROUND),
+    "disc(0.7, 64)": (disc(0.7), 0.0008),
+    "disc(0.03)": (disc(0.03), ROUND),
+    "disc(0.015)": (disc(0.015), ROUND),
+    "ellipse(0.8, 0.5)": (lambda x, y: 0.5 * (math.hypot(x / 0.8, y / 0.5) - 1), ROUND),
+    "ring(0.8, 0.2)": (band(0.8, 0.2), ROUND),
+    "ring(0.8, 3)": (disc(0.8), ROUND),
+    "arc(0.8, 0.2, 30deg, 140deg)": (both(band(0.8, 0.2), sector(30, 140)), ROUND),
+    "arc(0.8, 0.2, 140deg, 390deg)": (without(band(0.8, 0.2), sector(30, 140)), ROUND),
+    "pie(0.8, 30deg, 50deg)": (both(disc(0.8), sector(30, 50)), ROUND),
+    "pie(0.8, -220deg, 30deg)": (without(disc(0.8), sector(30, 140)), ROUND),
+    "rounded(1.2, 0.8, 0.2)": (rounded(1.2, 0.8, 0.2), ROUND),
+    "rounded(1.2, 0.8, 9)": (rounded(1.2, 0.8, 0.4), ROUND),
+    "rounded(1.2, 0.6, 0)": (BOX, SHARP),
+    "capsule([-0.5, -0.3], [0.4, 0.6], 0.3)": (segment(-0.5, -0.3, 0.4, 0.6, 0.3), ROUND),
+    "path([[-0.5, -0.3], [0.4, 0.6], [0.5, -0.5]], 0.1)": (
+        any_of(segment(-0.5, -0.3, 0.4, 0.6, 0.1), segment(0.4, 0.6, 0.5, -0.5, 0.1)),
+        ROUND,
+    ),
+    "disc_mask(0.7)": (disc(0.7), ROUND),
+}
+
+
+@pytest.mark.parametrize("call", SHAPE_FIELDS)
+def test_shape_is_its_closed_form(call: str) -> None:
+    field, near = SHAPE_FIELDS[call]
+    (node,) = nsg.loads(f"{IMPORT} s.{call};").nodes
+    random.seed(call)
+    reach = 1.0 if "0.0" not in call else 0.05
+    decided = 0
+    for _ in range(250):
+        x, y = random.uniform(-reach, reach), random.uniform(-reach, reach)
+        wanted = field(x, y)
+        if abs(wanted) > near:
+            decided += 1
+            assert (oracle.sample(node, x, y, [], None)[0] < 0) == (wanted < 0), (x, y, wanted)
+    assert decided > 150
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        call
+        for call in SHAPE_FIELDS
+        if re.match(r"polygon\(7|star\([59]|star\(6, 0.9, 0.3|disc\(0.7|ring|arc|pie|round", call)
+    ],
+)
+def test_no_seam_shows(call: str) -> None:
+    """What lies inside a shape is drawn, on the lines where its leaves meet too."""
+    field, _ = SHAPE_FIELDS[call]
+    side = 64
+    picture = nsg.render(
+        nsg.loads(f"{IMPORT} canvas({side}, {side}); background(#000); s.{call};"), backend="reference"
+    )
+    at = (np.arange(side) + 0.5) * 2 / side - 1
+    inside = np.array([[field(x, -y) < -2 / side for x in at] for y in at])
+    assert inside.sum() > 50
+    assert (picture[inside] == 1).all()
+
+
+def test_names_of_shapes_lead_to_modules_that_are_there() -> None:
+    text = (library.find(library.SHAPES) or Path()).read_text("utf-8")
+    assert [call for call in SHAPES.values() if f"\nmodule {call.partition('(')[0]}(" not in text] == []
+
+
+def test_shapes_compose() -> None:
+    """Over each other and over differences, and out of each other; a mask cuts, and leads a blend."""
+    calls = "".join(f"s.{call}; " for call in SHAPE_FIELDS if "mask" not in call and "0.0" not in call)
+    found = nsg.Diagnostics()
+    for text in (
+        f"{calls} group {{ {calls} rotate(10deg); }}",
+        "chain { s.disc(0.9); subtract s.ring(0.5); subtract s.pie(0.4, 0deg, 40deg); s.star(6, 0.2); }",
+        "chain { square {} s.disc(0.3) { translate(0.5, 0.5); } intersect s.disc_mask(0.8); }",
+        "chain { s.disc_mask(0.5); smooth star { scale(0.5); translate(0.4, 0); } }",
+        "s.disc(0.3) { twirl(1); bend(0.4); }",
+    ):
+        nsg.compile(nsg.loads(IMPORT + text), diagnostics=found)
+    assert [*found] == []
+
+
+NOTHING = (
+    "rect(0, 1)",
+    "disc(0)",
+    "ring(0, 1)",
+    "arc(1, 0.1, 40deg, 20deg)",
+    "pie(1, 0deg, 0deg)",
+    "star(5, 0)",
+    "polygon(6, 0)",
+    "line([1, 1], [1, 1])",
+    "arrow([1, 1], [1, 1])",
+    "parallelogram([0, 0], [1, 1], [2, 2])",
+    "corners([0, 0], [1, 1], [2, 2])",
+    "rounded(1, 0, 0.1)",
+    "capsule([0, 0], [1, 0], 0)",
+    "disc_mask(0)",
+)
+
+
+@pytest.mark.parametrize("call", NOTHING)
+def test_nothing_is_drawn_without_extent(call: str) -> None:
+    found = nsg.Diagnostics()
+    assert len(nsg.compile(nsg.loads(f"{IMPORT} s.{call};"), diagnostics=found)) == 0
+    assert {d.code for d in found} <= {"W0401"}
+
+
+def test_it_is_found_from_anywhere(tmp_path: Path) -> None:
+    """From text without a folder and from imports, under one name wherever it is installed."""
+    (program,) = {nsg.compile(nsg.loads(f"{IMPORT} s.rect();")).digest()}
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "lib.nsg").write_text(f"{IMPORT} module m() {{ s.rect(); }}")
+    (tmp_path / "main.nsg").write_text('import "sub/lib.nsg" as l; l.m();')
+    scene = nsg.load(tmp_path / "main.nsg")
+    assert nsg.compile(scene).digest() == program
+    assert nsg.loads(scene.to_nsg()) == scene
+
+
+def test_reserved_names_and_the_users_own_files(tmp_path: Path) -> None:
+    (tmp_path / "std").mkdir()
+    for name in ("shapes", "shapes.nsg", "mine"):
+        (tmp_path / "std" / name).write_text("let mine = 1;")
+
+    def codes(path: str, use: str) -> list[tuple[str, str | None]]:
+        found = nsg.Diagnostics()
+        text = f'import "{path}" as s; square {{ scale({use}); }}'
+        with contextlib.suppress(nsg.SceneError):
+            nsg.loads(text, root=tmp_path, diagnostics=found)
+        return [(d.code, d.help) for d in found]
+
+    assert codes("std/shapes", "s.sides_of(0.3)") == []
+    assert codes("std/shapes.nsg", "s.mine") == codes("./std/shapes", "s.mine") == []
+    assert codes("std/mine", "s.mine") == [
+        ("E0214", "it has std/meshes, std/shapes; a file of your own is `./std/mine`")
+    ]
+    assert [code for code, _ in codes("std/../std/shapes", "s.mine")] == []
+    (tmp_path / "std" / "shapes.nsg").unlink()
+    found = nsg.Diagnostics()
+    with pytest.raises(nsg.SceneError):
+        nsg.loads('import "std/shapes.nsg" as s; s.disc();', root=tmp_path, diagnostics=found)
+    fixed, _ = apply_fixes(found.items[0].span.source.text, list(found))
+    assert nsg.loads(fixed, root=tmp_path).nodes
+
+
+NEST = "module m(n) {{ if (n > 0) {{ subtract {{ {level} m(n - 1); }} }} else {{ {inmost} }} }}"
+"""Composites in each other, n deep."""
+
+
+def test_mistakes_in_calls_are_shown_at_the_call() -> None:
+    """And so are those of the compiler: nothing in the library is the user's to mend."""
+    for text, code, where in (
+        ('s.disc("a");', "E0301", "s.disc"),
+        ("s.line([0, 0], 3deg);", "E0303", "s.line"),
+        ("s.arc(1, 0.1, 0, 9);", "E0302", "s.arc"),
+        (f"{NEST.format(level='square {}', inmost='s.disc_mask(1);')} m(16);", "E0409", "s.disc_mask"),
+    ):
+        found = nsg.Diagnostics()
+        scene, spans = Source(text=SourceFile("a.nsg", IMPORT + text)).scene(found)
+        if scene is not None:
+            with pytest.raises(nsg.SceneError):
+                compile_scene(scene, spans=spans, diagnostics=found)
+        assert [(d.code, d.span and d.span.text) for d in found] == [(code, where)], list(found)
+
+
+def test_known_shapes_lead_to_the_library() -> None:
+    for text in ("circle { scale(0.5); }", "Circle(0.2);", "hexagon() {}", "line;"):
+        found = nsg.Diagnostics()
+        with pytest.raises(nsg.SceneError):
+            nsg.loads(f"nsg 1;\n{text}", diagnostics=found)
+        (only,) = found
+        assert only.code == "E0204"
+        assert (only.help or "").startswith('import "std/shapes" as s; then s.')
+
+
+def test_what_is_imported_already_is_used() -> None:
+    found = nsg.Diagnostics()
+    with pytest.raises(nsg.SceneError):
+        nsg.loads('import "std/shapes" as form; let s = 1; circle;', diagnostics=found)
+    assert found.items[0].help == "form.disc(r)"
+    with pytest.raises(nsg.SceneError, match="rect"):
+        nsg.loads("square(0.5);")

@@ -1,0 +1,139 @@
+"""Every code has a page; its bad examples give exactly that code, and its good ones nothing at all."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import scenelang
+from scenelang.compiler import lower
+from scenelang.compiler.check import check_compiles, check_frames
+from scenelang.language import lexer, limits, parser, session, statements, values
+from scenelang.language import scene as schema
+from scenelang.language import values as functions
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
+from scenelang.language.evaluation import Source
+from scenelang.language.pages import AREAS, CODES, Example, Page, read_page
+from scenelang.language.parser import parse
+from scenelang.language.reports import SceneError
+from scenelang.language.resolve import find_unused
+from scenelang.language.scene import Scene
+from scenelang.language.session import Defines
+from scenelang.language.tables import tables
+
+PAGES = Path(scenelang.__file__).parent / "language/pages"
+ROOT = Path(__file__).parents[2]
+
+
+def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
+    """What there is to say about an example."""
+    found = Diagnostics()
+    if example.language == "python":
+        try:
+            exec(compile(example.text, page.code, "exec"), {})
+        except SceneError as error:
+            return list(error.diagnostics)
+        return []
+    spans = None
+    if example.language == "json":
+        try:
+            scene: Scene | None = Scene.from_json(example.text)
+        except SceneError as error:
+            return list(error.diagnostics)
+    else:
+        for name, text in (("scene.nsg", example.text), *page.files):
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text, "utf-8")
+        told = {"-D": [], "--frame": []}
+        for name, value in zip(example.options[::2], example.options[1::2], strict=True):
+            told[name].append(value)
+        defines = Defines(dict(item.split("=", 1) for item in told["-D"]))
+        source = SourceFile("scene.nsg", example.text)
+        path = folder / "scene.nsg"
+        tree = parse(source, found)
+        evaluation = Source(path, tree=tree, params=defines).evaluation(found, replays=True)
+        scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
+        defines.report_unused(found)
+        if not found.errors:
+            find_unused(tree, found)
+    if scene is not None:
+        check_compiles(scene, spans, found)
+    if example.language == "nsg" and not told["--frame"]:
+        check_frames(evaluation, found, first=scene)
+    return list(found)
+
+
+EXAMPLES = [
+    pytest.param(example, page, id=f"{page.code}-{example.kind}{index}")
+    for page in map(read_page, CODES)
+    for index, example in enumerate(page.examples)
+]
+
+
+@pytest.mark.parametrize(("example", "page"), EXAMPLES)
+def test_example(example: Example, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in example.limits:
+        monkeypatch.setattr(name, value)
+    found = check(example, page, tmp_path)
+    wanted = [page.code] if example.kind == "bad" else []
+    assert [d.code for d in found] == wanted, [(d.message, d.span) for d in found]
+
+
+def test_codes_are_those_of_the_pages() -> None:
+    assert sorted(CODES) == sorted(path.stem for path in PAGES.glob("*.md"))
+    assert all(re.fullmatch(r"[EW]0[1-5]\d\d", code) for code in CODES)
+
+
+@pytest.mark.parametrize("page", [*map(read_page, CODES)], ids=lambda page: page.code)
+def test_shape_of_a_page(page: Page) -> None:
+    assert page.text.startswith(f"# {page.code}: {page.title}\n\n")
+    assert re.findall(r"^## (.*)$", page.text, re.MULTILINE) == ["Why", "Example", "Instead"]
+    kinds = [example.kind for example in page.examples]
+    assert kinds == sorted(kinds), "bad examples come before good ones"
+    assert set(kinds) == ({"good"} if page.retired else {"bad", "good"})
+    assert page.text.count("```") == 2 * (
+        len(page.examples) + len(page.files) + sum(bool(e.options) for e in page.examples)
+    ), "a fence that means nothing"
+    prose = re.sub(r"```.*?```", "", page.text, flags=re.DOTALL)
+    assert 200 < len(prose) < 1500
+    assert all(len(line) <= 110 for line in page.text.splitlines())
+    assert page.area in AREAS.values()
+
+
+@pytest.mark.parametrize(("model", "label"), [("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')])
+def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part(model: str, label: str) -> None:
+    found = Diagnostics()
+    source = SourceFile("scene.nsg", model + "square { scale(0.5); }\nsphere { scale(0.3); }\n")
+    scene, spans = Source(text=source).scene(found)
+    assert scene is not None
+    check_compiles(scene, spans, found)
+    (only,) = found
+    assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
+    assert only.span is not None
+    assert (only.span.text, only.labels[0].span.text) == ("sphere", label)
+    assert only.labels[0].message == "flat by this"
+
+
+def test_pages_state_the_lists_and_limits_of_the_code() -> None:
+    def prose(code: str) -> str:
+        return " ".join(read_page(code).text.split())
+
+    words = {text for text in tables().literals if text[0].isalpha()} - {"step", "as"}
+    assert set(re.findall(r"`(\w+)`", read_page("E0110").meaning)) == words
+    listed = re.search(r"The functions are `([^`]*)`", prose("E0207"))
+    assert listed is not None
+    assert set(listed[1].split()) == set(functions.FUNCTIONS)
+    for code, number in {
+        "E0120": f"{parser.MAX_DEPTH} levels",
+        "E0121": f"more than {lexer.MAX_MISTAKES} syntax",
+        "E0311": f"above {statements.MAX_SIDE_PX}",
+        "E0320": f"{limits.MAX_OBJECTS:,} objects",
+        "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
+        "E0322": f"{limits.MAX_STEPS // 1_000_000} million steps",
+        "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
+        "E0324": f"{limits.MAX_BYTES // 1_000_000} MB, or imports nest more than {session.MAX_IMPORT_DEPTH}",
+        "E0405": f"{lower.MAX_DEPTH:,} levels",
+    }.items():
+        assert number in prose(code), code

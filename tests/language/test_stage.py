@@ -1,0 +1,159 @@
+"""The stage of 3D scenes and the width of a blend: what is stated, what hides it, and who refuses it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import scenelang as nsg
+from scenelang.compiler.choose import scene_dimension
+from scenelang.compiler.lower import lower
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.spaces import Camera, Ground, Light, Stage, decoded, stage_of
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.scene import same_nodes
+from tests.language.cases import run_text
+
+SHAPES, SOLIDS = load_manifest("shapes2d"), load_manifest("solids3d")
+OTHER, LEARNED = replace(SOLIDS, any_blend=False), load_manifest("shapes2d-streaming")
+
+
+@pytest.mark.parametrize(
+    ("text", "stage"),
+    [
+        ("", Stage()),
+        ("camera(); light(); ground();", Stage()),
+        (
+            "camera(fov = 0.25turn, eye = 2 * X);",
+            Stage(Camera(eye=(2.0, 0.0, 0.0), fov_rad=math.pi / 2)),
+        ),
+        ("light([1, 2, 3], 4, rgb(0, 0.5, 1));", Stage(light=Light((1, 2, 3), 4, decoded((0, 0.5, 1))))),
+        ("light(color = #fff);", Stage()),
+        ("ground(-2);", Stage(ground=Ground(-2.0))),
+        ("ground(color = #fff);", Stage(ground=Ground(rgb=(1.0, 1.0, 1.0)))),
+        ("ground(none);", Stage(ground=None)),
+        ("background(none);", Stage(transparent=True)),
+        ("background(#fff);", Stage(horizon=(1.0, 1.0, 1.0), zenith=(1.0, 1.0, 1.0))),
+    ],
+)
+def test_what_is_stated_stands_over_the_defaults(text: str, stage: Stage) -> None:
+    scene = run_text(text + "sphere;").good()
+    assert stage_of(scene) == stage
+    assert (
+        stage_of(run_text(scene.to_nsg()).good()) == stage_of(nsg.Scene.from_json(scene.to_json())) == stage
+    )
+
+
+def test_the_stage_moves() -> None:
+    text = (
+        "animate(1, 4); camera(eye = [4 * sin(TAU * u * 1rad), 1, 4]); smooth(k = 0.1 + u) { sphere; torus; }"
+    )
+    scenes = [run_text(text, frame=frame).good() for frame in (0, 1)]
+    assert [scene.camera.eye[0] for scene in scenes] == pytest.approx([0, 4])
+    assert [scene.nodes[0].k for scene in scenes] == pytest.approx([0.1, 0.35])
+    moved = scenes[0].model_copy(update={"camera": scenes[1].camera})
+    assert same_nodes(scenes[0], scenes[0])
+    assert not same_nodes(scenes[0], moved)
+    found = run_text("animate(1, 4); camera(fov = 60deg * u); sphere;").only()
+    assert (found.code, found.span.text) == ("E0338", "60deg * u")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "module light(p) { sphere; } light(3);",
+        "module ground { sphere; } ground;",
+        "module camera() { sphere; } group { camera(); }",
+        "let light = material diffuse; sphere { light; }",
+    ],
+)
+def test_own_names_hide_the_words(text: str) -> None:
+    scene = run_text(text.replace("ground {", "ground() {")).good()
+    assert (scene.camera, scene.light, scene.ground) == ("default",) * 3
+    assert len(scene.nodes) == 1
+
+
+def test_a_value_of_the_name_is_an_argument() -> None:
+    assert run_text("let light = 3; light(power = light); sphere;").good().light == nsg.Light(power=3)
+
+
+def test_imported_files_have_no_stage(tmp_path: Path) -> None:
+    lib = tmp_path / "lib.nsg"
+    text = 'import "lib.nsg" as lib; lib.ball();'
+    lib.write_text("module ball() { sphere; }\nlight(power = 3);\nbackground(#000);\n", "utf-8")
+    found = run_text(text, path=tmp_path / "main.nsg").only()
+    assert (found.code, found.message, found.span.text) == ("E0330", "`light` in an imported file", "light")
+    lib.write_text("module ball() { light(); }\nmodule light() { sphere; }\nlight();\n", "utf-8")
+    assert run_text(text, path=tmp_path / "main.nsg").good().light == "default"
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension"),
+    [
+        ("", 2),
+        ("camera();", 3),
+        ("ground(none);", 3),
+        ("background(#000);", 2),
+        ("light(); square;", 2),
+        ("smooth(k = 0.3) { sphere; torus; }", 3),
+        ("group { group {} chain { square; smooth(k = 0.3) star; } } torus;", 2),
+        ("torus; square;", 3),
+    ],
+)
+def test_the_first_geometry_and_then_the_stage_say_the_dimension(text: str, dimension: int) -> None:
+    assert scene_dimension(run_text(text).good()) == dimension
+
+
+@pytest.mark.parametrize(
+    ("scene", "manifest", "codes"),
+    [
+        (nsg.Scene(camera=nsg.Camera(), ground=None), SHAPES, ["E0511", "E0511"]),
+        (nsg.Scene(camera=nsg.Camera(), ground=None), SOLIDS, []),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")] * 2, k=0.2)), OTHER, ["E0512"]),
+        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")], k=0.2)), OTHER, []),
+        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("diffuse"))), SHAPES, ["E0502"]),
+        (nsg.Scene(nodes=nsg.Object("sphere", (), nsg.Material("wood", (), "volumetric"))), SOLIDS, []),
+        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("wood"))), LEARNED, ["E0509", "E0502"]),
+        (nsg.Scene(nodes=[nsg.Object("star"), nsg.Object("sphere")]), SHAPES, ["E0501"]),
+        (nsg.Scene(nodes=nsg.Group(nsg.Object("sphere"), nsg.Displace(1, 2))), SOLIDS, ["E0407"]),
+        (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Displace(1, 3)])), SOLIDS, ["E0407"]),
+        (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Twist(3)])), SOLIDS, []),
+    ],
+)
+def test_what_models_refuse(scene: nsg.Scene, manifest: Manifest, codes: list[str]) -> None:
+    found = Diagnostics()
+    lower(scene, manifest, None, found)
+    assert [d.code for d in found] == codes
+
+
+def test_the_width_of_each_blend_reaches_the_graph() -> None:
+    text = (
+        "chain { sphere; smooth(k = 0.3) torus; smooth sphere; smooth(0.2) smooth(k = 1) { torus; sphere; } }"
+    )
+    graph = lower(run_text(text).good(), SOLIDS, None, Diagnostics())
+    (chain,) = [link.node for link in graph.root.links]
+    assert [link.k for link in chain.links] == [0.0, 0.3, 0.0, 0.2]
+    assert [link.k for link in chain.links[3].node.links] == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: nsg.Camera((0, 0, 0)), "the eye is the target"),
+        (lambda: nsg.Camera(fov=4.0), "fov"),
+        (lambda: nsg.Camera((0, 0, 1e13)), "eye"),
+        (lambda: nsg.Camera(fov=1e-20), "too narrow"),
+        (lambda: nsg.Light(power=-1), "power"),
+        (lambda: nsg.Light((0, 1e13, 0)), "position"),
+        (lambda: nsg.Ground(-1e13), "y"),
+        (lambda: nsg.Link("union", nsg.Object("sphere"), 0.3), "`union` has no k"),
+        (lambda: nsg.Boolean("smooth", k=0), "k"),
+        (lambda: nsg.Scene(ground="none"), "`ground`"),
+    ],
+)
+def test_constructors_refuse(make, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        make()

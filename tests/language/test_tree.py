@@ -1,0 +1,207 @@
+"""What each statement and expression becomes, and where its span lies."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenelang.language import tree as nodes
+from scenelang.language.diagnostics import Span
+from tests.language.reading import MALFORMED, SCENES, read, read_well
+
+
+def show(node: Any) -> str:
+    """An expression with all its parentheses."""
+    match node:
+        case nodes.Number():
+            return f"{node.value:g}{node.unit}"
+        case nodes.NameRef():
+            return node.name.text
+        case nodes.Unary():
+            return f"({node.op}{show(node.operand)})"
+        case nodes.Binary():
+            return f"({show(node.left)} {node.op} {show(node.right)})"
+        case nodes.Conditional():
+            return f"({show(node.condition)} ? {show(node.then)} : {show(node.otherwise)})"
+        case nodes.Member():
+            return f"{show(node.value)}.{node.name.text}"
+        case nodes.Index():
+            return f"{show(node.value)}[{show(node.index)}]"
+        case nodes.Vector():
+            return f"[{', '.join(map(show, node.items))}]"
+        case nodes.CallExpr():
+            args = (f"{a.name.text}={show(a.value)}" if a.name else show(a.value) for a in node.args)
+            return f"{node.name.text}({', '.join(args)})"
+        case nodes.Range():
+            step = f" step {show(node.step)}" if node.step else ""
+            return f"{show(node.start)}{'..<' if node.exclusive else '..'}{show(node.stop)}{step}"
+        case nodes.Bool():
+            return str(node.value).lower()
+        case nodes.String():
+            return repr(node.value)
+        case nodes.MaterialExpr():
+            return f"material {node.name.text}" + (" {}" if node.body else "")
+    raise AssertionError(node)
+
+
+def expression(text: str) -> nodes.Expr:
+    statement = read_well(f"let it = {text};").statements[0]
+    assert isinstance(statement, nodes.Let)
+    return statement.value
+
+
+@pytest.mark.parametrize(
+    ("text", "tree"),
+    [
+        ("-2^2", "(-(2 ^ 2))"),
+        ("2^3^2", "(2 ^ (3 ^ 2))"),
+        ("2^-1", "(2 ^ (-1))"),
+        ("1 - 2 - 3", "((1 - 2) - 3)"),
+        ("1 + 2 * 3 % 4", "(1 + ((2 * 3) % 4))"),
+        ("-a * b", "((-a) * b)"),
+        ("!a && b || c", "(((!a) && b) || c)"),
+        ("a < b == c >= d", "((a < b) == (c >= d))"),
+        ("a ? b : c ? d : e", "(a ? b : (c ? d : e))"),
+        ("(1 + 2) * 3", "((1 + 2) * 3)"),
+        ("v.x + w[0][1].y", "(v.x + w[0][1].y)"),
+        ("lib.wave(1, k = 2)", "lib.wave(1, k=2)"),
+        ("f()", "f()"),
+        ("f(1, 2,)", "f(1, 2)"),
+        ("[1, [2, 3],]", "[1, [2, 3]]"),
+        ("[]", "[]"),
+        ("0..3", "0..3"),
+        ("1..<n", "1..<n"),
+        ("0..1 step 0.25", "0..1 step 0.25"),
+        ("a + 1..b * 2", "(a + 1)..(b * 2)"),
+        ("(0..3)", "0..3"),
+        ("step(as, 2)", "step(as, 2)"),
+        ("a ? material flat : material m { hue(1turn); }", "(a ? material flat : material m {})"),
+        ("material lib.red", "material lib.red"),
+        ('"a\\"b\\\\\\n"', repr('a"b\\\n')),
+        ("true != false", "(true != false)"),
+    ],
+)
+def test_expression(text: str, tree: str) -> None:
+    assert show(expression(text)) == tree
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit", "integer"),
+    [
+        ("1", 1, "", True),
+        ("007", 7, "", True),
+        ("1.5", 1.5, "", False),
+        (".5", 0.5, "", False),
+        ("1.", 1, "", False),
+        ("1e-3", 1e-3, "", False),
+        ("2.5E+2", 250, "", False),
+        ("30deg", 30, "deg", True),
+        ("0.5rad", 0.5, "rad", False),
+        (".25turn", 0.25, "turn", False),
+        ("1e3ms", 1000, "ms", False),
+        ("2s", 2, "s", True),
+    ],
+)
+def test_number(text: str, value: float, unit: str, integer: bool) -> None:
+    number = expression(text)
+    assert isinstance(number, nodes.Number)
+    assert (number.value, number.unit, number.is_integer) == (value, unit, integer)
+    assert number.span.text == text
+
+
+def test_colours() -> None:
+    short, long = expression("#d3f"), expression("#DD33ff")
+    assert isinstance(short, nodes.Color)
+    assert isinstance(long, nodes.Color)
+    assert short.rgb == long.rgb == (0xDD / 255, 0x33 / 255, 1.0)
+
+
+def test_statements() -> None:
+    text = """nsg 1; model "m"; canvas(2, 3); param k = 1 in 0..2; param j = 2; let a = 1;
+    fn f(x, y = 2,) = x; fn g() = 1; module m() { } import "a.nsg" as lib;
+    for (i in 0..3) { star; } if (a) { } else if (b) { } else { }
+    group { } union { } smooth { } subtract { } intersect { } chain { star { } smooth lib.leaf(1) { } }
+    mist; mist { hue(1turn); } material flat; material lib.red { }"""
+    kinds = [type(statement).__name__ for statement in read_well(text).statements]
+    assert kinds == (
+        ["Version", "Model", "Call", "Param", "Param", "Let", "Fn", "Fn", "Module", "Import", "For", "If"]
+        + ["Node"] * 6
+        + ["Call", "Call", "MaterialUse", "MaterialUse"]
+    )
+
+
+def test_calls() -> None:
+    bare, block, args, both = read_well("a; lib.b { } c(1); d(x = 1) { star; }").statements
+    assert isinstance(bare, nodes.Call)
+    assert isinstance(block, nodes.Call)
+    assert isinstance(args, nodes.Call)
+    assert isinstance(both, nodes.Call)
+    assert bare.args is None
+    assert bare.body is None
+    assert block.name.text == "lib.b"
+    assert block.args is None
+    assert block.body is not None
+    assert args.args is not None
+    assert args.body is None
+    assert both.args is not None
+    assert both.args[0].name is not None
+    assert both.body is not None
+
+
+def test_chain_words() -> None:
+    chain = read_well("chain { square { } subtract union { star; } intersect group { } }").statements[0]
+    assert isinstance(chain, nodes.Node)
+    square, subtract, intersect = chain.body.statements
+    assert isinstance(square, nodes.Call)
+    assert isinstance(subtract, nodes.Combined)
+    assert subtract.op == "subtract"
+    assert isinstance(subtract.child, nodes.Node)
+    assert isinstance(intersect, nodes.Combined)
+    assert intersect.keyword.text == "intersect"
+
+
+def test_comments_and_byte_order_mark() -> None:
+    tree = read_well("\ufeff// one\nstar; /* two\n * three */ star; /**/ //")
+    assert len(tree.statements) == 2
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_scene_has_no_mistakes(path: Path) -> None:
+    assert read_well(path.read_text(encoding="utf-8")).statements
+
+
+@pytest.mark.parametrize("text", ["", " ", "// nothing", "\n\n"])
+def test_empty_text(text: str) -> None:
+    tree = read_well(text)
+    assert tree.statements == ()
+    assert (tree.span.start, tree.span.end) == (0, len(text))
+
+
+def test_statement_spans_cover_their_text() -> None:
+    for path in SCENES:
+        for statement in read_well(path.read_text(encoding="utf-8")).statements:
+            assert statement.span.text[-1] in ";}"
+            assert statement.span.text[0].isalpha()
+
+
+def check_spans(node: Any, within: Span) -> None:
+    """Spans run forward and those of parts lie inside those of wholes."""
+    if isinstance(node, Span):
+        assert within.start <= node.start <= node.end <= within.end
+    elif isinstance(node, tuple):
+        for item in node:
+            check_spans(item, within)
+    elif is_dataclass(node):
+        own = getattr(node, "span", within)
+        check_spans(own, within)
+        for field in fields(node):
+            check_spans(getattr(node, field.name), own)
+
+
+@pytest.mark.parametrize("path", SCENES + MALFORMED, ids=lambda path: path.stem)
+def test_spans_nest(path: Path) -> None:
+    tree, _ = read(path.read_text(encoding="utf-8"))
+    check_spans(tree, tree.span)

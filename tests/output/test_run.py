@@ -1,0 +1,348 @@
+"""Whole animations: the pictures, what is drawn once, what a killed run leaves, what other processes draw."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import scenelang as nsg
+from scenelang.drawing.how import How
+from scenelang.language.evaluation import Source
+from scenelang.output import animate, painting
+from scenelang.output.animate import Progress, make
+from scenelang.output.frames import Busy, Clip, Store, find_target
+from scenelang.output.painting import Painter
+from tests.output.scenes import DARK, HEAD, TRICKY, tricky
+
+SMALL = (24, 16)
+MOVING = HEAD + DARK + "star { scale(0.6); rotate(0.2turn * u); } square { scale(0.2); }"
+
+
+def write(folder: Path, text: str = MOVING) -> Path:
+    path = folder / "a.nsg"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def pixels(path: Path) -> np.ndarray:
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def left(folder: Path) -> list[str]:
+    return sorted(name for name in os.listdir(folder) if name != "a.nsg")
+
+
+@pytest.mark.parametrize("name", TRICKY)
+def test_pictures_are_what_they_are_alone(name: str, tmp_path: Path) -> None:
+    """Bit for bit, also where tiles are taken over: the picture is split for four threads."""
+    path = write(tmp_path, tricky(name))
+    for frame, image in enumerate(nsg.render_frames(path, size=(20, 48), threads=4)):
+        scene = nsg.load(path, frame=frame).model_copy(update={"canvas": (20, 48)})
+        assert image.tobytes() == nsg.render(scene, device="cpu", threads=4).tobytes()
+
+
+def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
+    text = "square { scale(0.2); translate(0, 2); } star { scale(0.2 + u / 9); translate(0, -2); } triangle;"
+    clip = Clip(Source(write(tmp_path, HEAD + text), size=(16, 64)))
+    painter = Painter(clip, How(threads=4))
+    from scenelang.drawing.torch_backend import draw_program, open_model
+
+    pairs = []
+    model = open_model("shapes2d")
+    for frame in range(3):
+        program = clip.program(clip.shot(frame))
+        fresh = draw_program(program, model, threads=4)
+        painter.draw(painter.prepare(clip.shot(frame)))
+        again = draw_program(program, model, threads=4, kept=painter.kept)
+        assert again.image.tobytes() == fresh.image.tobytes()
+        assert again.pairs == 0
+        pairs.append(fresh.pairs)
+    kept = Painter(clip, How(threads=4))
+    for frame in range(3):
+        kept.draw(kept.prepare(clip.shot(frame)))
+    moved = draw_program(clip.program(clip.shot(3)), model, threads=4, kept=kept.kept)
+    assert 0 < moved.pairs < 0.7 * min(pairs)
+
+
+def test_threads_of_the_split_do_not_show(tmp_path: Path) -> None:
+    from scenelang.drawing.torch_backend import draw_program, open_model
+
+    program = nsg.compile(nsg.load(write(tmp_path), frame=2))
+    model = open_model(program.model)
+    expected = draw_program(program, model, threads=3).image
+    assert draw_program(program, model, threads=1, split=3).image.tobytes() == expected.tobytes()
+
+
+def test_a_sequence(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    made = nsg.animate(path, f"{tmp_path}/out/", size=SMALL, frames="1..3", threads=1)
+    assert [file.name for file in made.files] == ["a-0001.png", "a-0002.png", "a-0003.png"]
+    assert left(tmp_path) == ["out"]
+    assert sorted(os.listdir(tmp_path / "out")) == ["a-0001.png", "a-0002.png", "a-0003.png"]
+    for frame, file in zip(range(1, 4), made.files, strict=True):
+        scene = nsg.load(path, frame=frame).model_copy(update={"canvas": SMALL})
+        np.testing.assert_array_equal(pixels(file), nsg.render(scene, threads=1, device="cpu").to_uint8())
+
+
+def test_equal_frames_are_drawn_once(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD + DARK + "square { scale(frame % 3 == 1 ? 0.5 : 0.3); }")
+    made = nsg.animate(path, tmp_path / "%d.png", size=SMALL)
+    assert (made.frames, made.drawn) == (6, 2)
+    data = [file.read_bytes() for file in made.files]
+    assert data[0] == data[2] == data[3] == data[5] != data[1] == data[4]
+
+
+def test_a_scene_without_frames_is_one(tmp_path: Path) -> None:
+    path = write(tmp_path, "star { scale(0.5); }")
+    (only,) = nsg.render_frames(path, size=SMALL)
+    scene = nsg.load(path).model_copy(update={"canvas": SMALL})
+    assert only.tobytes() == nsg.render(scene, device="cpu").tobytes()  # by torch, as frames are
+
+
+def test_pictures_that_were_given_out_are_not_touched(tmp_path: Path) -> None:
+    frames = nsg.render_frames(write(tmp_path, HEAD + "star;"), size=SMALL)
+    first = next(frames)
+    first[:] = 0.5
+    assert (next(frames) != 0.5).any()
+
+
+def test_alpha(tmp_path: Path) -> None:
+    path = write(tmp_path, MOVING.replace(DARK, "background(none);"))
+    nsg.animate(path, tmp_path / "a.apng", size=SMALL)
+    with Image.open(tmp_path / "a.apng") as image:
+        assert image.n_frames == 6
+        assert image.mode == "RGBA"
+        assert image.getpixel((0, 0))[3] == 0
+
+
+def test_other_processes_draw_the_same(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    one = nsg.animate(path, tmp_path / "one-%d.png", size=SMALL, jobs=1)
+    two = nsg.animate(path, tmp_path / "two-%d.png", size=SMALL, jobs=2)
+    assert (one.jobs, two.jobs) == (1, 2)
+    for a, b in zip(one.files, two.files, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
+
+
+@pytest.mark.parametrize(("cores", "taken"), [(1, 2), (3, 3), (64, 4)])
+def test_no_more_processes_than_frames_or_cores(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cores: int, taken: int
+) -> None:
+    def start(count: int) -> None:
+        raise Enough(count)
+
+    monkeypatch.setattr(animate, "usable_cores", lambda: cores)
+    monkeypatch.setattr(painting, "Workers", start)
+    with pytest.raises(Enough, match=f"^{taken}$"):
+        nsg.animate(write(tmp_path), tmp_path / "a-%d.png", frames=range(4), size=SMALL, jobs=256)
+    one = nsg.animate(write(tmp_path), tmp_path / "b-%d.png", frames=range(1), size=SMALL, jobs=256)
+    assert "drawn by 1 process (256 asked for" in one.lines()[0]
+
+
+def test_other_processes_that_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path)
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(nsg.RenderError, match="ended by itself"):
+        nsg.animate(path, tmp_path / "a.gif", size=SMALL, jobs=2)
+    assert left(tmp_path) == []
+
+
+# ---------------------------------------------------------------- interrupted runs
+
+
+class Enough(Exception):
+    """Raised to stop a run."""
+
+
+def interrupted(path: Path, out: Path, frames: int, text: str | None = None) -> None:
+    """Begin an animation and stop after some frames."""
+
+    def stop(progress: Progress) -> None:
+        if progress.stage == "drawing" and progress.done >= frames:
+            raise Enough
+
+    with pytest.raises(Enough):
+        nsg.animate(path, out, size=SMALL, backend="reference", progress=stop)
+
+
+@pytest.mark.parametrize("name", ["a.gif", "f-%03d.png"])
+def test_a_run_goes_on_where_it_stopped(tmp_path: Path, name: str) -> None:
+    path = write(tmp_path)
+    interrupted(path, tmp_path / name, 2)
+    assert left(tmp_path) == [find_target(str(tmp_path / name)).work.name]
+    made = nsg.animate(path, tmp_path / name, size=SMALL, backend="reference")
+    assert (made.resumed, made.drawn) == (2, 4)
+    whole = nsg.animate(path, tmp_path / f"whole-{name}", size=SMALL, backend="reference")
+    assert whole.resumed == 0
+    for a, b in zip(made.files, whole.files, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+    assert not [found for found in os.listdir(tmp_path) if found.startswith(".")]
+
+
+def test_frames_of_another_scene_are_not_used(tmp_path: Path) -> None:
+    """Whatever changed: the text, an import, a param, the size. What means the same is used."""
+    (tmp_path / "lib.nsg").write_text("let k = 0.6;")
+    text = 'import "lib.nsg" as l; param p = 0.2;' + HEAD + DARK
+    text += "star { scale(l.k); rotate(0.2turn * u); } square { scale(p); }"
+    path, out = write(tmp_path, text), tmp_path / "a.gif"
+
+    def resumed(**options: object) -> int:
+        interrupted(path, out, 3)
+        made = nsg.animate(path, out, **{"size": SMALL, "backend": "reference", **options})  # type: ignore[arg-type]
+        return made.resumed
+
+    assert resumed() == 3
+    assert resumed(params={"p": 0.3}) == 0
+    assert resumed(size=(16, 16)) == 0
+    assert resumed(fps=12) == 3  # every other of the twelve
+    interrupted(path, out, 3)
+    path.write_text("// a comment\n" + text)
+    assert nsg.animate(path, out, size=SMALL, backend="reference").resumed == 3
+    interrupted(path, out, 3)
+    path.write_text(text.replace("0.2turn", "0.13turn"))
+    assert nsg.animate(path, out, size=SMALL, backend="reference").resumed == 1  # u = 0
+    interrupted(path, out, 3)
+    (tmp_path / "lib.nsg").write_text("let k = 0.5;")
+    assert nsg.animate(path, out, size=SMALL, backend="reference").resumed == 0
+
+
+def test_half_a_frame_is_no_frame(tmp_path: Path) -> None:
+    """A picture is renamed into place; what was being written when the run was killed goes."""
+    path, out = write(tmp_path), tmp_path / "a.gif"
+    interrupted(path, out, 2)
+    work = find_target(str(out)).work
+    (work / f".{'a' * 40}.png.scenelang.part").write_bytes(b"half")
+    assert nsg.animate(path, out, size=SMALL, backend="reference").resumed == 2
+    assert left(tmp_path) == ["a.gif"]
+
+
+@pytest.mark.parametrize("name", ["a.gif", "f-%03d.jpg"])
+@pytest.mark.parametrize("damage", ["cut", "no picture", "another size", "a link", "another format"])
+def test_a_damaged_frame_is_drawn_again(tmp_path: Path, name: str, damage: str) -> None:
+    path, out = write(tmp_path), tmp_path / name
+    interrupted(path, out, 3)
+    kept = sorted(find_target(str(out)).work.glob(f"*{'.jpg' if 'jpg' in name else '.png'}"))
+    frame = kept[0]
+    whole = frame.read_bytes()
+    if damage == "cut":
+        frame.write_bytes(whole[: len(whole) // 2])
+    elif damage == "no picture":
+        frame.write_bytes(b"no picture")
+    elif damage == "another size":
+        Image.new("RGB", (5, 5)).save(frame)
+    elif damage == "another format":
+        Image.new("RGB", SMALL).save(frame, "BMP")
+    else:
+        (tmp_path / "elsewhere").write_bytes(whole)
+        frame.unlink()
+        frame.symlink_to(tmp_path / "elsewhere")
+    made = nsg.animate(path, out, size=SMALL, backend="reference")
+    assert (made.resumed, made.drawn) == (2, 4)
+    whole_made = nsg.animate(path, tmp_path / f"whole-{name}", size=SMALL, backend="reference")
+    for a, b in zip(made.files, whole_made.files, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+        assert not a.is_symlink()
+
+
+def test_two_runs_at_once(tmp_path: Path) -> None:
+    path, out = write(tmp_path), tmp_path / "a.gif"
+    with Store(find_target(str(out)).work) as store:
+        with pytest.raises(Busy, match="another process"):
+            nsg.animate(path, out, size=SMALL, backend="reference")
+        assert left(tmp_path) == [store.folder.name]
+        store.remove()
+    assert nsg.animate(path, out, size=SMALL, backend="reference").files == [out]
+
+
+def test_errors_leave_an_old_file_alone(tmp_path: Path) -> None:
+    path, out = write(tmp_path, HEAD + "square { scale(3 - frame); }"), tmp_path / "a.gif"
+    out.write_bytes(b"old")
+    with pytest.raises(nsg.SceneError):
+        nsg.animate(path, out, size=SMALL, backend="reference")
+    assert out.read_bytes() == b"old"
+
+
+def test_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, out = write(tmp_path), tmp_path / "a.gif"
+    replace = os.replace
+
+    def full(part: os.PathLike[str], file: os.PathLike[str]) -> None:
+        if Path(file) == out:
+            raise OSError(28, "No space left on device", str(file))
+        replace(part, file)
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(OSError, match="No space"):
+        nsg.animate(path, out, size=SMALL, backend="reference")
+    assert not out.exists()
+
+
+def started(folder: Path, out: str) -> subprocess.Popen[str]:
+    """The command, in a process of its own, once it has drawn two frames."""
+    text = "animate(seconds = 60, fps = 20); star { scale(0.6); rotate(0.2turn * u); }"
+    write(folder, text)
+    command = [sys.executable, "-m", "scenelang", "render", "a.nsg", "-o", out, "--backend", "reference"]
+    process = subprocess.Popen(
+        [*command, "--size", "24x24"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    work = find_target(str(folder / out)).work
+    deadline = time.monotonic() + 60
+    while len(list(work.glob("*.png"))) < 2:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    return process
+
+
+def test_a_killed_run_is_taken_up(tmp_path: Path) -> None:
+    process = started(tmp_path, "a.gif")
+    process.kill()
+    process.communicate()
+    assert not (tmp_path / "a.gif").exists()
+    painter = Painter(Clip(Source(tmp_path / "a.nsg", size=(24, 24))), How("reference"))
+    target = find_target(str(tmp_path / "a.gif"))
+    kept = len(list(target.work.glob("[0-9a-f]*.png")))
+    made = make(painter, target, range(kept + 2))
+    assert 2 <= made.resumed <= kept
+    assert made.drawn == kept + 2 - made.resumed
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == kept + 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no signals to send")
+def test_ctrl_c(tmp_path: Path) -> None:
+    process = started(tmp_path, "a.gif")
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert left(tmp_path) == [".a.gif.frames"]
+
+
+def test_solids_load_no_torch_and_other_processes_draw_the_same(tmp_path: Path) -> None:
+    path = write(
+        tmp_path, "animate(1, 3); canvas(64, 48); sphere { translate(u, 0, 0); } torus { rotate(1turn * u); }"
+    )
+    code = f"""import sys, scenelang as nsg
+nsg.animate({str(path)!r}, {str(tmp_path / "one-%d.png")!r}, jobs=1)
+made = nsg.animate({str(path)!r}, {str(tmp_path / "two-%d.png")!r}, jobs=2)
+assert made.jobs == 2
+assert "torch" not in sys.modules"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+    for number in range(3):
+        one, two = (tmp_path / f"{name}-{number}.png" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
