@@ -157,8 +157,8 @@ class ClosedSolids(SolidArrays):
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
         tokens, joined = cell.own[0], None
         for token in np.unique(tokens):
-            found = _joined(token, cell.past[0], memory[0], d)
-            joined = found if joined is None else np.where(tokens == token, found, joined)
+            result = _joined(token, cell.past[0], memory[0], d)
+            joined = result if joined is None else np.where(tokens == token, result, joined)
         assert joined is not None
         register, paint = memory[1:], joined[2]
         if wanted != Wanted.DISTANCE:

@@ -117,11 +117,11 @@ class Outputs:
 
     def only(self, wanted: Sequence[Output], sources: Mapping[int, Source]) -> Outputs:
         """Those that are asked for, with what ``sources`` says of the objects that are seen."""
-        found = {name: getattr(self, name) for name in wanted}
+        result = {name: getattr(self, name) for name in wanted}
         if self.object is None or "object" not in wanted:
-            return Outputs(**found)
+            return Outputs(**result)
         seen = {n: sources[n] for n in np.unique(self.object).tolist() if n}
-        return Outputs(**found, objects=seen)
+        return Outputs(**result, objects=seen)
 
     @property
     def names(self) -> tuple[Output, ...]:
@@ -145,8 +145,8 @@ class Outputs:
     def range(self) -> tuple[float | None, float | None]:
         """Least and greatest depth; None where no surface is seen."""
         assert self.depth is not None
-        found = self.depth[np.isfinite(self.depth)]
-        return (float(found.min()), float(found.max())) if found.size else (None, None)
+        result = self.depth[np.isfinite(self.depth)]
+        return (float(result.min()), float(result.max())) if result.size else (None, None)
 
     def told(self, name: Output) -> str:
         """What to say about the file of an output."""
@@ -166,8 +166,8 @@ class Outputs:
         Raises:
             ValueError: a number has more than 16 bits.
         """
-        found = getattr(self, name)
-        facts, values = self.facts(name), np.asarray(getattr(found, "bound", found), np.float64)
+        result = getattr(self, name)
+        facts, values = self.facts(name), np.asarray(getattr(result, "bound", result), np.float64)
         if name == "depth":
             values = 65535.0 * (facts["near"] or 0.0) / values
             facts["stored"] = "65535 near / depth, 0 for none"
@@ -208,10 +208,10 @@ class Outputs:
         """The channels of an EXR."""
         single = {"depth.Z": self.depth, "object.id": self.object, "alpha.A": self.alpha}
         single |= {"proof.bound": None if self.proof is None else self.proof.bound}
-        found = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
+        result = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
         if self.normal is not None:
-            found |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}
-        return found
+            result |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}
+        return result
 
 
 def chunk(kind: bytes, body: bytes) -> bytes:
@@ -412,5 +412,5 @@ def enlarged(picture: Image, canvas: tuple[int, int]) -> Image:
     if clear := picture.shape[2] == 4:
         parts = np.concatenate([parts[..., :3] * parts[..., 3:], parts[..., 3:]], 2)
     channels = [pillow.fromarray(np.ascontiguousarray(part)) for part in np.moveaxis(parts, 2, 0)]
-    found = np.stack([np.asarray(c.resize(canvas, pillow.Resampling.BILINEAR)) for c in channels], 2)
-    return from_samples(found[..., :3], found[..., 3] if clear else None)
+    result = np.stack([np.asarray(c.resize(canvas, pillow.Resampling.BILINEAR)) for c in channels], 2)
+    return from_samples(result[..., :3], result[..., 3] if clear else None)

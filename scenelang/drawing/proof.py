@@ -100,16 +100,16 @@ class Written(NamedTuple):
 
 def written(root: Fold) -> dict[int, Written]:
     """All objects of a lowered graph, by number."""
-    found: dict[int, Written] = {}
+    result: dict[int, Written] = {}
     todo: list[tuple[Node, tuple[Step, ...]]] = [(root, ())]
     while todo:
         node, outer = todo.pop()
         steps = (*[move.step for move in node.moves], *outer)
         if isinstance(node, Leaf):
-            found[node.number] = Written(node.look, steps)
+            result[node.number] = Written(node.look, steps)
         else:
             todo += [(link.node, steps) for link in node.links]
-    return found
+    return result
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
@@ -314,12 +314,12 @@ def _chosen(which: Mask, new: tuple[Any, Any], old: tuple[Any, Any]) -> tuple[An
 
 def blended(meetings: Meetings, rounds: Mask) -> Mask:
     """After which pairs (P,) a blend follows in their region."""
-    found, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
+    result, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
     for part in reversed(meetings.slots()):
         n = part.stop - part.start
-        found[part] = seen[:n]
+        result[part] = seen[:n]
         seen[:n] |= rounds[part]
-    return found
+    return result
 
 
 def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
@@ -386,7 +386,9 @@ def load_errors(name: str = PROVER) -> dict[str, Errors]:
 def layers_of(network: FramedNetwork, geometry: int) -> Layers:
     """The decoder of a geometry in float64, so that every machine computes the same distances."""
     one = np.append(network.codes[geometry].astype(np.float64), 1.0)
-    parts = [[part.astype(np.float64) for part in found] for found in (network.decoder_w, network.decoder_b)]
+    parts = [
+        [part.astype(np.float64) for part in result] for result in (network.decoder_w, network.decoder_b)
+    ]
     return [(np.tensordot(one, w, 1).T, one @ b) for w, b in zip(*parts, strict=True)]
 
 
@@ -463,12 +465,12 @@ class Stream:
             p = q[:, some]
             if name in self.unknown:
                 length = np.hypot(*p)
-                found = Enclosure(length - 1, length + 1)
+                result = Enclosure(length - 1, length + 1)
             elif exactly:
-                found = Enclosure(*[leaf_distance(name, p)] * 2)
+                result = Enclosure(*[leaf_distance(name, p)] * 2)
             else:
-                found = self._known[name].exact(p)
-            low[some], high[some] = found
+                result = self._known[name].exact(p)
+            low[some], high[some] = result
         return Enclosure(low, high)
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
@@ -614,15 +616,15 @@ def prove_image(
     for top in range(0, height, rows):
         part = range(top, min(top + rows, height))
         band, drawn = Band(stream, graph.canvas, part, behind), picture[part.start : part.stop]
-        found = _off(drawn, band.shown)
-        if redraw and (bad := found > PROVED).any():
+        result = _off(drawn, band.shown)
+        if redraw and (bad := result > PROVED).any():
             band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))
             middle = (band.shown.low + band.shown.high) / 2
             bad &= _off(middle, band.shown) <= PROVED  # what stays open stays as it was drawn
             drawn[bad] = middle[bad]
-            found = _off(drawn, band.shown)
+            result = _off(drawn, band.shown)
             redrawn += int(bad.sum())
-        bound[part.start : part.stop] = found
+        bound[part.start : part.stop] = result
     if redrawn:
         credit = image.credit
         image = from_samples(picture[..., :3], picture[..., 3] if clear else None)

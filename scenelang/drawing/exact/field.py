@@ -65,10 +65,10 @@ def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
 @lru_cache(maxsize=16)
 def _values(element: Element, light: bool) -> Values:
     """Colours (h, w, 3) or (n, n, n, 3)."""
-    found = texels(element).astype(np.float64)
+    result = texels(element).astype(np.float64)
     if element.form == "picture":  # of 8 bits
-        found = np.rint(found * 255) / 255
-    return np.asarray(decoded(found), np.float64) if light else found
+        result = np.rint(result * 255) / 255
+    return np.asarray(decoded(result), np.float64) if light else result
 
 
 def _mixed(values: Values, places: list[Values]) -> Values:

@@ -56,16 +56,16 @@ class Look:
 
     def at(self, triangles: Rows, share: Points) -> Points:
         """Colours (M, 3) of sRGB, 0 to 1, at points of triangles (M,), by barycentric shares (M, 3)."""
-        found = (self.tint[triangles] * share[..., None]).sum(1)
+        result = (self.tint[triangles] * share[..., None]).sum(1)
         linear = self.linear[triangles]
-        texel = np.ones_like(found)
+        texel = np.ones_like(result)
         uv = (self.uv[triangles] * share[..., None]).sum(1)
         for k, image in enumerate(self.images):
             on = self.image[triangles] == k
             texel[on] = _looked_up(image, uv[on])
-        found[linear] = encoded(found[linear] * decoded(texel[linear]))
-        found[~linear] *= texel[~linear]
-        return np.asarray(found.clip(0, 1))
+        result[linear] = encoded(result[linear] * decoded(texel[linear]))
+        result[~linear] *= texel[~linear]
+        return np.asarray(result.clip(0, 1))
 
     @property
     def plain(self) -> tuple[float, float, float] | None:
@@ -83,8 +83,8 @@ def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
 
     place = np.stack([1 - uv[:, 1], uv[:, 0]]) % 1.0 * np.array([image.shape[:2]]).T - 0.5
     channels = np.moveaxis(image, -1, 0)
-    found = [map_coordinates(c, place, np.float64, order=1, mode="grid-wrap") for c in channels]
-    return np.stack(found, 1) / 255
+    result = [map_coordinates(c, place, np.float64, order=1, mode="grid-wrap") for c in channels]
+    return np.stack(result, 1) / 255
 
 
 def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:
@@ -279,14 +279,14 @@ class Mesh:
         _ = None if self.closed else self._trees
         for few, least in ((16, 0.0), (500, _ENCLOSED - 0.1), (count, _ENCLOSED)):
             started = time.process_time()
-            found, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
-            spent_s, enclosed = time.process_time() - started, len(found) / len(points[:few])
+            result, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
+            spent_s, enclosed = time.process_time() - started, len(result) / len(points[:few])
             if few < count and not self.closed and spent_s > 1 + _SLOW_S * few:
                 raise FitError("its triangles overlap so much that distances to it would take minutes")
             if enclosed < least:
                 open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
                 raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
-        return found, out, thin
+        return result, out, thin
 
 
 def outer(
@@ -452,8 +452,8 @@ def read_solids(
                 _few(data)
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
-            found = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
-            solids = _solids(found, suffix, files is not None)
+            result = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
+            solids = _solids(result, suffix, files is not None)
     except (FitError, MemoryError):
         raise
     except Exception as error:

@@ -59,8 +59,8 @@ def brought(
     """
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
-    found, notes = solids.read_solids(data, suffix, files)
-    made = solid_parts(found, name, sign, bool(apart))
+    result, notes = solids.read_solids(data, suffix, files)
+    made = solid_parts(result, name, sign, bool(apart))
     return made._replace(notes=(*made.notes, *notes))
 
 
@@ -74,9 +74,9 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
         if layers:
             return Outline(layers[0])
     else:
-        found, _ = solids.read_solids(data, suffix)
-        if number <= len(found):
-            return solids.whole(found[number - 1 : number] if number else found, sign)
+        result, _ = solids.read_solids(data, suffix)
+        if number <= len(result):
+            return solids.whole(result[number - 1 : number] if number else result, sign)
     raise FitError(f"it has no part {number}")
 
 

@@ -293,14 +293,14 @@ class Field:
 
     def __init__(self, root: Fold, brought: Brought | None = None) -> None:
         self.root = root
-        found = list(_leaves(root))
+        result = list(_leaves(root))
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
-        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in found), default=0.0)
+        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in result), default=0.0)
         self.bodies = [
             Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
-            for leaf, steps, taken in found
+            for leaf, steps, taken in result
         ]
         kinds = {body.medium for body in self.bodies}
         self.mixed = len(kinds) > 1
@@ -446,7 +446,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
     stop, t = leave.max(0, initial=-np.inf), np.maximum(enter.min(0, initial=np.inf), 0.0)
     origin, along, speed = o.take(ray, 1), d.take(ray, 1), speed.take(ray, 1)
     lower: Any = None
-    found: list[tuple[Any, ...]] = []
+    result: list[tuple[Any, ...]] = []
     taken = 0
     while len(ray):
         taken += 1
@@ -458,7 +458,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
             lower = t, np.full_like(t, FAR), first[ray]
         at = np.nonzero(kind != lower[2])[0]
         if len(at):
-            found.append((ray[at], *(v[at] for v in (*lower, t, value, kind))))
+            result.append((ray[at], *(v[at] for v in (*lower, t, value, kind))))
         last[ray] = kind
         following = np.where(enter > t, enter, np.inf).min(0)
         lower, t = (t, value, kind), np.minimum(np.minimum(t + np.maximum(way, STEP), following), stop)
@@ -468,9 +468,9 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
             origin, along, enter, leave, speed = (
                 v.take(going, 1) for v in (origin, along, enter, leave, speed)
             )
-    if not found:
+    if not result:
         return Changes(first, last, np.zeros(0, int), np.zeros(0), first[:0], first[:0])
-    ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*found, strict=True))
+    ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*result, strict=True))
     # Where d passes through 0 a straight line finds the place; where the material alone changes, halving.
     surface = (before == OUT) != (after == OUT)
     for at, rounds in ((np.nonzero(surface)[0], 2), (np.nonzero(~surface)[0], 20)):

@@ -44,7 +44,7 @@ LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
     """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    found = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
+    result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
     worn = np.zeros(len(meetings.columns), bool)
     worn[place[field.texture[objects] != NO_TEXTURE]] = True
     width = field.widths[objects]
@@ -52,7 +52,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
     gap = xp.array((width + CORNER * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
     for part in meetings.slots():
         if narrow[part].any():
-            some = found[:, : part.stop - part.start]
+            some = result[:, : part.stop - part.start]
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
     if trace.joined and worn.any():
         most = CORNER * px * (1 + float(field.frames.stretch.max()))
@@ -60,8 +60,8 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
             width = field.group_widths[groups]
             narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
             near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
-            found[:, columns] |= near & xp.array(narrow, field.like)
-    return found
+            result[:, columns] |= near & xp.array(narrow, field.like)
+    return result
 
 
 def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
@@ -119,8 +119,8 @@ def add_textures(
         if offsets is not None:
             spots = spots[:, None] + offsets
         q = field.frames.local(xp, objects[pair], spots)
-        found = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
-        xp.add(total, index, found.mean(1) * xp.take(share, some))
+        result = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
+        xp.add(total, index, result.mean(1) * xp.take(share, some))
     s = field.network.config.state
     memory[:, s : s + 3] += total.reshape(3, groups, columns).swapaxes(0, 1)
 
@@ -187,8 +187,8 @@ class Coverage:
             for columns, part, points in self._pixels(grid, side, meetings):
                 inside = grid.inside(columns, side)
                 tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
-                found = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
-                values = tile.over(np.ascontiguousarray(found.transpose(2, 0, 1))).reshape(
+                result = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
+                values = tile.over(np.ascontiguousarray(result.transpose(2, 0, 1))).reshape(
                     len(part.columns), side, side, -1
                 )
                 blocks[columns[1] // side, :, columns[0] // side] = values
@@ -242,8 +242,8 @@ class Coverage:
             centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
             for first, portion in _portions(some, 4):
                 last = first + len(portion.columns)
-                found = self._four(portion, centres[..., first:last], px, tile)[0]
-                self.xp.put(planes, flat[first:last], found)
+                result = self._four(portion, centres[..., first:last], px, tile)[0]
+                self.xp.put(planes, flat[first:last], result)
         return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
 
     def _matter(
@@ -268,10 +268,10 @@ class Coverage:
         """Numbers (rows, width), from 1, of the objects that paint pixels' centres, 0 where none does."""
         grid = raster(canvas, rows)
         tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
-        found = np.zeros((grid.high, grid.wide), np.int32)
+        result = np.zeros((grid.high, grid.wide), np.int32)
         with self.xp.inference():
             side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(found[..., None], side)
+            blocks = grid.blocks(result[..., None], side)
             for columns, part, points in self._pixels(grid, side, meetings):
                 own = np.zeros(points.shape[1:], np.int32)
                 trace = self.field.trace(points.shape[1], len(part.pairs))
@@ -285,7 +285,7 @@ class Coverage:
                 covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
                 values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
                 blocks[columns[1] // side, :, columns[0] // side] = values
-        return found[: len(rows), : canvas[0]]
+        return result[: len(rows), : canvas[0]]
 
     def _pixels(
         self, grid: Raster, side: int, meetings: Meetings
@@ -417,8 +417,8 @@ def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, object
         mine = objects[part][:, None] + 1
         own[level, :, columns] = np.where(painted[:, part].T, mine, own[level, :, columns])
         close(len(after))
-    found: np.ndarray = own[0]
-    return found
+    result: np.ndarray = own[0]
+    return result
 
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:

@@ -79,9 +79,9 @@ def _learned(x, y, weights, WIDTH: tl.constexpr):
     weights += WIDTH * WIDTH
     # in float32: TF32, the default, would be off by up to 0.002
     hidden = tl.dot(hidden, inner, input_precision="ieee") + tl.load(weights + unit)[None, :]
-    found = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
+    result = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
     far = tl.load(weights + 2 * WIDTH + 1)
-    return found + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
+    return result + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
 
 
 @triton.jit
@@ -107,9 +107,9 @@ def _grid(x, y, nodes, side):
     place_x, place_y = (inside_x + 1.0) * half, (inside_y + 1.0) * half
     row, column = tl.minimum(place_x.to(tl.int32), side - 2), tl.minimum(place_y.to(tl.int32), side - 2)
     across, down = place_y - column.to(tl.float32), place_x - row.to(tl.float32)
-    found = _between(nodes, row * side + column, side, across, down)
+    result = _between(nodes, row * side + column, side, across, down)
     beyond = (x - inside_x) * (x - inside_x) + (y - inside_y) * (y - inside_y)
-    return tl.where(beyond > 0.0, tl.sqrt_rn(found * found + beyond), found)
+    return tl.where(beyond > 0.0, tl.sqrt_rn(result * result + beyond), result)
 
 
 @triton.jit
@@ -333,8 +333,8 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
         ProgramError: as `scenelang.drawing.neural.draw.draw`.
     """
     if samples == "draft":
-        found = draw_on_device(network, halved(program), "one")
-        return found and replace(found, image=enlarged(found.image, program.canvas))
+        result = draw_on_device(network, halved(program), "one")
+        return result and replace(result, image=enlarged(result.image, program.canvas))
     config = network.config
     if program.stage or not config.features == config.state == 1 or config.decoder_width > WIDTHS[1]:
         return None
@@ -415,9 +415,9 @@ def launch(programs: int, *arguments: Any, **sizes: int) -> None:
 @lru_cache(maxsize=4)
 def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArrays:
     """A network's parameters as numpy arrays, fetched again when they have changed."""
-    found = FramedArrays(network.config, {k: v.cpu().numpy() for k, v in network.state_dict().items()})
-    found.layout = network.layout
-    return found
+    result = FramedArrays(network.config, {k: v.cpu().numpy() for k, v in network.state_dict().items()})
+    result.layout = network.layout
+    return result
 
 
 def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -429,18 +429,18 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
     nest, count = nesting(meetings, field.groups), len(field.tokens)
     if nest is None:
         return pairs.block, pairs.object, np.zeros(0, int), 1
-    found = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
+    result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
 
     def close(closings: list[Closing]) -> None:
         for columns, groups, level in closings:
-            found.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(found))))
+            result.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(result))))
 
     for part, level, fresh, before, after in nest.turns:
         close(before)
         rows = meetings.pairs.object[part] + count * fresh
-        found.append((np.arange(len(level)), rows, level, np.full(len(level), len(found))))
+        result.append((np.arange(len(level)), rows, level, np.full(len(level), len(result))))
         close(after)
-    columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*result, strict=True))
     block = meetings.columns[columns]
     by = np.lexsort((moments, block))
     return block[by], rows[by], levels[by], nest.levels
@@ -467,12 +467,12 @@ def _rows(field: Field) -> np.ndarray:
         groups = np.zeros((len(field.groups.joins), whole.shape[1]))
         groups[:, 0] = 1 / field.unit
         parts += [(whole, field.cells(np.arange(count), opened=True)), (groups, field.joins())]
-    found = []
+    result = []
     for row, cell in parts:
         lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
         gates = [lines.reshape(3 * len(lines), len(row)).T, cell.candidate[0].T, cell.bump.T]
-        found.append(np.concatenate([row, *gates], 1, dtype=np.float32))
-    return np.concatenate(found)
+        result.append(np.concatenate([row, *gates], 1, dtype=np.float32))
+    return np.concatenate(result)
 
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:

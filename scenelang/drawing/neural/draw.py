@@ -198,9 +198,9 @@ def draw(
         if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
             out[band.start : band.stop] = kept.picture[band.start : band.stop]
         else:
-            found = coverage.tile(program.canvas, band, samples, background)
-            out[band.start : band.stop] = found.picture
-            drawn.append(found)
+            result = coverage.tile(program.canvas, band, samples, background)
+            out[band.start : band.stop] = result.picture
+            drawn.append(result)
         finished.append(index)
         if progress is not None:
             progress(len(finished) / len(tiles))
@@ -245,11 +245,11 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
     """
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
-        found = solid_outputs(solids, program.stage, program.canvas, threads=threads)
+        result = solid_outputs(solids, program.stage, program.canvas, threads=threads)
     else:
-        found = _plane(network, program)  # type: ignore[arg-type]
-    assert found.object is not None
-    return replace(found, object=np.array((0, *program.numbers), np.int32)[found.object])
+        result = _plane(network, program)  # type: ignore[arg-type]
+    assert result.object is not None
+    return replace(result, object=np.array((0, *program.numbers), np.int32)[result.object])
 
 
 def _plane(network: FramedNetwork, program: Program) -> Outputs:
@@ -257,7 +257,7 @@ def _plane(network: FramedNetwork, program: Program) -> Outputs:
     field = Field(network, program.vectors, program.tokens, program.brought())
     coverage = Coverage(field, prove=False)
     height, rows = program.canvas[1], max(1, TILE // program.canvas[0])
-    found = [
+    result = [
         coverage.owners(program.canvas, range(top, min(top + rows, height))) for top in range(0, height, rows)
     ]
-    return Outputs(object=np.concatenate(found), alpha=np.asarray(image)[..., 3])
+    return Outputs(object=np.concatenate(result), alpha=np.asarray(image)[..., 3])

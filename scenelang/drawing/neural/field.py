@@ -52,14 +52,14 @@ class Trace:
 
     def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
         """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
-        left, found = 1.0 * seen, 0.0 * self.paint
+        left, result = 1.0 * seen, 0.0 * self.paint
         if nest is not None:
-            return self._nested(nest, left, found)
+            return self._nested(nest, left, result)
         for part in reversed(meetings.slots()):
             rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
-            found[:, part] = rest * paint
+            result[:, part] = rest * paint
             rest *= 1.0 - paint
-        return found
+        return result
 
     def _nested(self, nest: Nesting, seen: Array, found: Array) -> Array:
         left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
@@ -134,9 +134,9 @@ class Field:
         """Decoders of the leaves in use, grids of elements, and which object has which."""
         xp, network = self.xp, self.network
         every = np.ascontiguousarray(self.parts.code)
-        found, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
-        codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
-        self.codes = codes = codes.reshape(len(found), every.shape[1])
+        result, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
+        codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
+        self.codes = codes = codes.reshape(len(result), every.shape[1])
         """Of the leaves in use (K, C): decoders are computed together."""
         self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
@@ -239,7 +239,7 @@ class Field:
         xp, shape = self.xp, self.shape[objects]
         used = np.flatnonzero(np.bincount(shape)).tolist()
         groups = q.shape[1]
-        found = None
+        result = None
         for at in used:
             index = None if len(used) == 1 else np.flatnonzero(shape == at)
             part = q if index is None else xp.take(q, xp.array(index, q))
@@ -248,16 +248,16 @@ class Field:
                 -1, groups, part.shape[2]
             )
             if index is None:
-                found = one
+                result = one
                 break
-            if found is None:
-                found = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
-            for feature, values in zip(found, one, strict=True):
+            if result is None:
+                result = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
+            for feature, values in zip(result, one, strict=True):
                 xp.put(feature, xp.array(index, q), values)
-        assert found is not None
+        assert result is not None
         scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
-        found = found.swapaxes(0, 1) * scale
-        return found.clip(-FAR, FAR) if self.frames.wild[objects].any() else found
+        result = result.swapaxes(0, 1) * scale
+        return result.clip(-FAR, FAR) if self.frames.wild[objects].any() else result
 
     def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
         """Features (F, M) in leaf units."""
@@ -387,17 +387,17 @@ class Field:
         seen = np.nan_to_num(q).clip(-FAR, FAR)
         far = np.full(len(objects), bool((np.hypot(*seen) > RADIUS).any()))
         points = self.xp.array(seen.astype(np.float32)[:, None], self.like)
-        found: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
-        return found
+        result: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
+        return result
 
     def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
         """By how much world distances (P,) at leaf coordinates differ at most from those in radii (P,)."""
-        found, shape = np.full(len(objects), np.inf), self.shape[objects]
+        result, shape = np.full(len(objects), np.inf), self.shape[objects]
         for at, slopes in enumerate(self.slopes):
             here = np.flatnonzero(shape == at)
             if slopes is not None and len(here):
-                found[here] = slopes.rise(q.take(here, -1), radius[here])
-        most = np.fmin((found + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
+                result[here] = slopes.rise(q.take(here, -1), radius[here])
+        most = np.fmin((result + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
         return np.asarray(most, np.float32)
 
     def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
@@ -423,14 +423,14 @@ def rounded(cells: Cell, s: int) -> Cell:
     """
     lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
     features = lines.shape[-1] - s
-    found = [lines], [bias], [candidate], [bump]
+    result = [lines], [bias], [candidate], [bump]
     for sign in (1.0, -1.0):  # of the object's features
         turned = lines * np.array([sign] * features + [-1.0] * s, np.float32)
         shut = np.where(np.arange(len(bias)) < s, bias, -1.0).astype(np.float32)
         turned[s:] = 0.0
-        for part, more in zip(found, (turned, shut, -sign * candidate, -bump), strict=True):
+        for part, more in zip(result, (turned, shut, -sign * candidate, -bump), strict=True):
             part.append(more)
-    more = Cell(*(np.stack(part) for part in found))
+    more = Cell(*(np.stack(part) for part in result))
     return Cell(*(np.concatenate([one, two]) for one, two in zip(cells, more[:], strict=True)))
 
 

@@ -261,14 +261,14 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
 
 def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> list[Closing]:
     """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
-    found = list[Closing]()
+    result = list[Closing]()
     if not len(columns):
-        return found
+        return result
     for at in range(open_groups.shape[1] - 1, -1, -1):
         some = columns[(kept <= at) & real[columns, at]]
         if len(some):
-            found.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
-    return found
+            result.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
+    return result
 
 
 Floats32 = npt.NDArray[np.float32]
@@ -494,19 +494,19 @@ class Raster:
         if self.canvas == (self.wide, self.high):
             return None
         down, across = np.divmod(np.arange(side * side)[:, None], side)
-        found: np.ndarray = (place[0] + across < self.canvas[0]) & (place[1] + down < self.canvas[1])
-        return found
+        result: np.ndarray = (place[0] + across < self.canvas[0]) & (place[1] + down < self.canvas[1])
+        return result
 
     def centres(self, place: tuple[Index, Index], side: int) -> np.ndarray:
         """World coordinates (2, side * side, B), float32, of blocks' pixels row by row.
 
         They are float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel.
         """
-        found = np.empty((2, side, side, len(place[0])), np.float32)
+        result = np.empty((2, side, side, len(place[0])), np.float32)
         steps = self.px * np.arange(side)[:, None]
-        found[0] = (self.left + self.px * place[0]) + steps
-        found[1] = ((self.top - self.px * place[1]) - steps)[:, None]
-        return found.reshape(2, side * side, -1)
+        result[0] = (self.left + self.px * place[0]) + steps
+        result[1] = ((self.top - self.px * place[1]) - steps)[:, None]
+        return result.reshape(2, side * side, -1)
 
     def reached(self, frames: Frames, reach: Floats) -> Pairs:
         """Objects at the largest blocks where they may be within their reach (N,), leaf units."""

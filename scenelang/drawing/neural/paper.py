@@ -214,7 +214,7 @@ class Level(nn.Module):
         """
         hidden = torch.zeros_like(maps[:, 0])
         cell = torch.zeros_like(hidden, dtype=marks.dtype)
-        found = []
+        result = []
         for i in range(maps.shape[1]):
             mark = marks[:, i, :, None, None].to(maps.dtype).expand(-1, -1, *maps.shape[3:])
             after = self.cell(torch.cat([maps[:, i], mark], 1), (hidden, cell))
@@ -223,8 +223,8 @@ class Level(nn.Module):
             else:
                 used = (i < count)[:, None, None, None]
                 hidden, cell = (torch.where(used, a, b) for a, b in zip(after, (hidden, cell), strict=True))
-            found.append(hidden)
-        return found
+            result.append(hidden)
+        return result
 
 
 class Streaming(nn.Module):
@@ -331,14 +331,14 @@ def draw_whole(
         side = network.config.resolution
         if program.canvas != (side, side):
             raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
-        found = network(v, t)[0].permute(1, 2, 0)
+        result = network(v, t)[0].permute(1, 2, 0)
         pairs = len(program) * side * side
     else:
-        found = _sampled(network, v, t, width, height, progress)
+        result = _sampled(network, v, t, width, height, progress)
         pairs = len(program) * 4 * width * height
     if progress is not None:
         progress(1.0)
-    picture = found.clamp(0.0, 1.0).cpu().numpy()
+    picture = result.clamp(0.0, 1.0).cpu().numpy()
     return Drawing(from_samples(np.ascontiguousarray(picture), None), pairs, 0, width * height)
 
 

@@ -79,8 +79,8 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
     width, height = canvas
     if samples == "one":
         every = np.array(rows)[:, None] + 0.5
-        found, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
-        return found[:4], work
+        result, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
+        return result[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
@@ -110,8 +110,8 @@ def _shade(
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
-        found = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
-    return found.reshape(7, *way.shape[1:]), shade.work
+        result = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
+    return result.reshape(7, *way.shape[1:]), shade.work
 
 
 def directions(camera: Camera, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -152,26 +152,26 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
     """
     width, height = canvas
     lighting = Lighting(field, stage)
-    found = np.empty((ROWS, height, width), np.float32)
+    result = np.empty((ROWS, height, width), np.float32)
     every = max(1, min(TILE // width, -(-height // threads)))
 
     def row(top: int) -> None:
         y = np.arange(top, min(top + every, height))[:, None] + 0.5
-        found[:, top : top + every] = _shown(lighting, directions(stage.camera, canvas, x_centres, y))
+        result[:, top : top + every] = _shown(lighting, directions(stage.camera, canvas, x_centres, y))
 
     def four(start: int) -> None:
         at = slice(start, start + TILE // 4)
         way = directions(stage.camera, canvas, across[at, None] + quarter[0], down[at, None] + quarter[1])
         alpha = _alpha(lighting, way.reshape(3, -1))[1]
-        found[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
+        result[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
 
     x_centres = np.arange(width) + 0.5
     quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
     with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
         list(pool.map(row, range(0, height, every)))
-        down, across = np.nonzero(rough(found[5:]))
+        down, across = np.nonzero(rough(result[5:]))
         list(pool.map(four, range(0, len(down), TILE // 4)))
-    return Outputs(found[0], np.moveaxis(found[1:4], 0, 2), found[4].astype(np.int32), found[5])
+    return Outputs(result[0], np.moveaxis(result[1:4], 0, 2), result[4].astype(np.int32), result[5])
 
 
 def _alpha(lighting: Lighting, way: Array) -> tuple[Trail, Array]:

@@ -295,8 +295,8 @@ class Objects:
             length = xp.sqrt((q * q).sum(0))
             rim = RADIUS / length.clip(RADIUS)
             place = q * rim
-        found = self._decoded(place, objects, gradient)
-        d, g = found[0], found[1:]
+        result = self._decoded(place, objects, gradient)
+        d, g = result[0], result[1:]
         if length is not None and rim is not None:
             d = d + (length - RADIUS).clip(0.0)
             if gradient:
@@ -344,12 +344,12 @@ class Objects:
         xp = self.xp
         if len(self.decoders) == 1:
             return self._field(q, self.decoders[0], gradient)
-        found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
+        result, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
         for i, layers in enumerate(self.decoders):
             index = xp.where(which == i)
             if len(index):
-                xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
-        return found
+                xp.put(result, index, self._field(xp.take(q, index), layers, gradient))
+        return result
 
     def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
         if isinstance(decoder, GridShape):
@@ -408,7 +408,7 @@ class Stacks:
         xp.put(begun, rays[:met], ways[:met])
         if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
             return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
-        found: list[Array | None] = []
+        result: list[Array | None] = []
         closings: list[list[Closing]] = []
         stacks, paths = 0 * every, xp.take(self._path, 0 * every)
         start, deepest = 0, 1
@@ -428,29 +428,29 @@ class Stacks:
             states = xp.take(self._states, stack)
             deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
             closings.append(closing)
-            found.append(place if place is None and not start else points + count * states)
+            result.append(place if place is None and not start else points + count * states)
             xp.put(stacks, points, stack)
             xp.put(paths, points, path)
             start += len(points)
         closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
-        if deepest > 1 and found[0] is None:
-            found[0] = every
-        return found, closings, deepest
+        if deepest > 1 and result[0] is None:
+            result[0] = every
+        return result, closings, deepest
 
     def _closed(
         self, points: Array, stack: Array, common: Array, path: Array, count: int
     ) -> tuple[list[Closing], Array]:
         """End the groups of stacks (k,) but for what they have in common with what follows."""
-        xp, found = self._xp, list[Closing]()
+        xp, result = self._xp, list[Closing]()
         ending = stack & ~common
         for depth in reversed(range(self._groups)):
             bit = 1 << depth
             some = xp.where((ending & bit) > 0)
             if len(some):
                 inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
-                found.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                result.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
                 stack = stack - (ending & bit)
-        return found, stack
+        return result, stack
 
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
@@ -583,11 +583,11 @@ class SolidField(Objects):
         objects = xp.whole(pairs[OBJECT])
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
-        found = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
+        result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
         if most < 2 or not self.tree.deepest:
-            return found
+            return result
         places, closings, depth = self._stacks.followed(places, rays, objects, every)
-        return found._replace(places=places, closings=closings, depth=depth)
+        return result._replace(places=places, closings=closings, depth=depth)
 
     def answer(
         self,
@@ -650,12 +650,12 @@ class SolidField(Objects):
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
-        found = states.at(xp, inner)
-        d, look = found.memory[0].clip(-EMPTY, NOTHING), found.memory[1:]
-        xp.put(states.memory[:1], inner, 0 * found.memory[:1] + EMPTY)
+        result = states.at(xp, inner)
+        d, look = result.memory[0].clip(-EMPTY, NOTHING), result.memory[1:]
+        xp.put(states.memory[:1], inner, 0 * result.memory[:1] + EMPTY)
         if states.bound is not None:
             xp.put(states.bound, inner, 0 * d + EMPTY)
-        operand = Operand(d, look, found.slope, found.bound, found.owner)
+        operand = Operand(d, look, result.slope, result.bound, result.owner)
         self._join(states, index, operand, which, wanted)
 
     def _join(
@@ -708,14 +708,14 @@ class SolidField(Objects):
         xp, inside = self.xp, self.inside(passes, t)
         alone = inside.sum(0) == 1
         one, several = xp.where(alone), xp.where(~alone)
-        found = xp.full((3, len(t)), 0.0, t)
+        result = xp.full((3, len(t)), 0.0, t)
         if len(several):
             there = passes.at(xp, several), xp.take(t, several), Wanted.ALL
-            xp.put(found, several, self.meet(*there, p=xp.take(p, several)).register[:3])
+            xp.put(result, several, self.meet(*there, p=xp.take(p, several)).register[:3])
         if len(one):
             objects = xp.whole(xp.take((passes.slots[OBJECT] * inside).sum(0), one))
-            xp.put(found, one, self.worn(objects, xp.take(p, one)))
-        return found
+            xp.put(result, one, self.worn(objects, xp.take(p, one)))
+        return result
 
     def textured(self, passes: Passes) -> Array:
         """Texels (M,) that rays may cross in a world unit, 0 where they pass no object with a texture."""

@@ -76,11 +76,11 @@ class Lookups:
         off = (off - seen[:, None] * ratio) / (1 + ratio)
         p = (self._eye[:, None] + way * (t + INTO))[:, None] + off
         if objects is not None:
-            found = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
+            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
         else:
             four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
-            found = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
-        return found.reshape(3, 4, -1).mean(1)
+            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
+        return result.reshape(3, 4, -1).mean(1)
 
     def along(self, way: Array, trail: Trail, pieces: Piece, px: float) -> Iterator[tuple[Array, int, Array]]:
         """Of pieces of rays in media with textures which they are, a node and what `_woven` gives for it.
@@ -212,20 +212,20 @@ class Lighting:
             seen = seen * 0
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-        both, found = xp.concat([surface, floor], 0), []
+        both, result = xp.concat([surface, floor], 0), []
         work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface), lost=trail.lost)
         if len(surface):
-            found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
+            result.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
         if len(floor):
-            found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+            result.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
         mist = None
         if trail.pieces:
             pieces = self._cut(way, self._parted(trail))
             mist, share = self._scattering(way, trail, pieces, px)
-            found.append(mist)
-        if not found:
+            result.append(mist)
+        if not result:
             return Shade(seen[:3], seen[-3:], alpha, work)
-        points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
+        points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
         light, free, more = self._lit(points, xp.take(trail.soft, surface), _steps(trail))
         work += more
         xp.put(seen, both, light[:, : len(both)])
@@ -351,23 +351,23 @@ class Lighting:
         xp = self.xp
         t = xp.take(trail.hit, index)
         passes = trail.at(self.xp, index)
-        found = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
+        result = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
         sharp = xp.take(trail.soft, index) == 0
-        off = xp.where(sharp & (abs(found.distance) > 3 * INTO))
+        off = xp.where(sharp & (abs(result.distance) > 3 * INTO))
         if len(off):  # where the distances on both sides of the surface said little about it
-            t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
+            t_off = xp.take(t, off) + INTO + self._ahead(result, way, off)
             again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
             there = xp.where(_dot(again.gradient, again.gradient) > 0.01)  # not past an edge
             off = xp.take(off, there)
             xp.put(t, off, xp.take(t_off, there) - INTO)
             for name in ("distance", "register", "gradient"):
-                xp.put(getattr(found, name), off, xp.take(getattr(again, name), there))
-        g = found.gradient
+                xp.put(getattr(result, name), off, xp.take(getattr(again, name), there))
+        g = result.gradient
         towards = _dot(g, way)
-        t = t + sharp * (INTO + self._ahead(found, way, None))
+        t = t + sharp * (INTO + self._ahead(result, way, None))
         p = self.eye[:, None] + way * t
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        colour = found.register[:-1]
+        colour = result.register[:-1]
         for soft in (False, True) if px and self.field.textures else ():
             some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
             if len(some):
@@ -407,7 +407,7 @@ class Lighting:
         some = xp.where(several)
         if not field.coloured or not len(some):
             return piece
-        found = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
+        result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
         ray, begin, end, before = (xp.take(part, some) for part in piece)
         passes = trail.at(xp, ray)
         places = [begin + (end - begin) * share for share in LOOKS]
@@ -428,12 +428,12 @@ class Lighting:
         for step in steps:  # a ray changes once in each
             stop, done = low[done : done + len(step)], done + len(step)
             rays, starts, befores = (xp.take(part, step) for part in (ray, start, before))
-            found.append((rays, starts, stop, befores))
+            result.append((rays, starts, stop, befores))
             start, before = 1 * start, 1 * before
             xp.put(start, step, stop)
             xp.put(before, step, befores + stop - starts)
-        found.append((ray, start, end, before))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
+        result.append((ray, start, end, before))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
     def _cut(self, way: Array, piece: Piece) -> Piece:
         """The same pieces of rays, cut where the light falls unevenly along them."""
@@ -441,18 +441,18 @@ class Lighting:
         ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
         narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
-        found = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
+        result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
         wide = xp.where(~narrow)
         if not len(wide):
-            return found[0]
+            return result[0]
         ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
         middle = _dot(ways, to)
         aside = _length(xp, to - ways * middle).clip(NEAREST)
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
-            found.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
+            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
 
 def _steps(trail: Trail) -> int:

@@ -237,12 +237,12 @@ class Rays:
             d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
             free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
         else:
-            found = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
-            self.trail.met += found.met
-            d, free, dense = found.distance, abs(found.distance), None
+            result = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
+            self.trail.met += result.met
+            d, free, dense = result.distance, abs(result.distance), None
             if solids.mixed:
-                dense = found.register[0] > 0.5
-                free = self.xp.select((d < 0) & dense, found.change, free)
+                dense = result.register[0] > 0.5
+                free = self.xp.select((d < 0) & dense, result.change, free)
         within = (d < 0) & batch.alive
         if not solids.media:
             return within & False, (d < TOUCH) & batch.alive, free
@@ -310,9 +310,9 @@ class Rays:
         low, high = row[PAST], row[T]
         for _ in range(halvings):
             half = (low + high) / 2
-            found = self.solids.meet(passes, half, self.wanted)
-            self.trail.met += found.met
-            still = (found.distance < 0) & (found.register[0] > 0.5)
+            result = self.solids.meet(passes, half, self.wanted)
+            self.trail.met += result.met
+            still = (result.distance < 0) & (result.register[0] > 0.5)
             low, high = xp.select(still, half, low), xp.select(still, high, half)
         xp.put(self.trail.hit, ray, high)
         xp.put(self.trail.soft, ray, high * 0 + 1)
@@ -321,8 +321,8 @@ class Rays:
     def _root(self, rows: Array, free: Array) -> Array:
         """Where between their last two points some rays met a surface, as far as both bounds tell."""
         t, past, before = rows[T], rows[PAST], rows[FREE]
-        found = past + (t - past) * (before / (before + free).clip(1e-9))
-        return self.xp.maximum(found, t - self.gap)
+        result = past + (t - past) * (before / (before + free).clip(1e-9))
+        return self.xp.maximum(result, t - self.gap)
 
     def _close(self, ray: Array, rows: Array, end: Array) -> Array:
         """End the ways through media of rays (k,) with such rows (STATE, k); lengths (k,) in media so far."""
@@ -365,15 +365,15 @@ def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
     objects, way, end = xp.whole(pairs[OBJECT]), pairs[WAY], pairs[END]
     speed = xp.sqrt((way * way).sum(0))
     q = xp.take(passes.origins, objects) + way * end
-    found, which = 0 * end, xp.take(solids.decoder, objects)
+    result, which = 0 * end, xp.take(solids.decoder, objects)
     for i, layers in enumerate(solids.segments):
         some = xp.where(which == i)
         if len(some):
             x = folded(xp, xp.take(q, some), xp.take(way, some) / -xp.take(speed, some))
-            xp.put(found, some, solids.network.field(x, layers, False)[0])
-    found = xp.minimum(found.clip(0.0) / speed, end - pairs[BEGIN])
+            xp.put(result, some, solids.network.field(x, layers, False)[0])
+    result = xp.minimum(result.clip(0.0) / speed, end - pairs[BEGIN])
     each = 0 * slots[OBJECT].reshape(-1)
-    xp.put(each, flat, found)
+    xp.put(each, flat, result)
     return each.reshape(slots.shape[1:]).sum(0), len(flat)
 
 

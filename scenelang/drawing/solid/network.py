@@ -73,12 +73,12 @@ def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     for _ in range(LEVELS):
         half /= 2
         centre = (centre[:, :, None] + half * CORNERS).reshape(3, -1)
-        found = distance(centre)
-        inside = centre[:, found <= 0]
+        result = distance(centre)
+        inside = centre[:, result <= 0]
         low = np.minimum(low, inside.min(1, keepdims=True, initial=np.inf))
         high = np.maximum(high, inside.max(1, keepdims=True, initial=-np.inf))
         wider = ((centre - half < low) | (centre + half > high)).any(0)
-        centre = centre[:, wider & (found <= STEEPEST * half * 3**0.5)]
+        centre = centre[:, wider & (result <= STEEPEST * half * 3**0.5)]
     low = np.minimum(low, (centre - half).min(1, keepdims=True, initial=np.inf))
     high = np.maximum(high, (centre + half).max(1, keepdims=True, initial=-np.inf))
     return np.concatenate([low, high], 1).T

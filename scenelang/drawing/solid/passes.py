@@ -55,8 +55,8 @@ class Turn(NamedTuple):
         rows = [g[0], g[1], g[2]]
         rows[self.i], rows[self.j] = cos * a - sin * b, sin * a + cos * b
         rows[self.along] = rows[self.along] + self.rate * swing
-        found = xp.stack(rows, 0)
-        return found if length is None else found + (self.twirl * swing / length.clip(1e-12)) * p
+        result = xp.stack(rows, 0)
+        return result if length is None else result + (self.twirl * swing / length.clip(1e-12)) * p
 
     def placed(self, xp: Arrays, like: Array) -> Turn:
         """Itself."""
@@ -194,12 +194,12 @@ def inverse_of(linear: np.ndarray) -> np.ndarray:
         ProgramError: it has none in float32.
     """
     try:
-        found: np.ndarray = np.linalg.inv(linear)
+        result: np.ndarray = np.linalg.inv(linear)
     except np.linalg.LinAlgError:
         raise ProgramError("a damaged program: a frame without an inverse") from None
-    if not np.abs(found).max() < MOST:
+    if not np.abs(result).max() < MOST:
         raise ProgramError("a frame beyond float32")
-    return found
+    return result
 
 
 def _map(frame: np.ndarray) -> Map:
@@ -314,10 +314,10 @@ def showing(groups: Groups) -> Mask:
 
 def _under(groups: Groups, operator: int) -> Mask:
     """Find rows (N,) that an operator joins, or a group around them."""
-    found = groups.tokens == operator
+    result = groups.tokens == operator
     for path in groups.path.T:
-        found = found | ((path >= 0) & (groups.joins[path] == operator))
-    return np.asarray(found)
+        result = result | ((path >= 0) & (groups.joins[path] == operator))
+    return np.asarray(result)
 
 
 def _widened(
@@ -412,7 +412,7 @@ def find_passes(
         limit: where the rays end (M,).
         tight: whether objects' boxes count too.
     """
-    low, high, found = 0 * way[0], limit, []
+    low, high, result = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
     around: list[tuple[Array, Array]] = []  # of the groups that a group stands in
     for i, solid in reversed(list(enumerate(solids))):
@@ -429,13 +429,13 @@ def find_passes(
         xp.put(filled, rays, slot + 1)
         if solid.draws:
             xp.put(drawn, rays, slot >= 0)
-        found.append((rays, slot, values))
+        result.append((rays, slot, values))
     some = xp.where(drawn)
     count, most = len(some), int(filled.max()) if len(some) else 0
     slots = xp.full((SLOT, most, count), 0.0, way)
     slots[BEGIN], slots[END] = INF, -INF
     if count:
-        rays, slot, values = (xp.concat(parts, -1) for parts in zip(*found, strict=True))
+        rays, slot, values = (xp.concat(parts, -1) for parts in zip(*result, strict=True))
         place = xp.take(placed(xp, some, filled), rays)
         kept = xp.where(place >= 0)
         if len(kept) < len(place):
@@ -471,6 +471,6 @@ def _crossed(
 
 def placed(xp: Arrays, index: Array, like: Array) -> Array:
     """Where in an index each of M entries is, -1 for those that are not; `like` are integers (M,)."""
-    found = 0 * like - 1
-    xp.put(found, index, xp.whole(0 * index + 1).cumsum(0) - 1)
-    return found
+    result = 0 * like - 1
+    xp.put(result, index, xp.whole(0 * index + 1).cumsum(0) - 1)
+    return result
