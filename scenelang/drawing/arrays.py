@@ -1,7 +1,7 @@
 """The dozen functions by which numpy arrays and torch tensors differ; all else is written as both have it.
 
 The field is written once, for a network whose `xp` is `NUMPY` here or `TORCH` (`arrays_torch.py`). Points lie
-along the last axis, M, and functions leave their arguments as they are, `put` aside.
+along the last axis, M. Functions leave their arguments as they are; `put`, `add` and `unit` write in place.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Pictures as arrays that save and show themselves, and outputs beside colour with their files.
+"""Pictures as arrays that save and show themselves, and their other outputs with the files of these.
 
 A PNG holds one output in 16 bits, an EXR the picture and all outputs as layers of floats. Both carry a text
 ``scenelang``, JSON, that says what the numbers are and which objects are seen.
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")
-"""What 2D pictures have."""
+"""Outputs of 2D pictures."""
 DEEP = 0.01
 """World units in a medium where its object is asked for, where it is as deep."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -40,12 +40,12 @@ PROVED = 1 / 255
 """Of a channel: a pixel that is proved to be so near the exact one counts as right."""
 Floats = npt.NDArray[np.float32]
 Source = dict[str, str | int]
-"""Of an object its ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
+"""An object's ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proof:
-    """How far a picture may be from the exact one; row 0 is the top.
+    """Bounds of a picture's distance from the exact one; row 0 is the top.
 
     Args:
         bound: float32 (H, W), no less than the largest difference of a pixel's channels, in [0, 1] and, where
@@ -60,12 +60,12 @@ class Proof:
 
     @property
     def share(self) -> float:
-        """Of pixels that are proved right to `PROVED`."""
+        """Share of pixels that are proved right to `PROVED`."""
         return float((self.bound <= PROVED).mean())
 
     @property
     def left(self) -> int:
-        """How many pixels are not."""
+        """Number of pixels that are not."""
         return int((self.bound > PROVED).sum())
 
     @property
@@ -79,7 +79,7 @@ class Proof:
         return {"to": PROVED, **figures, "unknown": list(self.unknown)}
 
     def told(self) -> str:
-        """What to say about it."""
+        """A sentence about the proof."""
         percent = int(self.share * 1e5) / 1e3  # rounded down, so that only all are 100
         again = f", {self.redrawn:,} of them drawn again" if self.redrawn else ""
         rest = f"; {self.left:,} are not, by at most {255 * self.worst:.0f}/255" if self.left else ""
@@ -116,7 +116,7 @@ class Outputs:
     proof: Proof | None = None
 
     def only(self, wanted: Sequence[Output], sources: Mapping[int, Source]) -> Outputs:
-        """Those that are asked for, with what ``sources`` says of the objects that are seen."""
+        """Select the outputs that are wanted, with the ``sources`` of the objects that are seen."""
         result = {name: getattr(self, name) for name in wanted}
         if self.object is None or "object" not in wanted:
             return Outputs(**result)
@@ -125,11 +125,11 @@ class Outputs:
 
     @property
     def names(self) -> tuple[Output, ...]:
-        """Those that there are."""
+        """Names of the outputs that are not None."""
         return tuple(name for name in get_args(Output) if getattr(self, name) is not None)
 
     def facts(self, name: Output) -> dict[str, Any]:
-        """What the file of an output says of its numbers, as JSON data."""
+        """Meaning of an output's numbers for its file, as JSON data."""
         said: dict[str, Any] = {"output": name}
         if name == "depth":
             near, far = self.range()
@@ -149,7 +149,7 @@ class Outputs:
         return (float(result.min()), float(result.max())) if result.size else (None, None)
 
     def told(self, name: Output) -> str:
-        """What to say about the file of an output."""
+        """A few words about the file of an output."""
         if name != "depth":
             seen = f"{plural(len(self.objects or ()), 'object')} seen"
             known = {"normal": "normals in world axes", "object": seen, "proof": "bounds of pixels"}
@@ -230,7 +230,7 @@ def png16(values: npt.NDArray[np.uint16], text: str) -> bytes:
 
 
 def output_file(path: Path, name: Output) -> Path:
-    """Where an output of a picture goes: ``STEM.depth.png``, or into the picture if that is an EXR.
+    """Path of an output of a picture: ``STEM.depth.png``, or the picture itself if that is an EXR.
 
     Raises:
         ValueError: the picture is neither.
@@ -291,7 +291,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         write_output(path, self.encode(image_format(path)))
 
     def encode(self, kind: str = "PNG") -> bytes:
-        """What a file holds, in one of Pillow's formats or as ``"EXR"``, which has `layers`.
+        """Contents of a file in one of Pillow's formats, or as ``"EXR"``, which has `layers`.
 
         Formats without alpha (JPEG) get the picture over white.
         """
@@ -327,7 +327,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
 
 def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
-    """What the files of a picture and of its outputs hold, the picture's first.
+    """Contents of the files of a picture and of its outputs, the picture's first.
 
     Raises:
         ValueError: their format cannot hold them.

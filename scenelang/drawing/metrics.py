@@ -70,7 +70,7 @@ def flip(picture: Array, reference: Array) -> float:
 
 
 def compare(picture: Array, reference: Array) -> dict[str, float]:
-    """How near a picture is to another: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
+    """Similarity of two pictures: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
 
     Args:
         picture: float (H, W, 3) or, with straight alpha, (H, W, 4), sRGB-encoded in [0, 1]; alpha is put over

@@ -1,19 +1,16 @@
 """Bounds, proved pixel by pixel, of how far a picture of the plane may differ from the exact one.
 
-They are of the chain as written, so that they cover what the passes make of it.
+A region of the picture has a distance to each object: the exact one at its centre, enclosed in an interval,
+widened by the region's radius in the leaf's own coordinates, as exact distances change by no more. Intervals
+pass through the exact fold, by the formulas of `exact/field.py`; its state is monotonic in both distances, so
+the ends of its interval come from theirs. Where the result is one colour, all samples of the region have it.
+Elsewhere objects that are certain to change nothing are dropped, and the region's quarters are asked, down to
+single samples. All bounds are of the scene as written, so that they cover the compiler's passes too.
 
-The formulas are those of `drawing.exact.field`. The state is monotonic in both distances, so the ends of its
-interval come of theirs.
-
-`python -m lab.errors` proves it. Within `RADIUS` a cell of leaf coordinates says between which
-numbers learned less exact distance lies. Farther points are seen at the rim: a leaf lies in the unit disc,
-so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine of the
-largest angle between the ways from the origin and from a point of the disc.
-
-A region's distance to an object is the exact one at its centre, enclosed, give or take how far the region
-reaches in the leaf's own coordinates, as exact distances change by no more. Intervals through the exact fold
-say what it shows. Where that is one colour, all of its samples do. Elsewhere objects that are certain to
-change nothing are dropped, and the region's quarters are asked, down to single samples.
+The exact distance at a centre is the learned one, less an error that `python -m lab.errors` has enclosed for
+each cell of leaf coordinates within `RADIUS`. The network sees farther points at the rim: a leaf lies in the
+unit disc, so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine
+of the largest angle between the ways from the origin and from a point of the disc.
 """
 
 from __future__ import annotations
@@ -64,8 +61,8 @@ from scenelang.drawing.neural.meetings import (
 from scenelang.drawing.neural.network import RADIUS, FramedNetwork
 from scenelang.language.words import TOKENS
 
-TAME = 1e-9  # leaf units: what is allowed for in any case
-EPS = 32 * 2.0**-52  # of a number: what one step may lose of it
+TAME = 1e-9  # leaf units: an error that is allowed for in any case
+EPS = 32 * 2.0**-52  # relative error of one step: a few dozen roundings of float64
 
 
 class Written(NamedTuple):
@@ -84,7 +81,7 @@ class Written(NamedTuple):
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
     def discoloured(self, reach: float, far: float) -> float:
-        """Of a channel, by how much the colours of a texture may be off there."""
+        """Greatest error of a channel of a texture's colours there."""
         if self.look.element is None:
             return 0.0
         reach = min(reach, _seen(self.steps, far))
@@ -113,7 +110,7 @@ def written(root: Fold) -> dict[int, Written]:
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
-    """How long leaf coordinates are at most of points that are no longer than ``far`` in the world."""
+    """Greatest length of leaf coordinates of points that are no longer than ``far`` in the world."""
     size = np.full(2, far)
     for step in reversed(steps):
         if isinstance(step, Affine):
@@ -125,7 +122,7 @@ def _seen(steps: Sequence[Step], far: float) -> float:
 
 
 def _misplaced(steps: Sequence[Step], far: float) -> float:
-    """How far float64 may put points, no longer than ``far`` in the leaf, from where they are there.
+    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there.
 
     Everything is by coordinates, without signs: `size` of points behind the steps so far, `ways` how far they
     move in the leaf as they move there, `forth` the reverse.
@@ -147,7 +144,7 @@ def _misplaced(steps: Sequence[Step], far: float) -> float:
 
 
 def _unlike(rows: Rows) -> float | None:
-    """What is lost of a point where a warp moves past a map that counts as similar, None where none does."""
+    """Error of a point where a warp moves past a map that counts as similar, None where none does."""
     a, b, _, x, c, d, _, y = rows[:8]
     turned, mirrored = max(abs(a - d), abs(b + c)), max(abs(a + d), abs(b - c))
     off = max(min(turned, mirrored), abs(x), abs(y)) / (sqrt(abs(a * d - b * c)) or 1.0)
@@ -173,7 +170,7 @@ class Enclosure(NamedTuple):
 
 
 class Enclosed(NamedTuple):
-    """What is certain of regions.
+    """Facts that are certain of regions.
 
     Args:
         shown: channels (K, B).
@@ -333,7 +330,7 @@ def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
 CELLS = 128  # along a side of [-RADIUS, RADIUS]
 PROVER = "shapes2d"
 """The model whose distances are proved. It has every leaf of the plane; they tell of any model's pictures."""
-_SLOWEST = (1 - RADIUS**-2) ** 0.5
+_SLOWEST = (1 - RADIUS**-2) ** 0.5  # the cosine of the largest angle, whose sine is 1 / RADIUS
 _CHUNK = 2048  # points that go through a decoder at once
 
 
@@ -361,7 +358,7 @@ class Errors:
 
 
 def errors_path(name: str) -> Path:
-    """Where the file of a shipped model lies."""
+    """Path of the file of a shipped model."""
     return model_folder(name) / "errors.safetensors"
 
 
@@ -444,7 +441,7 @@ class Stream:
         self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
-        """How many objects a place on the canvas is in reach of, in the mean."""
+        """Mean number of objects that reach a place on the canvas."""
         every, half = np.isinf(self.reach), np.array(canvas)[:, None] / min(canvas)
         low, high = self.frames.boxes(np.where(every, 0.0, self.reach))
         sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
@@ -633,7 +630,7 @@ def prove_image(
 
 
 def _off(drawn: Floats, shown: Enclosure) -> Floats:
-    """How far pixels (H, W, K) may lie from what is shown, by their worst channels."""
+    """Greatest difference of pixels (H, W, K) from an enclosed picture, over their channels."""
     far = np.maximum(shown.high - drawn, drawn - shown.low)
     worst = far[..., 0]
     for channel in range(1, far.shape[-1]):
@@ -642,7 +639,7 @@ def _off(drawn: Floats, shown: Enclosure) -> Floats:
 
 
 def known_errors(manifest: Manifest) -> dict[str, Errors]:
-    """What is proved of the distances of geometries; raises as `prove_image`."""
+    """Proved errors of the distances of geometries; raises as `prove_image`."""
     if manifest.dimension != 2:
         raise ProofError("pictures of solids are not proved, those of the plane are")
     if manifest.lifting != "exact":

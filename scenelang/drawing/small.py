@@ -1,8 +1,8 @@
 """Small pictures, drawn by numpy without waiting for torch to be imported.
 
 Numpy on one core draws as fast as torch on one core. Torch has more cores and devices, and takes one to two
-seconds to import; so a single picture is worth it from some amount of work on. That amount is counted from
-the Program and never measured while drawing: the same Program is always drawn by the same library.
+seconds to import, which pays from some amount of work on. That amount is counted from the Program and never
+measured while drawing: the same Program is always drawn by the same library.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PROBE: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What a frame's time depends on.
+    """Numbers that a frame's time depends on.
 
     Args:
         objects: rows of the Program.
@@ -91,7 +91,7 @@ _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 
 
 class Drawer(NamedTuple):
-    """Which library draws a picture, and the reason in words."""
+    """The library that draws a picture, and the reason in words."""
 
     library: Literal["numpy", "torch"]
     why: str
@@ -100,7 +100,7 @@ class Drawer(NamedTuple):
 def choose_drawer(
     program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
 ) -> Drawer:
-    """Who draws a single picture: a function of the Program, and of where a caller wants it drawn.
+    """Choose the library for a single picture, from the Program and the caller's device alone.
 
     Args:
         device, samples: as of `How`.
@@ -128,7 +128,7 @@ def choose_drawer(
 
 
 def work_ms(program: Program, samples: Samples = "adaptive") -> float:
-    """What drawing a Program takes on one core of the machine that was measured, in milliseconds."""
+    """Milliseconds to draw a Program on one core of the machine that was measured."""
     row = load_of(program).row(skip=True)
     return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
 

@@ -294,7 +294,7 @@ _DIGITS = 1e-12  # of a coordinate: more than float64 loses in a step
 def parts(
     root: Fold, canvas: tuple[int, int], brought: Brought | None
 ) -> Iterator[tuple[Node, range, range]]:
-    """What there is to draw in each part of a picture: a node, rows and columns."""
+    """Parts of a picture: the node that may be seen there, rows and columns."""
     (width, height), unit = canvas, min(canvas) / 2
     todo: list[tuple[Node, range, range]] = [(root, range(height), range(width))]
     while todo:

@@ -1,9 +1,9 @@
 """Triangle meshes as solids: read, put into the unit ball, asked for distances and colours.
 
-Colours are what files mean, as numbers of sRGB. What glTF writes of colours is linear, its textures aside.
+Colours are in sRGB. The colours of a glTF are linear, its textures aside, and are converted.
 
-Needs trimesh and libigl, which measures. Every mesh is taken for a stranger's: what libigl would not survive
-is refused here.
+Needs trimesh, which reads, and libigl, which measures. No mesh is trusted: meshes that would crash libigl are
+refused here.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
 
 
 def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:
-    """What a mesh as trimesh reads it looks like; None where its file does not say.
+    """Colours of a mesh as trimesh reads it; None where its file has none.
 
     Args:
         linear: whether the numbers of its file are, as those of glTF.
@@ -158,11 +158,11 @@ _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are th
 
 
 class FitError(ValueError):
-    """What cannot be made an element, or which scene cannot be fitted to a picture, and why."""
+    """A file cannot be made an element, or a scene cannot be fitted to a picture."""
 
 
 class Shape(Protocol):
-    """What is to be made an element, in the unit ball or disc."""
+    """A shape to make an element of, in the unit ball or disc."""
 
     @property
     def dimension(self) -> int:
@@ -170,7 +170,7 @@ class Shape(Protocol):
 
     @property
     def centre(self) -> tuple[float, ...]:
-        """Of the ball, in the file's own coordinates."""
+        """Centre of the ball, in the file's own coordinates."""
 
     @property
     def size(self) -> float:
@@ -207,7 +207,7 @@ class Mesh:
 
     @cached_property
     def _trees(self) -> tuple[Any, Any]:
-        """What finds the nearest triangle, and winding numbers."""
+        """Search trees for the nearest triangle and for winding numbers."""
         igl = _igl()
         boxes, windings = igl.AABB(), igl.FastWindingNumberBVH()
         boxes.init(self.vertices, self.triangles)
@@ -292,9 +292,9 @@ class Mesh:
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
 ) -> tuple[Points, Points, float]:
-    """Of points of surfaces (M, d) those with an inside on one side alone (K, d), and outward normals.
+    """Select points of surfaces (M, d) that have an inside on one side alone (K, d), with outward normals.
 
-    Also the share of those that have none on either side.
+    Also returns the share of points that have none on either side.
 
     Args:
         distances: signed, of points.
@@ -308,7 +308,7 @@ def outer(
 
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which of triangles (F, 3) are the first with their corners in their order round."""
+    """A mask (F,) of triangles (F, 3) that are the first with their corners in their order round."""
     from trimesh.grouping import unique_rows
 
     turned = np.take_along_axis(triangles, (triangles.argmin(1)[:, None] + np.arange(3)) % 3, 1)
@@ -407,7 +407,7 @@ _IGNORED: Final = ("animations", "cameras", "skins")
 
 
 class Solid(NamedTuple):
-    """What has a name of its own in a file.
+    """A named mesh of a file.
 
     Args:
         vertices: (V, 3), where they lie in the whole.
@@ -474,7 +474,7 @@ def _few(data: bytes) -> None:
 
 
 def _notes(data: bytes) -> list[str]:
-    """What of a glTF is left out.
+    """Notes on parts of a glTF that are left out.
 
     Raises:
         FitError: it cannot be read without an extension.
@@ -511,7 +511,7 @@ def _notes(data: bytes) -> list[str]:
 
 
 def _beside(files: Mapping[str, bytes] | None) -> Any:
-    """What has the files that a file names, and notes which are missing."""
+    """A resolver, for trimesh, of the files that a file names; it notes the missing ones."""
     import trimesh
 
     class Beside(trimesh.resolvers.Resolver):

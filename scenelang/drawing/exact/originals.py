@@ -1,6 +1,6 @@
 """Files that elements were made from: the shapes in them, from which the exact picture is drawn.
 
-Of parts that are copies of each other, turned, mirrored, larger or smaller, the first one's shape serves all.
+Parts that are copies of each other, turned, mirrored or scaled, share the shape of the first one.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those o
 
 
 class Brought(NamedTuple):
-    """What a file is made.
+    """The shapes of a file.
 
     Args:
         shapes: what each element is made of, by its name; the whole comes last.
@@ -49,7 +49,7 @@ class Brought(NamedTuple):
 def brought(
     data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
 ) -> Brought:
-    """What the bytes of a file bring.
+    """Read shapes from the bytes of a file.
 
     Args:
         suffix: one that `scenelang.drawing.exact.mesh` or `scenelang.drawing.exact.outline` reads.
@@ -86,7 +86,7 @@ def said(text: str) -> str:
 
 
 def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
-    """What a file of meshes brings.
+    """Shapes of a file of meshes.
 
     Args:
         name: of the whole.
@@ -153,7 +153,7 @@ def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
 
 
 def _alike(one: Look | None, other: Look | None) -> bool:
-    """Whether copies may share their element: both of one colour each, or looking the same."""
+    """True where copies may share an element: both have one colour each, or they look the same."""
     if one is None or other is None:
         return one is other
     if one.plain is not None or other.plain is not None:
@@ -164,7 +164,7 @@ def _alike(one: Look | None, other: Look | None) -> bool:
 
 
 def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
-    """What a drawing brings: what it paints in one colour after another, each a part."""
+    """Shapes of a drawing: areas of one colour, in the order in which they are painted."""
     painted = [(colour, Outline(layers)) for colour, layers in whole.painted()]
     if len(painted) < 2 or apart is False or (apart is None and len(painted) > MOST_PARTS):
         colours = {colour for colour, _ in painted if colour}

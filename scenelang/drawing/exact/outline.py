@@ -1,10 +1,10 @@
 """Pictures as textures, and drawings and pictures as flat shapes.
 
-What is tried is WebP without loss, which suits drawings, and AV1 still pictures of one quality after another,
-found by halving. Others were measured and are larger (docs/training-log.md, Textures).
+A shape is a union of layers: filled areas, and strokes of their drawn width with round joins and ends. A
+texture is stored as lossless WebP, which suits drawings, or as an AV1 still picture, whose quality is
+searched by halving. Other formats were measured and are larger (docs/training-log.md, Textures).
 
-Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy. A shape is a union of
-layers: filled areas, and strokes as wide as they are drawn, with round joins and ends.
+Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ Inside = Callable[[Points], npt.NDArray[np.bool_]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """What lies on one side of edges, or near them.
+    """The area on one side of edges, or near them.
 
     Args:
         edges: (E, 2, 2).
@@ -217,7 +217,7 @@ class Layer:
     color: Painted = ()
 
     def touches(self, other: Layer) -> bool:
-        """Whether the boxes around both share a point."""
+        """True where the boxes around both share a point."""
         boxes = [
             (layer.edges.min((0, 1)) - layer.half, layer.edges.max((0, 1)) + layer.half)
             for layer in (self, other)
@@ -349,7 +349,7 @@ def _moved(inside: Inside, middle: Points, size: float) -> Inside:
 
 
 def winding(edges: Edges, odd: bool) -> Inside:
-    """Whether points lie within closed polygons, by the rule ``nonzero`` or ``evenodd``."""
+    """A test of points against closed polygons, by the rule ``nonzero`` or ``evenodd``."""
 
     low, high = edges[..., 1].min(1), edges[..., 1].max(1)
 
@@ -468,7 +468,7 @@ def _simplified(root: Any, svg: Any) -> list[str]:
 
 
 def _drawn(root: Any, named: dict[str, Any]) -> int:
-    """How many elements svgelements goes through, those that are used as often as they are.
+    """Number of elements that svgelements visits; one that is used twice counts twice.
 
     A use of itself counts as too many.
     """
@@ -540,7 +540,7 @@ def _seen(paint: Any, shape: Any) -> Painted | None:
 
 
 def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
-    """What a shape of a drawing paints, y up."""
+    """Layers that a shape of a drawing paints, y up."""
     open_edges, closing = [], []
     for part in svg.Path(shape).as_subpaths():
         points = [at for segment in svg.Path(part) for at in _ends(segment, svg)]

@@ -105,7 +105,7 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
 
 
 def _covered(field: Field, stage: Stage, d: Array) -> Array:
-    """How much of what is behind objects hide along unit directions d (3, M)."""
+    """Share of the background (M,) that objects hide along unit directions d (3, M)."""
     _, end, changes = seen_along(field, stage, d)
     hit = changes.after == OPAQUE
     end[changes.ray[hit]] = changes.t[hit]

@@ -83,7 +83,7 @@ class GridShape(Lattice):
         return self.xp.select(beyond > 0, self.xp.sqrt(result * result + beyond), result)
 
     def slopes(self) -> Slopes:
-        """How fast the distance in the plane changes; nothing is known of grids that end inside."""
+        """Bounds of how fast the distance in the plane changes; infinite for grids that end inside."""
         n, side = self.side, 2 * RADIUS / CELLS
         grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(n, n)
         rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
@@ -141,7 +141,7 @@ MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
 class Texture:
-    """What a paint makes of leaf coordinates.
+    """Colours of a paint at leaf coordinates.
 
     Args:
         xp: the library.

@@ -2,7 +2,7 @@
 
 Blocks of pixels are asked before pixels. An object is looked at by the blocks that it can reach; of each
 such pair the distance at the block's centre, and how fast it is proved to change, bound it on all of the
-block, and intervals through the cell bound what the block shows (`bounds.py`). Blocks of one colour are
+block, and intervals through the cell bound what the block shows (`meetings.py`). Blocks of one colour are
 filled; of the others, objects that are proved to change nothing there are dropped, and so is what lies behind
 one that hides it. What is left is asked again in smaller blocks, and pixel by pixel in the end.
 
@@ -42,7 +42,7 @@ LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 
 
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
+    """A mask of pixels (groups, B), of a side, that may have samples in a narrow blend with a texture."""
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
     result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
     worn = np.zeros(len(meetings.columns), bool)
@@ -65,7 +65,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
 
 
 def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """Which pixels (groups, B), of a side, may see where one object's colour gives way to another's.
+    """A mask of pixels (groups, B), of a side, that one object's colour may share with another's.
 
     In a union, outside both of them, that is not an outline, but a later blend may show it.
     """
@@ -151,7 +151,7 @@ class Tile:
     met: int = 0
 
     def over(self, picture: np.ndarray) -> np.ndarray:
-        """What is shown (…, 3 or 4) of premultiplied colour and coverage (…, 4)."""
+        """The picture (…, 3 or 4) over the background, of premultiplied colour and coverage (…, 4)."""
         if self.background is None:
             return picture
         shown: np.ndarray = picture[..., :3] + (1 - picture[..., 3:]) * self.background
@@ -249,7 +249,7 @@ class Coverage:
     def _matter(
         self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
     ) -> tuple[Meetings, tuple[Index, Index]]:
-        """What matters to the four samples of pixels, given leaf coordinates and distances in their middles.
+        """Pairs that matter to the four samples of pixels, by leaf coordinates and distances at centres.
 
         Pixels that are proved to show what their middles do are left out.
         """
@@ -290,7 +290,7 @@ class Coverage:
     def _pixels(
         self, grid: Raster, side: int, meetings: Meetings
     ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
-        """Where blocks begin, what they meet, and their pixels' centres (2, groups, B), row by row."""
+        """Corners of blocks, their meetings, and their pixels' centres (2, groups, B), row by row."""
         for _, part in _portions(meetings, side * side):
             columns = grid.place(part.columns, side)
             yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
@@ -303,7 +303,7 @@ class Coverage:
         return picture.reshape(p.shape[1], 4, 4, p.shape[2]).mean(1)
 
     def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
-        """What single points (2, groups, B) show (groups, 4, B)."""
+        """Premultiplied colour and coverage (groups, 4, B) at single points (2, groups, B)."""
         field = self.field
         trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
         memory = self.ask(meetings, p, tile, trace)[2]
@@ -325,7 +325,7 @@ class Coverage:
     # ------------------------------------------------------------ blocks
 
     def meetings(self, grid: Raster, tile: Tile) -> tuple[int, Meetings]:
-        """What blocks, and of what side, have to be asked pixel by pixel; fills others in the tile."""
+        """Side and objects of the blocks that need an answer for each pixel; fills others in the tile."""
         count = len(self.field.tokens)
         if not self.skip:
             side = LEVELS[-1]
@@ -349,7 +349,7 @@ class Coverage:
         return grid.reached(self.field.frames, self.field.reach)
 
     def _looked(self, grid: Raster, pairs: Pairs, side: int, tile: Tile) -> Pairs:
-        """What pairs are left of some when their blocks have been looked at."""
+        """Fill the blocks that are proved to be of one colour, and return the pairs of the others."""
         field, objects = self.field, pairs.object
         across, down = grid.place(pairs.block, side)
         half = side / 2 - 0.5
@@ -378,7 +378,7 @@ class Coverage:
         return left
 
     def _proved(self, pairs: Pairs, middle: np.ndarray, rise: np.ndarray) -> tuple[Pairs, Index, np.ndarray]:
-        """What is left of pairs, and blocks of one colour (n,) with their pictures (n, 4).
+        """Pairs that are still open, and blocks of one colour (n,) with their pictures (n, 4).
 
         Args:
             pairs: sorted by block.

@@ -1,11 +1,11 @@
 """Programs of the plane drawn on a device by one kernel of Triton: one upload, one launch, one download.
 
-It computes `network.py`, `frames.py`, `assets.py` and four samples a pixel. Everything
-stays in registers from a sample's place to its pixel's colour, so that a frame is one launch, however many
+The kernel, `draw_blocks`, computes `network.py`, `frames.py`, `assets.py` and four samples a pixel. Values
+stay in registers from a sample's place to its pixel's colour, so that a frame is one launch, however many
 objects meet however many blocks. M are a block's samples, those of a pixel side by side.
 
-The host says which objects can reach which blocks of pixels, from the Program alone, and makes the weights of
-its leaves. Everything goes up in one piece of page-locked memory; `kernel.py` does the rest.
+The host lists the objects that can reach each block of pixels, from the Program alone, and mixes the weights
+of its leaves. Everything goes up in one piece of page-locked memory.
 """
 
 from __future__ import annotations
@@ -315,7 +315,7 @@ WARPS = 8  # of 32 threads, for the 256 samples of a block
 
 @lru_cache
 def ready() -> bool:
-    """Whether Triton can start kernels: it looks for a device, and builds a library with a C compiler."""
+    """True where Triton can start kernels: it looks for a device, and builds a library with a C compiler."""
     try:
         return triton.runtime.driver.active.get_current_target() is not None
     except (ImportError, OSError, RuntimeError, SubprocessError):
@@ -452,7 +452,7 @@ def _cell_at(field: Field) -> int:
 
 
 def _rows(field: Field) -> np.ndarray:
-    """What the kernel knows of each object, and behind these of those that begin a state, and of groups."""
+    """Rows of the kernel's table: objects, and with groups these as first in a state, and the groups."""
     count, layout = len(field.tokens), field.layout
     whole = np.concatenate(
         [
@@ -476,7 +476,7 @@ def _rows(field: Field) -> np.ndarray:
 
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the kernel's ``parts`` are of each object (N, 6), and its ``weights``."""
+    """The kernel's ``parts``, of each object (N, 6), and its ``weights``."""
     shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]
     textures = [_texture_table(texture) for texture in field.textures]
     weights = [np.empty(0, np.float32), *shapes, *textures]

@@ -44,7 +44,7 @@ class Kept:
     picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
     def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
-        """Whether a tile of a picture with such keys shows what it did before."""
+        """True where a tile of a picture with such keys shows the same as before."""
         return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
 
     def look(self, coverage: Coverage, program: Program, tiles: Sequence[range]) -> list[bytes]:

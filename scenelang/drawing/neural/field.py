@@ -37,7 +37,7 @@ _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What P pairs did to points.
+    """Effect of P pairs on points.
 
     Args:
         paint: (groups, P) how far the object's colour came in.
@@ -51,7 +51,7 @@ class Trace:
     joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
     def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
-        """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
+        """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
         left, result = 1.0 * seen, 0.0 * self.paint
         if nest is not None:
             return self._nested(nest, left, result)
@@ -198,17 +198,17 @@ class Field:
 
     @property
     def provable(self) -> bool:
-        """Whether the network is of the kind that `shown` folds intervals of."""
+        """True where `shown` can fold intervals through the network."""
         return self.network.config.state == self.network.config.features == 1
 
     @property
     def blended(self) -> bool:
-        """Whether some object joins by a blend."""
+        """True where some object joins by a blend."""
         return bool((self._raw == SMOOTH).any())
 
     @property
     def textured(self) -> bool:
-        """Whether some object wears a texture."""
+        """True where some object has a texture."""
         return bool(self.textures)
 
     @property
@@ -401,7 +401,7 @@ class Field:
         return np.asarray(most, np.float32)
 
     def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
-        """What blocks are proved to show, whose pairs' distances lie within ``rise`` of ``middle``."""
+        """Prove the pictures of blocks whose pairs' distances lie within ``rise`` of ``middle``."""
         objects = meetings.pairs.object
         rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
         distance = Interval(middle - rise, middle + rise)

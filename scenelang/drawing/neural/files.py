@@ -1,6 +1,6 @@
 """Networks out of weights files as numpy arrays, and the proved slopes beside them.
 
-`python -m lab.slopes NAME` writes it. Weights without one are drawn without blocks being ruled out.
+`python -m lab.slopes NAME` proves slopes. Without them every block is drawn pixel by pixel.
 """
 
 from __future__ import annotations

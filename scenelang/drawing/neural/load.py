@@ -27,7 +27,7 @@ Network = Framed | Solids | Streaming | Reading
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What draws programs.
+    """A model that draws Programs.
 
     Args:
         network: the trained network, in evaluation mode, without gradients.

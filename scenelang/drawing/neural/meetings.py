@@ -1,10 +1,11 @@
-"""Blocks of pixels: where they lie, which objects they meet, and what they are proved to show.
+"""Blocks of pixels, the objects that they meet, and proofs of their colours.
 
 A pair is an object at a block. Blocks with the most objects are the first columns; then all pairs that come
 first at their block, all that come second, and so on: each of these slots is as long as there are columns
 with so many objects, and column i is its i-th pair.
 
-Everything is float32 on the host. Distances come widened by more than that may be off.
+A proof folds intervals, in float32 on the host. Its distances are widened beforehand by more than the
+rounding error of float32.
 """
 
 from __future__ import annotations
@@ -87,12 +88,12 @@ class Meetings:
     lengths: Index
 
     def slots(self) -> list[slice]:
-        """Where the pairs of each slot lie."""
+        """Slices of the pairs of each slot."""
         ends = np.cumsum(self.lengths).tolist()
         return [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)]
 
     def counts(self) -> Index:
-        """How many objects each column meets (B,)."""
+        """Number of objects that each column meets (B,)."""
         drops = np.bincount(self.lengths, minlength=len(self.columns) + 1)
         return np.cumsum(drops[::-1])[::-1][1:]
 
@@ -284,7 +285,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is proved of blocks.
+    """Facts that are proved of blocks.
 
     Args:
         picture: premultiplied colour and coverage (4, B).
@@ -490,7 +491,7 @@ class Raster:
         return pixels.reshape(self.high // side, side, self.wide // side, side, -1)
 
     def inside(self, place: tuple[Index, Index], side: int) -> np.ndarray | None:
-        """Which pixels (side * side, B) of blocks are wanted; None if all of the raster's are."""
+        """A mask of pixels (side * side, B) of blocks that are wanted; None if all of the raster's are."""
         if self.canvas == (self.wide, self.high):
             return None
         down, across = np.divmod(np.arange(side * side)[:, None], side)

@@ -1,27 +1,22 @@
 """The paper's renderers: a ConvLSTM over whole images, and a GRU by which each pixel reads the scene.
 
-Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 5.
-Fourier features after Tancik et al. 2020; gated recurrent unit after Cho et al. 2014.
+Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021: section 5
+for `Reading`; section 4, and Table 3 of its supplement (filters of each resolution, progressive growing), for
+`Streaming`. Fourier features after Tancik et al. 2020; gated recurrent unit after Cho et al. 2014.
 
-Letters: B scenes, N objects, P points, D = d_g + d_m numbers of an object, H = `hidden`, L = `octaves`.
+Letters: B scenes, N objects, P points, D = d_g + d_m numbers of an object, H = `hidden`, L = `octaves`,
+F filters of a level, R = resolution.
 
-A pixel has a state. In a read, a GRU looks at each object from that state; the answers are pooled over the
-objects by their maximum, so that a read does not depend on their number or order; a second GRU makes the
-next state of the pooled answer. After the last read a linear layer gives the colour. Boolean operators
-depend on the order, so each object comes with its token and its place in the stream, which the paper's
-unions do not need.
+`Reading` answers samples, four a pixel as the language defines. A pixel has a state. In a read, a GRU looks
+at each object from that state; the answers are pooled over the objects by their maximum, so that a read does
+not depend on their number or order; a second GRU makes the next state of the pooled answer. After the last
+read a linear layer gives the colour. Boolean operators depend on the order, so each object comes with its
+token and its place in the stream, which the paper's unions do not need.
 
-Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 4,
-and Table 3 of its supplement (filters of each resolution, progressive growing).
-
-Letters: B scenes, N objects, D = d_g + d_m numbers of an object, F filters of a level, R = resolution.
-
-An object's vectors pass through deconvolutions from 1 x 1 to R x R; the boolean token is joined to the
-feature map there; a convolutional LSTM (Shi et al. 2015) takes the maps one after the other; three 1 x 1
-convolutions turn its last hidden map into colours.
-
-`streaming` draws the whole canvas at once, at the one size it was trained for. `reading` answers samples,
-four a pixel as the language defines.
+`Streaming` draws the whole canvas at once, at the one size it was trained for. An object's vectors pass
+through deconvolutions from 1 x 1 to R x R; the boolean token is joined to the feature map there; a
+convolutional LSTM (Shi et al. 2015) takes the maps one after the other; three 1 x 1 convolutions turn its
+last hidden map into colours.
 """
 
 from __future__ import annotations
@@ -187,7 +182,7 @@ class ConvLSTM(nn.Module):
 
 
 class Level(nn.Module):
-    """What belongs to one resolution: the LSTM cell and the pixel generator."""
+    """The LSTM cell and the pixel generator of one resolution."""
 
     def __init__(self, filters: int) -> None:
         super().__init__()

@@ -1,6 +1,7 @@
 """Parameters of the networks in torch, for training and for drawing on devices.
 
-What it computes is `scenelang.drawing.neural.network`, whose letters are used here. P is its M in training.
+The formulas, and the letters, are those of `scenelang.drawing.neural.network` and of
+`scenelang.drawing.solid.network`. P is M in training.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class Framed(nn.Module, FramedNetwork):
 
 @dataclass(slots=True)
 class Trace:
-    """What `Framed.trace` returns.
+    """Distances, states and colours after each object, from `Framed.trace`.
 
     Args:
         distance: first feature of each object, world units (B, N, P).

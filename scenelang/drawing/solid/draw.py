@@ -140,7 +140,7 @@ ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
 def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1) -> Outputs:
-    """What the pixels of a field of solids show; objects are numbered as the field has them, from 1.
+    """Outputs of a field of solids; objects are numbered as the field has them, from 1.
 
     Alpha is the mean of four samples where it changes from pixel to pixel, the rest is of the centre.
 
@@ -175,7 +175,7 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
 
 
 def _alpha(lighting: Lighting, way: Array) -> tuple[Trail, Array]:
-    """What rays (3, M) from the eye meet, and how much of what is behind objects hide (M,)."""
+    """The trail of rays (3, M) from the eye, and the share of the background that objects hide (M,)."""
     with lighting.xp.inference():
         trail = march(lighting.field, lighting.eye, way, lighting.limit(way))
         return trail, 1 - (trail.hit == INF) * lighting.xp.exp(-EXTINCTION * trail.length)

@@ -1,12 +1,12 @@
 """The solids' field: distances, gradients and colours of objects at points, folded along the stream.
 
-Points meet a part of the objects, so of groups too; what is not met has no effect. A group that begins where
-nothing has been met of what it stands in, and that what it is joined by would show, goes on in that state.
+Each object's frame (`passes.py`) carries points into its own space. There pairs of points and objects meet
+the network together, where the point is in the object's ball; then the cell takes a point's objects in, one
+by one. Each open group of the stream has a state of its own (`States`), and a group's result is taken in as
+an object is.
 
-Each object's frame (`frames.py`) carries points into its own space. There pairs of points and objects meet
-the network together, where the point is in the object's ball (`passes.py`); then the cell takes a point's
-objects in, one by one. Where groups of the stream are open it has a state for each (`stacks.py`), and what
-a group comes to is taken in as an object is.
+A point meets some of the objects, and so some of a group; the others have no effect there. A group that draws
+goes on in the state around it where nothing has been met in that state yet.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Objects:
         """Whether media have different colours."""
 
     def _adding(self) -> Array | None:
-        """Which objects (N,) of groups do not draw but take nothing away, 1 or 0; None without groups."""
+        """A mask (N,), 1 or 0, of objects of groups that neither draw nor take away; None without groups."""
         groups = self.tree
         if not groups.deepest:
             return None
@@ -106,7 +106,7 @@ class Objects:
         return self.xp.array(adding.astype(np.float32), self.network.codes)
 
     def _tables(self, parts: Parts) -> None:
-        """What pairs of points and objects look up: arrays (…, N)."""
+        """Build the tables (…, N) that pairs of points and objects look up."""
         xp, network = self.xp, self.network
         frames, count = [solid.frame for solid in self.solids], len(self.solids)
 
@@ -148,10 +148,10 @@ class Objects:
         ]
 
     def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """What objects wear in place of a colour.
+        """Build the textures of objects that have one in place of a colour.
 
-        In place of a texture's colours theirs is a plain one, unlike any other's, that tells where one
-        object ends and how the light falls.
+        They get a plain colour too, unlike any other's, that stands for the texture where pixels are compared
+        to find outlines and shadows.
         """
         xp, like = self.xp, self.network.codes
         worn = {
@@ -170,7 +170,7 @@ class Objects:
             self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
 
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
-        """What tells distances, and which of them is each object's."""
+        """Build the decoders of distances, and each object's index among them."""
         xp, network = self.xp, self.network
         keys = [
             code.tobytes() if element is None else element
@@ -202,14 +202,14 @@ class Objects:
             for element, s in zip(brought, self.solids, strict=True)
         ]
         self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
-        """1 where `segments.py` may answer."""
+        """1 where the network for whole segments may answer."""
         self.answered = bool(self.asked.sum() > 0)
         """Whether that is so of any."""
         known = len(network.segment_w) and self.answered
         self.segments = [network.segment(code) for code in learned] if known else []
 
     def _alone(self) -> None:
-        """What holds where an object is the first that is met, or the only one."""
+        """Prepare the answers for points that meet one object alone, or meet it first."""
         xp, like, solids = self.xp, self.network.codes, self.solids
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
         cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
@@ -340,7 +340,7 @@ class Objects:
         return d + frame.amount * (s[0] * s[1] * s[2])
 
     def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
-        """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
+        """Decode leaf coordinates (3, P) to distances (1, P), or to these and gradients (4, P)."""
         xp = self.xp
         if len(self.decoders) == 1:
             return self._field(q, self.decoders[0], gradient)
@@ -457,7 +457,7 @@ NOTHING = 10.0  # world units: how far a group with nothing in it is at most for
 
 
 class Meeting(NamedTuple):
-    """What the field answers at points (M,).
+    """Answers of the field at points (M,).
 
     Args:
         distance: D.
@@ -500,7 +500,7 @@ class Pairs(NamedTuple):
 
 
 class Operand(NamedTuple):
-    """What states take in (k,): an object or a group, as of `Meeting`; `look` is a register (R, k or 1)."""
+    """An object or a group for states (k,) to take in, as of `Meeting`; `look` is a register (R, k or 1)."""
 
     distance: Array
     look: Array
@@ -511,7 +511,7 @@ class Operand(NamedTuple):
 
 @dataclass(slots=True)
 class States:
-    """What states carry: distances and registers, and what else is asked for, as of `Meeting`.
+    """Distances and registers of states, and optional values, as of `Meeting`.
 
     Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
     """
@@ -685,7 +685,7 @@ class SolidField(Objects):
         states.memory = _update(xp, states.memory, index, after)
 
     def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
-        """How far (k,) objects with distances d (k,) leave the kind of material as it is."""
+        """Distances (k,) within which objects at d (k,) leave the kind of material as it is."""
         xp, gap = self.xp, abs(d)
         if self.smooth is not None:
             blend = xp.minimum(gap, abs(before[0] - d) / 2)
@@ -694,7 +694,7 @@ class SolidField(Objects):
         return xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
 
     def inside(self, passes: Passes, t: Array) -> Array:
-        """Which balls (K, M) points at t (M,) are in, of objects that change something there."""
+        """A mask of balls (K, M) around the points at t (M,), of objects that change something there."""
         inside = (passes.slots[BEGIN] <= t) & (t <= passes.slots[END])
         if not self.draws:  # the others change only what is there
             touched = inside[0] & ~inside[0]

@@ -1,7 +1,7 @@
 """Light on solids: surfaces, ground, sky and media as rays from the eye see them.
 
-The light is computed, as the language defines it; what is learned is where things are and what they look
-like. Colours are linear. Letters as in `network.py`.
+The light is computed, as the language defines it; places and colours of solids are learned. Colours are
+linear. Letters as in `network.py`.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Lookups:
         return result.reshape(3, 4, -1).mean(1)
 
     def along(self, way: Array, trail: Trail, pieces: Piece, px: float) -> Iterator[tuple[Array, int, Array]]:
-        """Of pieces of rays in media with textures which they are, a node and what `_woven` gives for it.
+        """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there.
 
         Args:
             way: of the rays (3, M).
@@ -146,7 +146,7 @@ CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents o
 
 
 class Shade(NamedTuple):
-    """What M rays see.
+    """Light along M rays.
 
     Args:
         radiance: premultiplied and linear (3, M).
@@ -198,7 +198,7 @@ class Lighting:
         self.lookups = Lookups(field, stage.camera, pace.nodes)
 
     def shade(self, way: Array, px: float = 0.0) -> Shade:
-        """What rays from the eye see.
+        """Light along rays from the eye.
 
         Args:
             way: unit directions (3, M).
@@ -274,7 +274,7 @@ class Lighting:
         return glow, work
 
     def limit(self, way: Array) -> Array:
-        """How far rays from the eye go before they meet the ground (M,), inf for ever."""
+        """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
         xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
         if ground is None or eye[1] <= ground.y:
             return never
@@ -347,7 +347,7 @@ class Lighting:
         return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met, lost=trail.lost)
 
     def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
-        """Where rays meet solids, and normals (3, K), colours, and light that joins in before (R, K)."""
+        """Points where rays meet solids, normals (3, K), colours, and light from before them (R, K)."""
         xp = self.xp
         t = xp.take(trail.hit, index)
         passes = trail.at(self.xp, index)
@@ -377,7 +377,7 @@ class Lighting:
         return p, n, colour, 0 * colour
 
     def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
-        """How much farther rays meet the surface than where the field was asked."""
+        """Distance along rays from the points where the field was asked to the surface."""
         xp, d, g = self.xp, found.distance, found.gradient
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
@@ -456,7 +456,7 @@ class Lighting:
 
 
 def _steps(trail: Trail) -> int:
-    """Of rays from the light to what rays from the eye met."""
+    """Steps of the rays from the light to the points that rays from the eye met."""
     return HASTY if trail.lost else STEPS
 
 

@@ -3,8 +3,8 @@
 The three-dimensional companion of `frames.py`: maps, turns of space and what bounds them, none of it learned.
 Points are arrays (3, M).
 
-A ray has a slot for each ball that it passes, so that what follows costs what the balls along a ray do,
-however many objects the scene has. What cuts all that lies outside of it is met wherever that may be.
+A ray has a slot for each ball that it passes, so that its cost depends on those balls alone, however many
+objects the scene has. An object that cuts away everything outside of it is met wherever something may be.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Turn(NamedTuple):
         return self
 
     def stretch(self, radius: float) -> float:
-        """How much longer it makes a small step at most, in the ball of a radius about the origin.
+        """Greatest factor by which it lengthens a small step, in the ball of a radius about the origin.
 
         The turn's derivative is a rotation times ``1 + u v^T``, u the point turned by a right angle in the
         plane of the turn and v the angle's gradient: with m = |u| |v| and c = u . v the larger singular
@@ -306,7 +306,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
 
 
 def showing(groups: Groups) -> Mask:
-    """Whether rows may show something that was empty before (1 + D, N): at all, and in their groups."""
+    """A mask (1 + D, N) of rows that may show something where it was empty: at all, and in their groups."""
     shows = np.isin(groups.tokens, (UNION, SMOOTH))
     inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
     return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
@@ -388,7 +388,7 @@ class Passes(NamedTuple):
     origins: Array
 
     def at(self, xp: Arrays, index: Array) -> Passes:
-        """Those of some of the rays."""
+        """Passes of some of the rays."""
         return Passes(xp.take(self.slots, index), self.origins)
 
 
@@ -401,7 +401,7 @@ def find_passes(
     limit: Array,
     tight: bool = True,
 ) -> tuple[Array, Passes]:
-    """Which of M rays (k,) may meet something that draws, and the balls that these pass.
+    """Indices (k,) of rays that may meet something that draws, and the balls that these pass.
 
     Args:
         xp: functions of the arrays' library.
@@ -447,7 +447,7 @@ def find_passes(
 def _crossed(
     xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array, tight: bool
 ) -> tuple[Array, Array]:
-    """Which rays (k,) pass an object's ball between low and high, and their slots (SLOT, k) for it."""
+    """Indices (k,) of rays that pass an object's ball between low and high, and their slots (SLOT, k)."""
     near, to = None, solid.centre - origin
     far = float(xp.sqrt(to @ to))
     if far > solid.extent:  # rays within a cone around the ball
@@ -470,7 +470,7 @@ def _crossed(
 
 
 def placed(xp: Arrays, index: Array, like: Array) -> Array:
-    """Where in an index each of M entries is, -1 for those that are not; `like` are integers (M,)."""
+    """Positions (M,) of entries in an index, -1 for those that are not in it; `like` are integers (M,)."""
     result = 0 * like - 1
     xp.put(result, index, xp.whole(0 * index + 1).cumsum(0) - 1)
     return result
