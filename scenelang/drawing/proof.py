@@ -48,10 +48,12 @@ from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
 from scenelang.drawing.neural.meetings import (
     Index,
+    Interval,
     Mask,
     Meetings,
     Nesting,
     Pairs,
+    State,
     Turn,
     flat_nesting,
     meetings_of,
@@ -162,13 +164,6 @@ Floats = npt.NDArray[np.float64]
 NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
 
 
-class Enclosure(NamedTuple):
-    """Numbers from ``low`` to ``high``."""
-
-    low: Floats
-    high: Floats
-
-
 class Enclosed(NamedTuple):
     """Facts that are certain of regions.
 
@@ -177,7 +172,7 @@ class Enclosed(NamedTuple):
         left: (P,) objects that may change what is shown.
     """
 
-    shown: Enclosure
+    shown: Interval
     left: Mask
 
 
@@ -201,8 +196,8 @@ class Joins(NamedTuple):
 
 def enclosed(
     meetings: Meetings,
-    distance: Enclosure,
-    colour: Enclosure,
+    distance: Interval,
+    colour: Interval,
     joins: Joins,
     behind: Floats,
     nest: Nesting | None = None,
@@ -222,17 +217,15 @@ def enclosed(
     shut, opened = np.empty((2, pairs), bool)
     if nest is None:
         nest = flat_nesting(meetings)
-    state = _State.empty(count * nest.levels)
+    state, operands = _Exact.empty(NOTHING, count * nest.levels, np.float64), State(distance, colour)
 
     def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
-        part = turn.part
-        own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
-        return state.join(places, *own, joins.some(part), turn.fresh)
+        return state.join(places, operands.at(turn.part), joins.some(turn.part), turn.fresh)
 
     def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
         assert groups is not None
-        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(ended), bool))
-        state.clear(top)
+        joined = state.join(below, state.at(top), groups.some(ended), np.zeros(len(ended), bool))
+        state.clear(top, NOTHING)
         return joined
 
     nest.fold(count, shut, opened, pair, group)
@@ -240,43 +233,25 @@ def enclosed(
     if len(behind) > 3:
         first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
     back = behind[:, None]
-    shown = Enclosure(
+    shown = Interval(
         np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
         np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
     )
     return Enclosed(shown, ~shut)
 
 
-class _State(NamedTuple):
-    """Distances (B,) and colours (3, B) of a fold."""
+class _Exact(State):
+    """States of the exact fold."""
 
-    distance: Enclosure
-    colour: Enclosure
-
-    @classmethod
-    def empty(cls, count: int) -> _State:
-        return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
-
-    def at(self, columns: Index | slice) -> tuple[Enclosure, Enclosure]:
-        """Return distances and colours in some columns."""
-        return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
-
-    def clear(self, columns: Index | slice) -> None:
-        """Empty it in some columns."""
-        for side, colour in zip(self.distance, self.colour, strict=True):
-            side[columns], colour[:, columns] = NOTHING, 0.0
-
-    def join(
-        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins, fresh: Mask
-    ) -> tuple[Mask, Mask]:
+    def join(self, columns: Index | slice, operand: State, how: Joins, fresh: Mask) -> tuple[Mask, Mask]:
         """Take in n operands, ``fresh`` ones as they are; which change nothing, which leave nothing else."""
-        (d, e), (token, k, free) = distance, how
+        (d, e), (token, k, free) = operand.distance, how
         a, b = self.distance.low[columns].copy(), self.distance.high[columns].copy()
         union = token == UNION
         # the object's share of the colour; of a union all or none
         some = union & ((e < np.maximum(a, 0.0)) | (free & (a >= 0.0)))
         most = union & (some | ((d < np.maximum(b, 0.0)) & ~(free & (d >= 0.0))))
-        shares: tuple[Floats, Floats] = some.astype(float), most.astype(float)
+        shares = some.astype(float), most.astype(float)
         ends = np.minimum(a, d), np.minimum(b, e)
         closed, wide = d >= np.where(free, 0.0, np.maximum(b, 0.0)), e < np.where(free, 0.0, a)
         if (which := token == SMOOTH).any():
@@ -298,10 +273,7 @@ class _State(NamedTuple):
             ends, shares = _chosen(fresh, (d, e), ends), _chosen(fresh, (1.0, 1.0), shares)
             closed, wide = closed & ~fresh, wide | fresh
         self.distance.low[columns], self.distance.high[columns] = ends
-        for side, choose, own in zip(self.colour, (np.minimum, np.maximum), colour, strict=True):
-            now = side[:, columns]
-            more = own - now
-            side[:, columns] = now + choose(shares[0] * more, shares[1] * more)
+        self.paint(columns, operand.colour, Interval(*shares))
         return closed, wide
 
 
@@ -346,7 +318,7 @@ class Errors:
         self._layers = layers
         self._low, self._high = (np.asarray(side, np.float64) for side in (low, high))
 
-    def exact(self, q: Floats) -> Enclosure:
+    def exact(self, q: Floats) -> Interval:
         """The exact distance (M,) at leaf coordinates (2, M), leaf units, by the learned one."""
         length = np.sqrt(q[0] * q[0] + q[1] * q[1])
         beyond = np.maximum(length - RADIUS, 0.0)
@@ -354,7 +326,7 @@ class Errors:
         parts = [seen[:, at : at + _CHUNK] for at in range(0, seen.shape[1], _CHUNK)]
         learned = np.concatenate([NUMPY.perceptron(part, self._layers)[0] for part in parts])
         x, y = ((seen + RADIUS) * (CELLS / (2 * RADIUS))).astype(np.intp).clip(0, CELLS - 1)
-        return Enclosure(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
+        return Interval(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
 
 
 def errors_path(name: str) -> Path:
@@ -447,7 +419,7 @@ class Stream:
         sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
         return float((sides[0] * sides[1]).sum())
 
-    def distance(self, which: Index, q: Floats, exactly: bool) -> Enclosure:
+    def distance(self, which: Index, q: Floats, exactly: bool) -> Interval:
         """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
 
         Args:
@@ -462,15 +434,15 @@ class Stream:
             p = q[:, some]
             if name in self.unknown:
                 length = np.hypot(*p)
-                result = Enclosure(length - 1, length + 1)
+                result = Interval(length - 1, length + 1)
             elif exactly:
-                result = Enclosure(*[leaf_distance(name, p)] * 2)
+                result = Interval(*[leaf_distance(name, p)] * 2)
             else:
                 result = self._known[name].exact(p)
             low[some], high[some] = result
-        return Enclosure(low, high)
+        return Interval(low, high)
 
-    def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
+    def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
         """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
         low, high = self._plain[:, which], self._plain[:, which]
         for at in np.unique(which[self._painted[which]]).tolist():
@@ -479,7 +451,7 @@ class Stream:
             if sampled:
                 seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
-        return Enclosure(low, high)
+        return Interval(low, high)
 
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
@@ -505,12 +477,12 @@ class Band:
         )
         self._every = np.empty((2, grid.high // 2, grid.wide // 2, len(behind)))
         self._every[:] = behind
-        self.shown = Enclosure(*self._every[:, : len(rows), :width])
+        self.shown = Interval(*self._every[:, : len(rows), :width])
         pairs = grid.reached(stream.frames, self._reach)
         for side in SIDES[:-1]:
             columns, shown, pairs = self._looked(pairs, side)
             known = (shown.high - shown.low).max(0) <= FLAT
-            self._write(columns[known], Enclosure(shown.low[:, known], shown.high[:, known]), side)
+            self._write(columns[known], Interval(shown.low[:, known], shown.high[:, known]), side)
             done = np.zeros(grid.wide * grid.high // side**2, bool)
             done[columns[known]] = True
             pairs = pairs.take(~done[pairs.block])
@@ -526,7 +498,7 @@ class Band:
         self._pixels = self._pixels.take(every.ravel()[self._pixels.block])
         self._sampled(exactly=True)
 
-    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Enclosure, Pairs]:
+    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Interval, Pairs]:
         """Regions, what they show (K, B), and the pairs that have to be asked again."""
         stream, grid = self._stream, self._grid
         place, half = np.stack(grid.place(pairs.block, side)), (side - 1) / 2
@@ -542,7 +514,7 @@ class Band:
         exact, colour = stream.distance(thing, q, exactly), stream.colour(thing, q, side == 1)
         # what is not a number bounds nothing
         low = np.fmax((exact.low - radius) * scale, -NOTHING)
-        world_distance = Enclosure(low, np.fmin((exact.high + radius) * scale, NOTHING))
+        world_distance = Interval(low, np.fmin((exact.high + radius) * scale, NOTHING))
         joins, nest = stream.joins.some(thing), None
         if stream.groups.deepest:
             nest = nesting(meetings, stream.groups)
@@ -553,7 +525,7 @@ class Band:
         left[source] = told.left
         return meetings.columns, told.shown, pairs.take(left)
 
-    def _write(self, region: Index, shown: Enclosure, side: int) -> None:
+    def _write(self, region: Index, shown: Interval, side: int) -> None:
         x, y = self._grid.place(region, side)
         for every, values in zip(self._every, shown, strict=True):
             shape = self._grid.high // side, side // 2, -1, side // 2, len(self._behind)
@@ -629,7 +601,7 @@ def prove_image(
     return image, Proof(bound, redrawn, stream.unknown)
 
 
-def _off(drawn: Floats, shown: Enclosure) -> Floats:
+def _off(drawn: Floats, shown: Interval) -> Floats:
     """Greatest difference of pixels (H, W, K) from an enclosed picture, over their channels."""
     far = np.maximum(shown.high - drawn, drawn - shown.low)
     worst = far[..., 0]

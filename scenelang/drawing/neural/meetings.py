@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -273,14 +273,41 @@ def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> li
 
 
 Floats32 = npt.NDArray[np.float32]
-Columns = npt.NDArray[np.intp]
 
 
 class Interval(NamedTuple):
-    """Numbers from ``low`` to ``high``."""
+    """Numbers from ``low`` to ``high``, float32 or float64."""
 
-    low: Floats32
-    high: Floats32
+    low: npt.NDArray[Any]
+    high: npt.NDArray[Any]
+
+
+class State(NamedTuple):
+    """Intervals of distances (B,) and colours (3, B): of the states of a fold, or of operands."""
+
+    distance: Interval
+    colour: Interval
+
+    @classmethod
+    def empty(cls, distance: float, count: int, dtype: npt.DTypeLike = np.float32) -> Self:
+        """States before the first object, whose distance is given."""
+        return cls(Interval(*np.full((2, count), distance, dtype)), Interval(*np.zeros((2, 3, count), dtype)))
+
+    def at(self, columns: Index | slice) -> Self:
+        """Select some columns."""
+        return type(self)(*(Interval(low[..., columns], high[..., columns]) for low, high in self))
+
+    def clear(self, columns: Index | slice, distance: float) -> None:
+        """Empty some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = distance, 0.0
+
+    def paint(self, columns: Index | slice, colour: Interval, share: Interval) -> None:
+        """Move the colours of some columns towards others (3, n), by shares (n,) of the way."""
+        for side, own, choose in zip(self.colour, colour, (np.minimum, np.maximum), strict=True):
+            now = side[:, columns]
+            more = own - now
+            side[:, columns] = now + choose(share.low * more, share.high * more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,28 +347,25 @@ def shown(
         joins: cells of these groups, which come last.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _State.empty(empty, blocks * (1 if nest is None else nest.levels))
+    state = _Learned.empty(empty, blocks * (1 if nest is None else nest.levels))
     shut, wide = np.zeros((2, len(given)), bool)
+    operands = State(distance, colours)
     if nest is None or joins is None:
         gates = _Gates.of(cell, distance, given)
         for part in meetings.slots():
-            own = _Operand(
-                Interval(distance.low[part], distance.high[part]),
-                Interval(colours.low[:, part], colours.high[:, part]),
-            )
-            shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
+            columns = slice(part.stop - part.start)
+            shut[part], wide[part] = state.join(columns, operands.at(part), gates.some(part))
         wide |= given
     else:
         fresh = np.concatenate([turn.fresh for turn in nest.turns])
         gates = _Gates.of(cell, distance, given | fresh)
 
-        def pair(turn: Turn, places: Columns | slice) -> tuple[Mask, Mask]:
+        def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
             part = turn.part
-            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
-            keeps, hides = state.join(places, own, gates.some(part))
+            keeps, hides = state.join(places, operands.at(part), gates.some(part))
             return keeps, hides | given[part]
 
-        def group(top: Columns | slice, below: Columns | slice, ended: Columns) -> tuple[Mask, Mask]:
+        def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
             operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
             joined = state.join(
                 below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool))
@@ -380,7 +404,7 @@ class _Gates(NamedTuple):
         own.low[:, given] = own.high[:, given] = np.inf
         return cls(cell, own, up[:, 1], down[:, 1], given)
 
-    def some(self, which: slice | Columns) -> _Gates:
+    def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
         lines, bias, candidate, bump = self.cell
         return _Gates(
@@ -392,37 +416,10 @@ class _Gates(NamedTuple):
         )
 
 
-class _Operand(NamedTuple):
-    """Operand of a state in n columns: its distance (n,) and colour (3, n)."""
+class _Learned(State):
+    """States of the learned fold."""
 
-    distance: Interval
-    colour: Interval
-
-
-class _State(NamedTuple):
-    """Distances (B,) and colours (3, B) of a fold."""
-
-    distance: Interval
-    colour: Interval
-
-    @classmethod
-    def empty(cls, distance: float, count: int) -> _State:
-        return cls(
-            Interval(*np.full((2, count), distance, np.float32)),
-            Interval(*np.zeros((2, 3, count), np.float32)),
-        )
-
-    def at(self, columns: Columns | slice) -> _Operand:
-        """Return its distances and colours in some columns, as an operand."""
-        parts = ((low[..., columns], high[..., columns]) for low, high in self)
-        return _Operand(*(Interval(*part) for part in parts))
-
-    def clear(self, columns: Columns | slice, distance: float) -> None:
-        """Empty it in some columns."""
-        for side, colour in zip(self.distance, self.colour, strict=True):
-            side[columns], colour[:, columns] = distance, 0.0
-
-    def join(self, columns: Columns | slice, operand: _Operand, gates: _Gates) -> tuple[Mask, Mask]:
+    def join(self, columns: Index | slice, operand: State, gates: _Gates) -> tuple[Mask, Mask]:
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
@@ -443,10 +440,7 @@ class _State(NamedTuple):
         self.distance.high[columns] = np.maximum(
             np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
         ) - np.minimum(dent, 0.0)
-        for side, c, choose in zip(self.colour, own_colour, (np.minimum, np.maximum), strict=True):
-            now = side[:, columns]
-            more = c - now
-            side[:, columns] = now + choose(paint.low * more, paint.high * more)
+        self.paint(columns, own_colour, paint)
         return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
 
 
