@@ -6,7 +6,7 @@ along the last axis, M. Functions leave their arguments as they are; `put`, `add
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import Any, ClassVar
@@ -156,6 +156,18 @@ class Arrays:
 
     def one_core(self) -> None:
         """Have this thread compute each operation on one core."""
+
+    def each(self, threads: int, work: Callable[[Any], object], items: Sequence[Any]) -> None:
+        """Call ``work`` on each item, in so many threads if there is more than one item."""
+        if threads == 1 or len(items) == 1:
+            for item in items:
+                work(item)
+            return
+        from concurrent.futures import ThreadPoolExecutor
+
+        # every worker computes on one core; torch would otherwise split each small product again
+        with ThreadPoolExecutor(threads, initializer=self.one_core) as pool:
+            list(pool.map(work, items))
 
 
 NUMPY = Arrays()

@@ -604,7 +604,7 @@ def prove_image(
 def _off(drawn: Floats, shown: Interval) -> Floats:
     """Greatest difference of pixels (H, W, K) from an enclosed picture, over their channels."""
     far = np.maximum(shown.high - drawn, drawn - shown.low)
-    worst = far[..., 0]
+    worst: Floats = far[..., 0]
     for channel in range(1, far.shape[-1]):
         worst = np.maximum(worst, far[..., channel])
     return worst + ROUNDING

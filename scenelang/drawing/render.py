@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenelang.compiler.program import Place, Program
     from scenelang.drawing.exact.mesh import Shape
     from scenelang.drawing.image import Image
-    from scenelang.drawing.neural.draw import Drawing, Kept
+    from scenelang.drawing.neural.draw import Drawing, Run
 
 
 def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[str, Shape]]:
@@ -72,9 +72,7 @@ def draw(
     how: How = DEFAULT,
     *,
     place: str | None = None,
-    split: int | None = None,
-    kept: Kept | None = None,
-    progress: Callable[[float], None] | None = None,
+    **run: Unpack[Run],
 ) -> Drawing:
     """Draw a Program by the library that fits.
 
@@ -82,14 +80,12 @@ def draw(
         how: with a backend that draws Programs.
         place: ``"numpy"`` or a torch device; by default numpy for solids and small pictures, else
             ``how.device``.
-        split: threads that the picture is split for, which shows in the last bits; by default as many as
-            draw.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        progress: called with the share done, in [0, 1], from any thread.
+        **run: ``split``, ``kept`` and ``progress``, as of `Run`.
 
     Raises:
         RenderError: as `render`.
     """
+    run = {"threads": how.threads, **run, **how.care}
     if place is None:
         from scenelang.drawing.small import choose_drawer
 
@@ -98,16 +94,11 @@ def draw(
     if place == "numpy":
         from scenelang.drawing.small import draw_small
 
-        exact = how.backend == "exact"
-        return draw_small(
-            program, threads=how.threads, split=split, kept=kept, progress=progress, exact=exact, **how.care
-        )
+        return draw_small(program, exact=how.backend == "exact", **run)
     from scenelang.drawing.torch_backend import choose_device, draw_program, open_model
 
     model = open_model(program.model, choose_device(place), program.weights)
-    return draw_program(
-        program, model, threads=how.threads, split=split, kept=kept, progress=progress, **how.care
-    )
+    return draw_program(program, model, **run)
 
 
 def render(

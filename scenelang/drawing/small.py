@@ -8,7 +8,7 @@ measured while drawing: the same Program is always drawn by the same library.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, Unpack
 
@@ -23,9 +23,9 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError
 from scenelang.drawing.closed import field_of
-from scenelang.drawing.how import Care, Device, RenderError, Samples, keep_memory, threads_for
+from scenelang.drawing.how import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.drawing.image import Image
-from scenelang.drawing.neural.draw import Drawing, Kept, draw_objects
+from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
 
@@ -133,24 +133,13 @@ def work_ms(program: Program, samples: Samples = "adaptive") -> float:
     return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
 
 
-def draw_small(
-    program: Program,
-    *,
-    kept: Kept | None = None,
-    progress: Callable[[float], None] | None = None,
-    threads: int | None = None,
-    split: int | None = None,
-    exact: bool = False,
-    **care: Unpack[Care],
-) -> Drawing:
+def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:
     """Draw a Program by numpy, on one core, or solids, if they are large, on several.
 
     Args:
         program: of any size, for a model with a framed or a solids' network.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        threads, split: of solids, as for `scenelang.drawing.torch_backend.draw_program`.
         exact: ask formulas in place of the network.
-        **care: ``samples``, as of `How`.
+        **run: as of `Run`; ``threads`` and ``split`` are those of solids.
 
     Raises:
         RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
@@ -160,16 +149,9 @@ def draw_small(
     try:
         network = field_of(program, exact)
         if program.stage is None:
-            threads = split = 1
-        drawing = draw_objects(
-            network,
-            program,
-            threads=threads or threads_for(program.canvas),
-            split=split,
-            kept=kept,
-            progress=progress,
-            **care,
-        )
+            run |= {"threads": 1, "split": 1}
+        run["threads"] = run.get("threads") or threads_for(program.canvas)
+        drawing = draw_objects(network, program, **run)
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None
     drawing.image.credit = credit_of(program.elements)

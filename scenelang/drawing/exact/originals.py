@@ -60,8 +60,8 @@ def brought(
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
     result, notes = solids.read_solids(data, suffix, files)
-    made = solid_parts(result, name, sign, bool(apart))
-    return made._replace(notes=(*made.notes, *notes))
+    shapes = solid_parts(result, name, sign, bool(apart))
+    return shapes._replace(notes=(*shapes.notes, *notes))
 
 
 def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
@@ -85,22 +85,22 @@ def said(text: str) -> str:
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in text).strip("_")
 
 
-def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
+def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
     """Shapes of a file of meshes.
 
     Args:
         name: of the whole.
         apart: whether its solids are elements of their own.
     """
-    whole = solids.whole(found, sign)
-    if not apart or len(found) < 2:
+    whole = solids.whole(parts, sign)
+    if not apart or len(parts) < 2:
         return Brought({name: whole}, {}, _alone(name, whole), whole.notes)
-    _few(len(found))
+    _few(len(parts))
     shapes: dict[str, Shape] = {}
     numbers = {}
     firsts: list[tuple[Solid, Mesh, str]] = []
     group = []
-    for number, solid in enumerate(found, 1):
+    for number, solid in enumerate(parts, 1):
         mesh = solids.whole([solid], sign)
         rows, centre, size = np.eye(3), np.array(mesh.centre), mesh.size
         for first, like, called in firsts:  # noqa: B007, a copy goes by the first one's name

@@ -29,9 +29,7 @@ FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 1
 CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
 ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
-ROUNDED = (
-    3  # from a cut to the cell of one with a width: a smooth union's, and two cuts', stand behind the four
-)
+ROUNDED = 3  # from the index of a cut to that of the same cut with a rounded edge, see `rounded`
 _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
 
@@ -61,7 +59,7 @@ class Trace:
             rest *= 1.0 - paint
         return result
 
-    def _nested(self, nest: Nesting, seen: Array, found: Array) -> Array:
+    def _nested(self, nest: Nesting, seen: Array, result: Array) -> Array:
         left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
         rounds = iter(reversed(self.joined))
 
@@ -79,10 +77,10 @@ class Trace:
             for at in np.unique(level).tolist():
                 some = np.flatnonzero(level == at)
                 rest = left[at][:, some]
-                found[:, part.start + some] = rest * paint[:, some]
+                result[:, part.start + some] = rest * paint[:, some]
                 left[at][:, some] = rest * (1.0 - paint[:, some])
             opened(before)
-        return found
+        return result
 
 
 class Field:

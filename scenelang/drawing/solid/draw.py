@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import INF
 
 TILE = 1 << 16  # samples at a time
+QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
 PACES = {"quick": Pace(0.04, 2, 0.15), "one": Pace(0.04, 2)}
 """How carefully solids are drawn by ways to sample them; the others are `CAREFUL`."""
 
@@ -63,12 +63,7 @@ def draw_solids(
         if progress is not None:
             progress(len(costs) / len(bands))
 
-    if threads == 1 or len(bands) == 1:
-        for band in bands:
-            one(band)
-    else:
-        with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
-            list(pool.map(one, bands))
+    field.xp.each(threads, one, bands)
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     return from_light(out, stage.transparent), sum(costs, Work())
@@ -93,8 +88,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
-        quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
-        four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
+        four, more = _shade(lighting, canvas, x[:, None] + QUARTER[0], y[:, None] + rows.start + QUARTER[1])
         picture[:, y, x] = four[:4].mean(2)
         work += more + Work(refined=len(x))
     return picture, work
@@ -161,16 +155,14 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
 
     def four(start: int) -> None:
         at = slice(start, start + TILE // 4)
-        way = directions(stage.camera, canvas, across[at, None] + quarter[0], down[at, None] + quarter[1])
+        way = directions(stage.camera, canvas, across[at, None] + QUARTER[0], down[at, None] + QUARTER[1])
         alpha = _alpha(lighting, way.reshape(3, -1))[1]
         result[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
 
     x_centres = np.arange(width) + 0.5
-    quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
-    with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
-        list(pool.map(row, range(0, height, every)))
-        down, across = np.nonzero(rough(result[5:]))
-        list(pool.map(four, range(0, len(down), TILE // 4)))
+    field.xp.each(threads, row, range(0, height, every))
+    down, across = np.nonzero(rough(result[5:]))
+    field.xp.each(threads, four, range(0, len(down), TILE // 4))
     return Outputs(result[0], np.moveaxis(result[1:4], 0, 2), result[4].astype(np.int32), result[5])
 
 

@@ -376,9 +376,9 @@ class Lighting:
                 xp.put(colour[:3], some, mean)
         return p, n, colour, 0 * colour
 
-    def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
+    def _ahead(self, met: Meeting, way: Array, index: Array | None) -> Array:
         """Distance along rays from the points where the field was asked to the surface."""
-        xp, d, g = self.xp, found.distance, found.gradient
+        xp, d, g = self.xp, met.distance, met.gradient
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
         towards = _dot(g, way)

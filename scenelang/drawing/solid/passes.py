@@ -207,8 +207,9 @@ def _map(frame: np.ndarray) -> Map:
     return Map(rows[:, :3], rows[:, 3])
 
 
-def _single(found: Map) -> Map:
-    return Map(found.linear.astype(np.float32), found.shift.astype(np.float32))
+def _single(wide: Map) -> Map:
+    """A map in float32."""
+    return Map(wide.linear.astype(np.float32), wide.shift.astype(np.float32))
 
 
 def _turns(slots: np.ndarray) -> list[Turn]:
