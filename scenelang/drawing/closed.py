@@ -40,7 +40,7 @@ class ExactShape:
         return self.row.distance(q)
 
     def rise(self, q: Floats, radius: Floats) -> Floats:
-        """By how much distances (M,) at leaf coordinates (2, M) differ at most from those within radii."""
+        """Greatest difference (M,) of distances at leaf coordinates (2, M) from those within radii (M,)."""
         return radius
 
 

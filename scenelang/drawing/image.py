@@ -37,7 +37,7 @@ DEEP = 0.01
 """World units in a medium where its object is asked for, where it is as deep."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PROVED = 1 / 255
-"""Of a channel: a pixel that is proved to be so near the exact one counts as right."""
+"""Greatest error of a channel in a pixel that counts as proved right."""
 Floats = npt.NDArray[np.float32]
 Source = dict[str, str | int]
 """An object's ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
@@ -194,15 +194,17 @@ class Outputs:
             ValueError: a format that cannot hold them, or what writes it is not installed.
             OSError: a file cannot be written.
         """
-        path, facts = Path(path), [self.facts(name) for name in self.names]
-        files = [output_file(path, name) for name in self.names]
+        contents = self.packed(path := Path(path))  # all, before any is written
+        for file, data in contents.items():
+            (write_output if file == path else write_whole)(file, data)
+        return list(contents)
+
+    def packed(self, path: Path, layers: Mapping[str, Floats] | None = None) -> dict[Path, bytes]:
+        """Contents of the files of `save`, with further ``layers`` in an EXR; raises as that does."""
+        files = {output_file(path, name): name for name in self.names}
         if path in files:
-            write_output(path, exr(self.layers(), facts))
-            return [path]
-        pictures = [self.png(name) for name in self.names]  # all, before any is written
-        for file, data in zip(files, pictures, strict=True):
-            write_whole(file, data)
-        return files
+            return {path: exr({**(layers or {}), **self.layers()}, [self.facts(name) for name in self.names])}
+        return {file: self.png(name) for file, name in files.items()}
 
     def layers(self) -> dict[str, Floats]:
         """The channels of an EXR."""
@@ -332,12 +334,8 @@ def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
     Raises:
         ValueError: their format cannot hold them.
     """
-    files = [output_file(path, name) for name in outputs.names]
-    if path in files:
-        facts = [outputs.facts(name) for name in outputs.names]
-        return {path: exr({**image.layers(), **outputs.layers()}, facts)}
-    pictures = {file: outputs.png(name) for file, name in zip(files, outputs.names, strict=True)}
-    return {path: image.encode(image_format(path)), **pictures}
+    contents = outputs.packed(path, image.layers())
+    return contents if path in contents else {path: image.encode(image_format(path)), **contents}
 
 
 def save_outputs(image: Image, outputs: Outputs, path: Path) -> list[Path]:

@@ -488,7 +488,7 @@ class Band:
             pairs = pairs.take(~done[pairs.block])
             if side > 2:
                 pairs = pairs.split(grid.wide // side, 2)
-        self._pixels = pairs  # those that are told by their samples
+        self._pixels = pairs  # pixels that are drawn by their samples
         self._sampled(exactly=False)
 
     def draw(self, wanted: Mask) -> None:
@@ -520,10 +520,10 @@ class Band:
             nest = nesting(meetings, stream.groups)
         else:
             joins = joins._replace(free=~blended(meetings, stream.rounds[thing]))
-        told = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
+        result = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
         left = np.empty(len(pairs), bool)
-        left[source] = told.left
-        return meetings.columns, told.shown, pairs.take(left)
+        left[source] = result.left
+        return meetings.columns, result.shown, pairs.take(left)
 
     def _write(self, region: Index, shown: Interval, side: int) -> None:
         x, y = self._grid.place(region, side)

@@ -87,7 +87,7 @@ _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 `python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
-"""Of that, what other ways to sample take."""
+"""Shares of that for other ways to sample."""
 
 
 class Drawer(NamedTuple):

@@ -369,5 +369,5 @@ def _carried(steps: tuple[Step, ...], centre: Array, radius: float) -> tuple[Arr
 
 @lru_cache(maxsize=1 << 12)
 def _stretch(step: Affine) -> float:
-    """By how much the way back through an affine map lengthens at most."""
+    """Greatest factor by which the way back through an affine map lengthens."""
     return float(np.linalg.norm(frame_back(step, 2)[:, :2], 2))

@@ -381,9 +381,13 @@ def mesh_of(
         notes.append("inside out, turned")
         mesh.invert()
         look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
-    told = "normals" if by_normals else "winding numbers"
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
-    notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {told}"]
+    notes = [
+        plural(len(mesh.faces), "triangle"),
+        kind,
+        *notes,
+        f"inside by {'normals' if by_normals else 'winding numbers'}",
+    ]
     return Mesh(
         np.ascontiguousarray(mesh.vertices, float),
         np.ascontiguousarray(mesh.faces, np.int64),
@@ -396,9 +400,7 @@ def mesh_of(
 
 
 MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
-_MOST_PIECES: Final = (
-    10_000  # objects, groups and changes of material of a file; nodes and primitives of glTF
-)
+_MOST_PIECES: Final = 10_000  # objects, groups and changes of material; nodes and primitives of glTF
 _MOST_CORNERS: Final = 1000  # of a face
 _MOST_DEPTH: Final = 100  # of nodes within nodes
 _MOST_NUMBERS: Final = 10 * MOST_TRIANGLES  # elements of all accessors, which may be more than their bytes

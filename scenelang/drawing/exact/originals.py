@@ -207,18 +207,18 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     if not file or not digest or folder is None:
         raise FitError(f"the exact shape of `{name}` is not known: it does not say what it was made from")
     path = Path(folder, file)
-    made = f"`{name}` was made from `{file}`"
+    origin = f"`{name}` was made from `{file}`"
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         ships = library.owns(Path(folder, file).resolve())
         means = ", which `python -m lab docs meshes` of the repository makes" if ships else ""
         raise FitError(
-            f"{made}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
+            f"{origin}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
         )
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
     shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)
     if shape is None:
-        raise FitError(f"{made}, and `{path}` is another file of that name")
+        raise FitError(f"{origin}, and `{path}` is another file of that name")
     return shape
 
 

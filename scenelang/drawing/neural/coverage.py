@@ -35,7 +35,7 @@ from scenelang.drawing.neural.meetings import (
 from scenelang.drawing.neural.network import RADIUS
 
 QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
-"""Where the samples of a pixel lie (2, 4), pixels from its centre."""
+"""Places of a pixel's samples (2, 4), pixels from its centre."""
 CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
 NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
 LEAST = 1e-4  # of a colour, that counts as part of what a point shows

@@ -80,7 +80,7 @@ def _learned(x, y, weights, WIDTH: tl.constexpr):
     # in float32: TF32, the default, would be off by up to 0.002
     hidden = tl.dot(hidden, inner, input_precision="ieee") + tl.load(weights + unit)[None, :]
     result = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
-    far = tl.load(weights + 2 * WIDTH + 1)
+    far = tl.load(weights + 2 * WIDTH + 1)  # behind the last layer's weights and its bias
     return result + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
 
 
@@ -117,7 +117,8 @@ def _texture(x, y, numbers, steps, high, wide):
     """Colours of a picture, which repeats: numbers are a map, steps of colour, and three planes of texels."""
     u, v = _affine(x, y, numbers)
     numbers += 6
-    nodes = numbers + 4 * steps
+    nodes = numbers + 4 * steps  # a step is its kind and three numbers; texels follow the steps
+    # the planes have one more texel around the picture, from its other side: hence - 2 and + 0.5
     place_x = (u - tl.floor(u)) * (wide - 2).to(tl.float32) + 0.5
     place_y = (v - tl.floor(v)) * (high - 2).to(tl.float32) + 0.5
     column = tl.minimum(tl.maximum(place_x.to(tl.int32), 0), wide - 2)
@@ -159,6 +160,7 @@ def _turned(red, green, blue, turns):
 @triton.jit
 def _object(x, y, row, part, weights, OUTER: tl.constexpr, INNER: tl.constexpr, WIDTH: tl.constexpr):
     """Distances and colours (M,) of an object at world points."""
+    # a row: a map (6 numbers), warps (3 each), a map, warps, the scale of distances, and a colour
     x, y = _affine(x, y, row)
     row += 6
     for _ in range(OUTER):  # unrolled the code would be ten times as long
@@ -232,7 +234,7 @@ def draw_blocks(
     pixel = tl.arange(0, SIDE * SIDE * SAMPLES) // SAMPLES
     column, line = (block % across) * SIDE + pixel % SIDE, (block // across) * SIDE + pixel // SIDE
     which = tl.arange(0, SIDE * SIDE * SAMPLES) % SAMPLES
-    off = 0.25 if SAMPLES == 4 else 0.0
+    off = 0.25 if SAMPLES == 4 else 0.0  # pixels from the centre, to either side in both directions
     world_x = left + (column.to(tl.float32) + off * (2 * (which % 2) - 1).to(tl.float32)) * px
     world_y = top - (line.to(tl.float32) + off * (2 * (which // 2) - 1).to(tl.float32)) * px
 

@@ -135,7 +135,7 @@ class Field:
         result, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
         codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
         self.codes = codes = codes.reshape(len(result), every.shape[1])
-        """Of the leaves in use (K, C): decoders are computed together."""
+        """Codes of the leaves in use (K, C), whose decoders are computed together."""
         self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         for element in dict.fromkeys(element for element in self.brought if element is not None):
@@ -150,9 +150,9 @@ class Field:
         xp, groups = self.xp, self.groups
         widths = widths_of(self._raw, self.parts.width.astype(np.float64))
         self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
-        """Of the blends by which objects join (N,), world units."""
+        """Widths of the blends by which objects join (N,), world units."""
         self.group_widths = widths[groups.rows]
-        """And of those by which groups do (G,), 0 for none."""
+        """Widths of the blends by which groups join (G,), 0 for none."""
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
@@ -181,10 +181,10 @@ class Field:
         xp, parts = self.xp, self.parts
         albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
         self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
-        """Of the objects (3, N); 0 where a texture is worn."""
+        """Colours of the objects (3, N); 0 for those with a texture."""
         self.textures: list[Texture] = []
         self.texture = np.full(len(self.paints), NO_TEXTURE)
-        """Which of the textures an object wears (N,)."""
+        """Index of each object's texture (N,)."""
         known: dict[tuple[Paint, bytes], int] = {}
         for i, paint in enumerate(self.paints):
             if paint is None or not self.draws[i]:  # the others leave colours as they are
@@ -389,7 +389,7 @@ class Field:
         return result
 
     def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
-        """By how much world distances (P,) at leaf coordinates differ at most from those in radii (P,)."""
+        """Greatest difference (P,) of world distances at leaf coordinates from those within radii (P,)."""
         result, shape = np.full(len(objects), np.inf), self.shape[objects]
         for at, slopes in enumerate(self.slopes):
             here = np.flatnonzero(shape == at)

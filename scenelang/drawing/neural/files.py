@@ -87,7 +87,7 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
 
 
 MOST_SIZE: Final = 128
-"""Of a layer: so many units squared, times the code, are 9 MB."""
+"""Most units of a layer: their square, times the code, is 9 MB."""
 
 
 def solid_config(config: Any) -> SolidConfig:

@@ -244,7 +244,7 @@ class Slopes:
         self._radii = RADII[0] * 2.0 ** np.arange(len(levels))
 
     def rise(self, q: Floats, radius: Floats) -> Floats:
-        """By how much f at leaf coordinates (2, M) differs at most (M,) from f within radii (M,)."""
+        """Greatest difference (M,) of f at leaf coordinates (2, M) from f within radii (M,)."""
         squared = radius * radius
         length = np.sqrt(q[0] * q[0] + q[1] * q[1])
         level = self._radii.searchsorted(radius) if radius.max() > RADII[0] else 0

@@ -142,17 +142,17 @@ class Solids(nn.Module, SolidNetwork):
     def __init__(self, config: SolidConfig, geometries: int, materials: int) -> None:
         super().__init__()
         self.config = config
-        made: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
+        stacks: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
         for name, shape in solid_shapes(config, geometries, materials).items():
             group, _, index = name.partition(".")
             fan = (config.code + 1) * (shape[1] if index in ("1", "2") else 1)
             value = torch.randn(shape)
             if index:
                 scale = fan**-0.5 if group.endswith("w") else 0.3
-                made.setdefault(group, []).append(nn.Parameter(value * scale))
+                stacks.setdefault(group, []).append(nn.Parameter(value * scale))
             else:
                 setattr(self, name, nn.Parameter(value))
-        for name, layers in made.items():
+        for name, layers in stacks.items():
             setattr(self, name, nn.ParameterList(layers))
         with torch.no_grad():  # gates begin in their linear range
             self.cell_lines.mul_(0.3)

@@ -19,7 +19,7 @@ from scenelang.drawing.solid.passes import INF
 TILE = 1 << 16  # samples at a time
 QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
 PACES = {"quick": Pace(0.04, 2, 0.15), "one": Pace(0.04, 2)}
-"""How carefully solids are drawn by ways to sample them; the others are `CAREFUL`."""
+"""Paces of the ways to sample solids; the others are `CAREFUL`."""
 
 
 def draw_solids(

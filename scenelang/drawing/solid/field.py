@@ -86,14 +86,14 @@ class Objects:
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
-        """Whether all objects draw."""
+        """True where all objects draw."""
         self.adding = self._adding()
         self.media = bool(kinds.any())
-        """Whether some object is a medium."""
+        """True where some object is a medium."""
         self.mixed = self.media and not kinds.all()
-        """Whether not all are."""
+        """True where some objects are media and some are not."""
         self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
-        """Whether media have different colours."""
+        """True where media have different colours."""
 
     def _adding(self) -> Array | None:
         """A mask (N,), 1 or 0, of objects of groups that neither draw nor take away; None without groups."""
@@ -124,7 +124,7 @@ class Objects:
         look = network.look(xp.array(parts.material.copy(), network.codes)).T
         colour = table(parts.rgb.T, 3) * look[:3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
-        """Of each object colour and medium (R, N); where some have textures, a plain colour between these."""
+        """Colour and medium (R, N) of objects; where some have textures, a plain colour between these."""
 
     def _cells(self, widths: Floats) -> None:
         """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
@@ -160,7 +160,7 @@ class Objects:
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
         self.textures = list(worn.items())
-        """Those that draw, with their numbers."""
+        """Textures of objects that draw, with the objects' numbers."""
         detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
         self.detail = xp.array(np.array(detail, np.float32), like)
         """Texels that a way of a world unit may cross; 0 without a texture."""
@@ -204,7 +204,7 @@ class Objects:
         self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
         """1 where the network for whole segments may answer."""
         self.answered = bool(self.asked.sum() > 0)
-        """Whether that is so of any."""
+        """True where it may for some object."""
         known = len(network.segment_w) and self.answered
         self.segments = [network.segment(code) for code in learned] if known else []
 
@@ -214,10 +214,10 @@ class Objects:
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
         cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
         self.first = self.network.alone(xp.array(reach, like), cell)
-        """What distances (N,) of objects that are met first are multiplied with; 0: the cell has to say."""
+        """Factors of distances (N,) of objects that are met first; 0: the cell has to be asked."""
         drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
         self.open = bool(((self.first > 0) | (drawn == 0)).all())
-        """Whether that is so of no object that draws."""
+        """True where the cell need not be asked for any object that draws."""
         self.factor = self.first * self.scale
         """World units for a leaf unit of objects that are met alone."""
         self.special = [
@@ -227,12 +227,12 @@ class Objects:
         ]
         """Objects to which more than a map leads, or that are displaced."""
         self.groups = len(self.decoders) + len(self.special)
-        """Of objects that are met alone: those of each decoder, and each special one."""
+        """Number of groups of objects that are met alone: those of each decoder, and each special one."""
         group = 1 * self.decoder
         for at, i in enumerate(self.special):
             group[i] = len(self.decoders) + at
         self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
-        """Of each object that draws its group, else -1."""
+        """Group of each object that draws, else -1."""
 
     def worn(self, objects: Array, p: Array) -> Array:
         """Colours (3, P) of objects, whatever else is at points p (3, P)."""
@@ -322,7 +322,7 @@ class Objects:
         ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
         ask += [partial(self._special, i) for i in self.special]
         pieces = zip(ask, pairwise(bounds), strict=True)
-        parts = [told(at[:, a:b])[0] for told, (a, b) in pieces if a < b]
+        parts = [distances(at[:, a:b])[0] for distances, (a, b) in pieces if a < b]
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
 
     def _special(self, i: int, at: Array) -> Array:

@@ -451,7 +451,7 @@ def _crossed(
     """Indices (k,) of rays that pass an object's ball between low and high, and their slots (SLOT, k)."""
     near, to = None, solid.centre - origin
     far = float(xp.sqrt(to @ to))
-    if far > solid.extent:  # rays within a cone around the ball
+    if far > solid.extent:  # rays within a cone around the ball, by its cosine less 1e-5 for rounding
         near = xp.where(to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
         way, low, high = xp.take(way, near), xp.take(low, near), xp.take(high, near)
     a = solid.frame.outer.linear @ way
