@@ -194,7 +194,8 @@ class Outputs:
             ValueError: a format that cannot hold them, or what writes it is not installed.
             OSError: a file cannot be written.
         """
-        contents = self.packed(path := Path(path))  # all, before any is written
+        path = Path(path)
+        contents = self.packed(path)  # all, before any is written
         for file, data in contents.items():
             (write_output if file == path else write_whole)(file, data)
         return list(contents)

@@ -382,12 +382,8 @@ def mesh_of(
         mesh.invert()
         look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
-    notes = [
-        plural(len(mesh.faces), "triangle"),
-        kind,
-        *notes,
-        f"inside by {'normals' if by_normals else 'winding numbers'}",
-    ]
+    rule = "normals" if by_normals else "winding numbers"
+    notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {rule}"]
     return Mesh(
         np.ascontiguousarray(mesh.vertices, float),
         np.ascontiguousarray(mesh.faces, np.int64),
