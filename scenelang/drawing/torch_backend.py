@@ -14,11 +14,10 @@ from typing import Unpack
 
 from scenelang.assets.element import credit_of
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.compiler.weights import replaced
+from scenelang.compiler.weights import ModelError, replaced
 from scenelang.drawing.how import RenderError, keep_memory, threads_for
-from scenelang.drawing.how import usable_cores as usable_cores
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.neural.load import Model, ModelError, Network, load_model, place_of
+from scenelang.drawing.neural.load import Model, Network, load_model, place_of
 from scenelang.drawing.neural.paper import draw_whole
 from scenelang.drawing.neural.torch_networks import Framed, Solids
 

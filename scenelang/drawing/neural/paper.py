@@ -239,26 +239,6 @@ class Streaming(nn.Module):
         first = SMALLEST if grown else config.resolution
         self.stages = nn.ModuleDict({str(r): Level(config.filters(r)) for r in config.levels if r >= first})
 
-    @torch.no_grad()
-    def enlarge(self, resolution: int) -> bool:
-        """Let a level of growing begin as the one below it, enlarged, instead of as noise.
-
-        The new deconvolution becomes a bilinear enlargement of each channel, and the new cell and pixel
-        generator copies of the old ones, if both levels have as many filters. Gives whether they have.
-        """
-        f, at = self.config.filters(resolution), int(math.log2(resolution)) - 1
-        if self.config.filters(resolution // 2) != f:
-            return False
-        deconvolution = self.deconvolutions[at]
-        assert isinstance(deconvolution, nn.ConvTranspose2d)
-        assert deconvolution.bias is not None
-        tent = torch.tensor([0.25, 0.75, 0.75, 0.25], device=deconvolution.weight.device)
-        same = torch.eye(f, device=tent.device)
-        deconvolution.weight.copy_(same[:, :, None, None] * torch.outer(tent, tent))
-        deconvolution.bias.zero_()
-        self.stages[str(resolution)].load_state_dict(self.stages[str(resolution // 2)].state_dict())
-        return True
-
     def forward(
         self,
         vectors: Tensor,
