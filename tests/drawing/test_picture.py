@@ -156,6 +156,7 @@ def test_what_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         nsg.prove(scene, nsg.render(scene, size=(9, 9)))
     with pytest.raises(ValueError, match="unknown output"):
         nsg.render_outputs(scene, ["proof"])
-    monkeypatch.setattr(picture, "load_errors", lambda: errors.load_errors("shapes2d-w16"))
+    load = errors.load_errors
+    monkeypatch.setattr(picture, "load_errors", lambda: load("shapes2d-w16"))
     with pytest.raises(RenderError, match="no proof"):
         nsg.prove(scene)
