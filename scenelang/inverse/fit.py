@@ -1,6 +1,7 @@
-"""From pictures back to scenes: the values of params whose picture comes nearest to a target.
+"""Fitting: the values of a scene's params whose picture is nearest to a target.
 
-Otherwise sizes and colours make up for the blur, and the nearest picture is not that of the true values.
+A target's blur is fitted with the values. Otherwise sizes and colours would make up for it, and the nearest
+picture would not be that of the true values.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ from scenelang.language.evaluation import Axis, Source, literals_of, rewritten
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 
-SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
-MOST_SOLID: Final = 128  # of solids, which take longer
+SIDES: Final = (32, 64, 128, 256)  # pixels along the shorter side, from coarse to fine
+MOST_SOLID: Final = 128  # the same at most of solids, which take longer
 MOST_TARGETS: Final = 64
 
 
@@ -81,12 +82,12 @@ def task_of(
     root: str | os.PathLike[str] | None = None,
     frame: int = 0,
 ) -> Task:
-    """What `scenelang.fit`, whose arguments and errors these are, is to do."""
-    found = Diagnostics()
+    """Prepare the search of `scenelang.fit`, which has the same arguments and errors."""
+    diagnostics = Diagnostics()
     given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
-    source = Source(**given, params=fixed, model=model, root=root).parsed(found)
-    if found.errors:
-        raise SceneError(found)
+    source = Source(**given, params=fixed, model=model, root=root).parsed(diagnostics)
+    if diagnostics.errors:
+        raise SceneError(diagnostics)
     targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
     if not 0 < len(targets) <= MOST_TARGETS:
         raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
@@ -125,7 +126,7 @@ def task_of(
 
 
 def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
-    """Whether a scene is of solids, if it has pictures that can be compared."""
+    """Return whether a scene is of solids; raises `FitError` where its pictures cannot be compared."""
     program = moment.program(values, canvas)
     if program is None:
         raise SceneError(moment.trouble)
@@ -143,16 +144,16 @@ def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
 
 
 WIDEST: Final = 8.0  # standard deviation, pixels
-ENOUGH: Final = 1e-6  # share of the error by which a step has to lower it: most of it may be noise
+ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the error may be noise
 
 
 class Lens:
-    """The blur of a target, which is found with the values: one more number of a search.
+    """Blur of a target, fitted with the values as one more number of the search.
 
     Args:
         problem: of the last size.
         space: the params.
-        until: nothing is begun after this time, as of `time.monotonic`.
+        until: no descent starts after this time of `time.monotonic`.
     """
 
     def __init__(self, problem: Together, space: Space, until: float) -> None:
@@ -161,18 +162,18 @@ class Lens:
         self._last: tuple[Found, Found, Blur] | None = None
 
     def followed(self, place: Found) -> tuple[Found, Blur]:
-        """Where a place leads to once pictures are blurred, and how; not at all where that leads nowhere."""
+        """The place after a descent with blurred pictures, and the blur; the same place where none helps."""
         if self._last is None or self._last[0] is not place:
             self._last = place, *self._follow(place, (True, False))
         return self._last[1:]
 
     def noise(self, place: Found) -> bool:
-        """Whether what is left is like noise, once the blur is taken into account."""
-        found, blur = self.followed(place)
-        return self.problem.noise(found.point, blur)
+        """Return whether the remaining difference is like noise, once the blur is taken into account."""
+        result, blur = self.followed(place)
+        return self.problem.noise(result.point, blur)
 
     def ended(self, places: Sequence[Found]) -> tuple[list[Found], Blur]:
-        """Places of a search, best first, once more with the blur of the first, if it has one."""
+        """Descend again from the places of a search, best first, with the blur of the first, if any."""
         first, blur = self.followed(places[0])
         if not blur.sigma:
             return list(places), blur
@@ -191,38 +192,38 @@ class Lens:
             if time.monotonic() > self.until:
                 break
             residuals = partial(self._residuals, light)
-            found = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
-            if found is not None and found.cost < best[0].cost:
-                way = place.way + tuple(u[:-1] for u in found.way)
-                ended = Found(found.point[:-1], found.cost, way)
-                best = ended, Blur(WIDEST * float(found.point[-1]), light)
+            result = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
+            if result is not None and result.cost < best[0].cost:
+                way = place.way + tuple(u[:-1] for u in result.way)
+                ended = Found(result.point[:-1], result.cost, way)
+                best = ended, Blur(WIDEST * float(result.point[-1]), light)
         return best
 
     def _residuals(self, light: bool, u: Point) -> Point | None:
-        """Residuals of params and, as a share of `WIDEST`, the blur."""
+        """Residuals at a point whose last number is the blur, as a share of `WIDEST`."""
         drawn = self.finer if light else self.problem
-        found, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
-        if found is None:
+        result, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
+        if result is None:
             return None
         times = drawn.canvas[0] // self.problem.canvas[0]
-        return self.problem.residuals([blurred(one, blur, times) for one in found])
+        return self.problem.residuals([blurred(one, blur, times) for one in result])
 
 
 TIED: Final = 0.9  # correlation from which two numbers explain each other
 LEVEL: Final = 1 / 255
-_UNSEEN: Final = 1e-4  # root mean square change over a whole range that is none
+_UNSEEN: Final = 1e-4  # root mean square change over a whole range up to which the picture does not show it
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One number that was found, or one of a vector.
+    """One fitted number, or one of a vector.
 
     Args:
         label: ``k``, or ``ink.2`` of a vector.
         low, high: its range, in base units.
-        value: what was found, in base units.
-        felt: how far it has to move for the picture to change by 1/255 (root mean square of all channels), in
-            shares of its range; inf where the picture does not show it, NaN of a choice.
+        value: its fitted value, in base units.
+        felt: change, in shares of its range, that changes the picture by 1/255 (root mean square of all
+            channels); inf where the picture does not show it, NaN where it is not known.
     """
 
     label: str
@@ -234,24 +235,24 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What `scenelang.fit` found.
+    """Result of `scenelang.fit`.
 
     Args:
-        text: the scene with what was found as defaults, comments and layout as they were.
-        values: what was found, as text of the language, by param.
-        psnr: how near the picture of ``text`` is to the target, dB, over pixels that count; at most 100.
-        blur: of the target, as far as it tells.
-        blurred_psnr: how near the picture is once it is blurred as much.
-        start_psnr: of the picture before.
-        size: of the pictures that were compared, width and height.
-        done: whether the search came to an end by itself.
-        notes: what stands in the way of a nearer picture or a surer value, in sentences without a full stop.
-        numbers: of continuous params, how much the picture feels them.
-        tied: pairs of their labels and how far they are correlated, from `TIED` on.
+        text: the scene with the values as defaults; comments and layout stay.
+        values: the values as text of the language, by param.
+        psnr: PSNR of the picture of ``text`` to the target in dB, over pixels that count; at most 100.
+        blur: estimated blur of the target.
+        blurred_psnr: PSNR of the picture after the same blur.
+        start_psnr: PSNR of the picture before the search.
+        size: width and height of the pictures that were compared.
+        done: true where the search converged before the time was out.
+        notes: obstacles to a nearer picture or a surer value, in sentences without a full stop.
+        numbers: continuous params and how sensitive the picture is to each.
+        tied: pairs of their labels and their correlation, from `TIED` on.
         others: values of other places whose pictures are about as near.
         frames: pictures that were drawn.
         before, after, target: pictures (H, W, 3) of that size, of several targets one below the other.
-        way: scenes from the start to what was found, as `scenelang.animate` takes them.
+        way: scenes from the start to the result, as `scenelang.animate` takes them.
     """
 
     text: str = field(repr=False)
@@ -305,32 +306,32 @@ class Fit:
 
 
 def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
-    """What is known of each continuous axis."""
-    found = []
+    """Value and sensitivity of each continuous axis."""
+    result = []
     for at in np.flatnonzero(space.smooth).tolist():
         axis = space.axes[at]
         rate = 0.0 if slopes is None else float(np.linalg.norm(slopes[:, at]))
         share = math.nan if slopes is None else LEVEL / rate if rate > _UNSEEN else math.inf
         value = axis.low + float(u[at]) * (axis.high - axis.low)
-        found.append(Number(axis.label, axis.low, axis.high, value, share))
-    return tuple(found)
+        result.append(Number(axis.label, axis.low, axis.high, value, share))
+    return tuple(result)
 
 
 def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
-    """Pairs of axes of which one makes up for what the other does."""
+    """Pairs of axes whose effects on the picture are correlated, and the correlation."""
     if slopes is None:
         return ()
     seen = np.flatnonzero(np.linalg.norm(slopes, axis=0) > _UNSEEN)
     unit = slopes[:, seen] / np.linalg.norm(slopes[:, seen], axis=0)
     spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # the same columns may stand twice
     size = np.sqrt(np.diag(spread))
-    found = []
+    result = []
     for i in range(len(seen)):
         for j in range(i):
             r = float(spread[i, j] / (size[i] * size[j]))
             if abs(r) >= TIED:
-                found.append((space.axes[seen[j]].label, space.axes[seen[i]].label, r))
-    return tuple(found)
+                result.append((space.axes[seen[j]].label, space.axes[seen[i]].label, r))
+    return tuple(result)
 
 
 def hindrances(
@@ -342,11 +343,11 @@ def hindrances(
     worst: tuple[str, Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
-    """Why the picture is no nearer, as far as can be told.
+    """Reasons why the picture is no nearer, as far as they are known.
 
     Args:
-        worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
-        noise: whether these are like noise.
+        worst: label of the picture that is farthest off, and the errors (H, W) of its pixels.
+        noise: true where these are like noise.
     """
     notes = []
     if not done:
@@ -372,7 +373,7 @@ def hindrances(
 
 
 GOOD_DB: Final = 35.0
-"""From here on nothing is said of where a picture differs."""
+"""PSNR from which no note says where a picture differs."""
 
 
 Progress = Callable[[str, int, int], None]
@@ -414,7 +415,7 @@ def fit(
         progress: called with what is done, how much of it, and all.
 
     Returns:
-        What was found, also where it is not near.
+        The result, also where its picture is not near.
 
     Raises:
         FitError: there is nothing to find, the target does not fit the scene, or no values give a picture.
@@ -442,7 +443,7 @@ def fit(
 
 
 def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) -> Fit:
-    """What there is to say of the places that a search came to, and of the target's blur."""
+    """Result of the places that a search reached and of the target's blur."""
     space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
     every = [space.literals(place.point) for place in places]

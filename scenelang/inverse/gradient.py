@@ -59,13 +59,13 @@ _LEAST: Final = 1e-30  # of a square, whose root has no derivative at 0
 
 
 class _Parts(NamedTuple):
-    """Numbers of N objects and what is behind them, or n rates of these.
+    """Numbers of N objects and of the background, or n rates of these.
 
     Args:
         geometry: geometry vectors (N, G, n).
         colours: (N, 3, n).
-        widths: of the blends by which objects join (N, n).
-        behind: (3, n).
+        widths: widths of the blends by which objects join (N, n).
+        behind: colour of the background (3, n).
     """
 
     geometry: Tensor
@@ -75,12 +75,12 @@ class _Parts(NamedTuple):
 
 
 class SoftPlane:
-    """What a Program of the plane shows.
+    """Soft picture of a Program of the plane as a function of its numbers.
 
     Args:
-        program: of which the tokens and the shapes count here; none is an element or wears a texture.
+        program: gives tokens and shapes; no object is an element or has a texture.
         under: sRGB-encoded, behind what is transparent.
-        dtype: of all that is computed.
+        dtype: type of all computations.
     """
 
     def __init__(
@@ -118,8 +118,8 @@ class SoftPlane:
         moving.colours.mul_((still.colours >= 0) & (still.colours <= 1))
         still.colours.clamp_(0.0, 1.0)
         pieces = torch.split(self.points, max(1, PAIRS // self.count), 1)
-        found = zip(*(self._changes(p, still, moving) for p in pieces), strict=True)
-        pictures, slopes = (torch.cat(part, 1) for part in found)
+        result = zip(*(self._changes(p, still, moving) for p in pieces), strict=True)
+        pictures, slopes = (torch.cat(part, 1) for part in result)
         shape = 3, self.canvas[1], self.canvas[0]
         return (
             pictures.reshape(shape).movedim(0, 2).numpy(),
@@ -170,14 +170,14 @@ class SoftPlane:
                     steps.append(Warp(twirl, tuple(bend)))
         points = way_back(TORCH, steps, [x.expand(self.count, -1) for x in p])
         q = torch.stack(list(points))
-        found: list[Any] = [None] * self.count
+        result: list[Any] = [None] * self.count
         for shape, decoder in enumerate(self.decoders):
             which = np.flatnonzero(self.shapes == shape).tolist()
             own = q[:, which].reshape(2, -1)
             decoded = self.network.decode(own, TORCH.length(list(own)), 1.0, decoder)
             for at, row in zip(which, decoded.reshape(len(which), -1), strict=True):
-                found[at] = row
-        return torch.stack(found) * _scale(*maps)
+                result[at] = row
+        return torch.stack(result) * _scale(*maps)
 
     def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, behind: Tensor) -> Tensor:
         """Channels (3, M) of points, by distances, colours and widths (3, N, M) and what is behind (3, M)."""
@@ -227,7 +227,7 @@ def numbers_of(program: Program) -> Floats:
 
 
 def alike(a: Program, b: Program) -> bool:
-    """Whether two Programs differ in their numbers alone."""
+    """Return whether two Programs differ in their numbers alone."""
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
     plain = (a.background is None) == (b.background is None)
     named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
@@ -238,7 +238,7 @@ class Rates:
     """Derivatives of a Program's numbers.
 
     Args:
-        program: what draws the scene of a point, None where there is none.
+        program: compiles the scene of a point; gives None where its values have no scene.
         space: the params.
     """
 
@@ -255,7 +255,7 @@ class Rates:
             here: the point's Program.
         """
         base = numbers_of(here)
-        found, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)
+        result, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)
         if any(len(mask) != len(base) for mask in self._moved.values()):
             self._moved = {}
         groups = self._groups(len(base))
@@ -269,9 +269,9 @@ class Rates:
             for axis, mask in zip(group, masks, strict=True):
                 if change is not None:
                     column = change[0] * mask if len(group) > 1 else change[0]
-                    found[:, axis], known[axis] = column / change[1][axis], True
+                    result[:, axis], known[axis] = column / change[1][axis], True
                     self._moved[axis] = self._moved.get(axis, False) | (column != 0)
-        return found, known
+        return result, known
 
     def _groups(self, count: int) -> list[list[int]]:
         """Continuous axes, those together that are known to change different numbers."""

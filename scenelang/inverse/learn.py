@@ -1,4 +1,4 @@
-"""Elements from files that users bring."""
+"""Elements learned from meshes, drawings and pictures."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from scenelang.language.diagnostics import plural
 from scenelang.language.scene_data import Elements, load_elements
 from scenelang.output.workers import GivenUp, by_workers
 
-SEEN: Final = 960  # pixels across which a solid is thought of, to say how small its details may be
-COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
+SEEN: Final = 960  # assumed width of a solid in pixels, by which the report states its smallest details
+COARSER: Final = 2.0  # most times the error of the whole that a part may have, in its own radii
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """How elements are to be made.
+    """Options of learning elements.
 
     Args:
-        sign: what tells inside of a mesh.
+        sign: rule for the inside of a mesh.
         max_error: mean distance off that is near enough, in leaf units, `NEAR` if left out; of textures root
             mean square off of channels in [0, 1], `NEAR_COLOUR` if left out.
         budget_s: for each file; nothing new is begun after it.
         steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
         license: of the originals.
         source: where they are from.
-        pictures: what they become.
+        pictures: kind of element that a picture becomes.
         texels: most of a texture along its longer side.
-        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        parts: true makes each part of a file an element; if left out, only those of drawings.
         color_error: root mean square off of a mesh's colours that is near enough, of channels in [0, 1];
             `scenelang.inverse.colours.NEAR` if left out.
     """
@@ -70,7 +70,7 @@ class Wish:
                 raise ValueError("a license or a source is at most 2,000 characters, all of them printable")
 
     def about(self, original: Path, data: bytes) -> dict[str, str | float]:
-        """What an element says of where it is from; of one file and one wish it is the same."""
+        """Facts of an element about its origin; equal files and options give equal facts."""
         name = "".join(c if c.isprintable() else "?" for c in original.name)
         said = {"license": self.license, "source": self.source, "original": name}
         said |= {"sha256": hashlib.sha256(data).hexdigest()}
@@ -81,11 +81,11 @@ class Wish:
         return {key: value for key, value in (said | asked).items() if value is not None}
 
     def paints(self, suffix: str) -> bool:
-        """Whether files of a suffix become textures."""
+        """Return whether files of a suffix become textures."""
         return self.pictures == "texture" and suffix.lower() in outline.MOST_OF_PICTURE
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
-        """Whether an element is what would be made again."""
+        """Return whether making an element again would give the same one."""
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
@@ -97,7 +97,7 @@ ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "c
 
 
 class _Job(NamedTuple):
-    """What is asked of an element, and when its file's time ends."""
+    """One element to make, and the end of its file's time."""
 
     wish: Wish
     about: dict[str, str | float]
@@ -109,7 +109,7 @@ class _Job(NamedTuple):
 
     @property
     def terms(self) -> dict[str, Any]:
-        """As what fits takes them."""
+        """Arguments of the fitting functions."""
         return {
             "budget_s": self.end_s - time.monotonic(),
             "steps": self.wish.steps,
@@ -118,15 +118,15 @@ class _Job(NamedTuple):
 
 
 def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
-    """The file of what becomes of an original's bytes, in the process that is kept apart.
+    """Make the elements of an original's bytes in the sandbox; returns the bytes of their file.
 
     Args:
-        request: its ``suffix``, the ``name`` of the element, what it says ``about`` itself, the ``wish``, and
-            bytes of the ``files`` that it names.
-        tell: called with ``say`` and a line, and ``progress`` and how far what is.
+        request: the ``suffix``, the ``name`` of the element, its facts (``about``), the options (``wish``),
+            and bytes of the ``files`` that the original names.
+        tell: called with ``say`` and a line, or with ``progress`` and its arguments.
 
     Raises:
-        FitError: nothing does.
+        FitError: no element can be made of it.
     """
     wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
     job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
@@ -152,7 +152,7 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
 
 
 def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
-    """The element of a mesh or an outline; one that is small in the whole may be off by more of its size."""
+    """The element of a mesh or an outline; a small part of a whole may have a larger relative error."""
 
     def report(rung: Rung) -> None:
         job.say(
@@ -202,10 +202,10 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
 
 def _texture(data: bytes, name: str, job: _Job) -> Element:
     """The element of a picture."""
-    found = outline.read_picture(data, job.wish.texels)
-    job.say(f"{name}: {', '.join(found.notes)}")
+    result = outline.read_picture(data, job.wish.texels)
+    job.say(f"{name}: {', '.join(result.notes)}")
     element, tried = outline.fit_picture(
-        found,
+        result,
         name,
         max_error=job.wish.max_error,
         report=lambda coded: job.say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
@@ -219,7 +219,7 @@ def _texture(data: bytes, name: str, job: _Job) -> Element:
 
 Progress = Callable[[str, float, float], None]
 Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
-"""Files by their places, in whatever order, and what gives what was made of one or raises why nothing was."""
+"""Indices of files, in any order, each with a function that returns the made bytes or raises."""
 
 
 def learn_files(
@@ -234,12 +234,12 @@ def learn_files(
 ) -> list[Element]:
     """Make files elements of the file ``out``, beside those that it holds.
 
-    It is written after each element, whole or not at all; what it holds already of an original and a wish is
-    not made again. So work that was interrupted is taken up by asking for it again.
+    The file is written after each element, whole or not at all. An element that it already holds of the same
+    original and options is not made again. So the same call continues work that was interrupted.
 
     Args:
         files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
-        progress: is told what is done, how far it is and how far that goes.
+        progress: called with what is done, how much of it, and all.
     """
     names = names_of(files, wish, name)
     first = held = _writable(out)
@@ -262,13 +262,13 @@ def learn_files(
         for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
             with noted(index):
                 known = _named(held).get((called, wish.paints(file.suffix)))
-                found = _request(file, called, wish, known)
-                if isinstance(found, Element):
+                result = _request(file, called, wish, known)
+                if isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
-                    made[index] = replace(Zoo.of([found]), groups=groups)
+                    made[index] = replace(Zoo.of([result]), groups=groups)
                 else:
-                    yield index, found
+                    yield index, result
 
     hear: dict[str, Hear] = {"say": say, "progress": progress}
     with closing(_by_workers(cluster, asked(), hear) if cluster else _here(asked(), hear)) as answers:
@@ -284,7 +284,7 @@ def learn_files(
 
 
 def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
-    """What becomes of requests, one after another."""
+    """Answer requests one after another, in a sandbox of this machine."""
     with Apart() as apart:
         for index, (request, data) in asked:
             hear["progress"](request["name"], 0.0, 1.0)
@@ -292,22 +292,22 @@ def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answe
 
 
 def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
-    """What becomes of requests, several at a time and in any order."""
+    """Answer requests by the workers of a cluster, several at a time and in any order."""
 
     def taken(answer: Callable[[], tuple[list[str], bytes | FitError]]) -> bytes:
-        lines, found = answer()
+        lines, result = answer()
         for line in lines:
             hear["say"](line)
-        if isinstance(found, FitError):
-            raise found
-        return found
+        if isinstance(result, FitError):
+            raise result
+        return result
 
     for index, answer in by_workers(cluster, made_apart, asked, LIBRARIES):
         yield index, partial(taken, answer)
 
 
 def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | None = None) -> list[str]:
-    """What elements of files are called, those of one file ``name``.
+    """Names of the elements of files; that of a single file is ``name``.
 
     Raises:
         ValueError: scenes cannot say a name, or it is that of two.
@@ -316,12 +316,12 @@ def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | No
         raise ValueError("a name is for one file")
     names = [_word(Path(file).stem) if name is None else name for file in files]
     owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
-    for file, found in zip(files, names, strict=True):
-        if not (found.isascii() and found.isidentifier()):
-            raise ValueError(f"`{found}` is not a name; letters, digits and _ are, as --name says them")
-        first = owners.setdefault((found, wish.paints(Path(file).suffix)), file)
+    for file, word in zip(files, names, strict=True):
+        if not (word.isascii() and word.isidentifier()):
+            raise ValueError(f"`{word}` is not a name; letters, digits and _ are, as --name says them")
+        first = owners.setdefault((word, wish.paints(Path(file).suffix)), file)
         if first is not file:
-            raise ValueError(f"`{first}` and `{file}` would both be `{found}`")
+            raise ValueError(f"`{first}` and `{file}` would both be `{word}`")
     return names
 
 
@@ -332,7 +332,7 @@ def _word(stem: str) -> str:
 
 
 def _writable(out: str | os.PathLike[str]) -> Zoo:
-    """What a file of elements holds; found out before the work, as is whether its result has a place."""
+    """Contents of the output file; raises before the work where it could not be written afterwards."""
     place = output_place(out)
     for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
         if path != place or place.exists():
@@ -350,12 +350,12 @@ def _writable(out: str | os.PathLike[str]) -> Zoo:
 
 
 def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
-    """Elements by name and whether they are materials."""
+    """Elements by their name and whether they are materials."""
     return {(element.name, element.material): element for element in zoo.elements}
 
 
 def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
-    """Write what was held and what was made, in place of what has the same names and of their groups.
+    """Write a file's elements and the new ones, which replace those of the same names and their groups.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
@@ -366,15 +366,15 @@ def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Z
         elements, groups = elements | _named(zoo), groups | zoo.groups
     data = zoo_bytes(elements.values(), groups)
     try:
-        found = read_zoo(data)
+        result = read_zoo(data)
     except TensorError as error:
         raise NotWritten(errno.EFBIG, str(error), os.fspath(out)) from None
     write_output(out, data)
-    return found
+    return result
 
 
 def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked | Element:
-    """What `Apart` is asked of a file, with its bytes, or what was made of it before."""
+    """The request of a file to the sandbox and its bytes, or the element made of it before."""
     suffix = path.suffix.lower()
     if suffix not in MOST_OF:
         raise FitError(f"not one of {', '.join(MOST_OF)}")
@@ -408,7 +408,8 @@ def learn(
 ) -> Elements:
     """Make files elements, as ``scenelang learn`` does: ``learn("cow.obj", "zoo.safetensors")``.
 
-    What ``out`` holds stays beside them; what was made before of the same file and in the same way is kept.
+    Elements that ``out`` holds stay. One that was made before of the same file with the same options is
+    reused.
 
     Args:
         files: meshes, drawings and pictures, or one.
@@ -418,12 +419,12 @@ def learn(
         budget_s: for each file; nothing new is begun after so many seconds.
         steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
         license, source: of the originals, kept in the file.
-        sign: what tells inside of a mesh.
-        pictures: whether they become textures or geometries.
-        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        sign: rule for the inside of a mesh.
+        pictures: kind of element that a picture becomes: a texture or, by its outline, a geometry.
+        parts: true makes each part of a file an element; if left out, only those of drawings.
         cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
             the extra ``dask``, and what makes elements on each.
-        say: is told in lines what is found and tried; by workers, of a file when it is done.
+        say: called with lines of the report; with a cluster, for each file when it is done.
 
     Returns:
         All elements of ``out``, for a Scene.
