@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -37,14 +37,6 @@ _TIMES: Final = 8  # rounds of corrections
 _HOLD: Final = 0.3  # added to a node's weights, so that a node with little evidence moves little
 
 
-class Coloured(NamedTuple):
-    """One grid that was tried: nodes along an axis, bytes, and root mean square of channels off."""
-
-    side: int
-    bytes: int
-    error: float
-
-
 def fit_colours(
     mesh: Mesh,
     name: str,
@@ -53,7 +45,7 @@ def fit_colours(
     budget_s: float = np.inf,
     steps: int | None = None,
     about: dict[str, str | float] | None = None,
-    report: Callable[[Coloured], None] = lambda tried: None,
+    report: Callable[[int, int, float], None] = lambda side, size, error: None,
 ) -> Element:
     """Fit the smallest grid that gives a mesh the look in its file, or the best of at most `MOST_BYTES`.
 
@@ -63,7 +55,7 @@ def fit_colours(
         budget_s: no further grid is begun after so many seconds.
         steps: how many are tried at most, whatever the time.
         about: what the element says of itself, beside its error.
-        report: called with each that was tried.
+        report: called for each grid with nodes along an axis, bytes, and root mean square of channels off.
     """
     assert mesh.look is not None
     started, asked = time.monotonic(), max_error or NEAR
@@ -78,7 +70,7 @@ def fit_colours(
         element = packed(name, *_grid(mesh, side), {}, fine)
         drawn = _weights(points, side) @ unpacked(element).reshape(3, -1).T
         error = float(np.sqrt(np.square(drawn - true).mean()))
-        report(Coloured(side, len(element.data), error))
+        report(side, len(element.data), error)
         if best is not None and len(element.data) > MOST_BYTES:
             break
         best = Element(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,7 +23,6 @@ from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.how import Samples
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
-from scenelang.inverse import search
 from scenelang.inverse.problem import LEVELS, Moment, Problem, Together
 from scenelang.inverse.search import (
     ALIKE,
@@ -36,9 +35,12 @@ from scenelang.inverse.search import (
     Matrix,
     Picture,
     Point,
-    Space,
+    Report,
+    SearchBox,
     blurred,
+    central,
     descend,
+    solve,
     space_of,
     target_of,
 )
@@ -63,7 +65,7 @@ class Task(Record):
     """
 
     problems: tuple[Together, ...]
-    space: Space
+    space: SearchBox
     first: Point
     kept: dict[str, str]
 
@@ -156,7 +158,7 @@ class Lens:
         until: no descent starts after this time of `time.monotonic`.
     """
 
-    def __init__(self, problem: Together, space: Space, until: float) -> None:
+    def __init__(self, problem: Together, space: SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
         self.finer = problem.finer()
         self._last: tuple[Found, Found, Blur] | None = None
@@ -305,7 +307,7 @@ class Fit:
         return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
 
 
-def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
+def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
     """Value and sensitivity of each continuous axis."""
     result = []
     for at in np.flatnonzero(space.smooth).tolist():
@@ -317,7 +319,7 @@ def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, .
     return tuple(result)
 
 
-def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
+def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
     """Pairs of axes whose effects on the picture are correlated, and the correlation."""
     if slopes is None:
         return ()
@@ -335,7 +337,7 @@ def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], .
 
 
 def hindrances(
-    space: Space,
+    space: SearchBox,
     u: Point,
     numbers: Sequence[Number],
     psnr: float,
@@ -372,11 +374,7 @@ def hindrances(
     return tuple(notes)
 
 
-GOOD_DB: Final = 35.0
-"""PSNR from which no note says where a picture differs."""
-
-
-Progress = Callable[[str, int, int], None]
+GOOD_DB: Final = 35.0  # PSNR from which no note says where a picture differs
 NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
 
 
@@ -395,7 +393,7 @@ def fit(
     frame: int = 0,
     seed: int = 0,
     budget_s: float = 300.0,
-    progress: Progress = lambda what, done, count: None,
+    progress: Report = lambda what, done, count: None,
 ) -> Fit:
     """Find the values of params whose picture comes nearest to a target: ``fit("a.nsg", "a.png")``.
 
@@ -428,7 +426,7 @@ def fit(
         background=background, model=model, root=root, frame=frame,
     )  # fmt: skip
     lens = Lens(task.problems[-1], task.space, until)
-    places, done = search.solve(
+    places, done = solve(
         task.problems,
         task.space,
         task.first,
@@ -455,13 +453,13 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
     soft = [blurred(one, blur) for one in after]
-    step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
-    slopes = search.central(last.pixels, space, best, step, space.smooth)
+    step = 2 * STEPS[min(len(problems), len(STEPS)) - 1]
+    slopes = central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
     others = [
         literals
         for place, literals in zip(places[1:], every[1:], strict=True)
-        if place.cost <= max(search.ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+        if place.cost <= max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
     ]
     return Fit(
         text=text,
@@ -486,7 +484,7 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
     )
 
 
-def _scenes(moment: Moment, space: Space, way: Sequence[Point]) -> Iterator[Scene]:
+def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[Scene]:
     """The scenes of places that have one."""
     for u in way:
         with suppress(SceneError):

@@ -36,7 +36,7 @@ from scenelang.drawing.neural.frames import Affine, Warp, way_back
 from scenelang.drawing.neural.load import load_model
 from scenelang.drawing.neural.network import EMPTY, Cell, FramedArrays
 from scenelang.drawing.neural.torch_networks import Framed
-from scenelang.inverse.search import WHITE, Point, Space
+from scenelang.inverse.search import WHITE, Point, SearchBox
 
 
 @lru_cache(maxsize=64)
@@ -242,7 +242,7 @@ class Rates:
         space: the params.
     """
 
-    def __init__(self, program: Callable[[Point], Program | None], space: Space) -> None:
+    def __init__(self, program: Callable[[Point], Program | None], space: SearchBox) -> None:
         self.program, self.space = program, space
         self._moved: dict[int, npt.NDArray[np.bool_]] = {}  # (K,) which numbers an axis changes
 

@@ -25,7 +25,15 @@ from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
 from scenelang.drawing.exact.originals import MOST_OF, said
 from scenelang.inverse.colours import fit_colours
 from scenelang.inverse.grids import NEAR, THIN, Rung, fit
-from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Apart, Asked, Hear, files_beside, made_apart
+from scenelang.inverse.sandbox import (
+    CPU_S,
+    LIBRARIES,
+    Asked,
+    Hear,
+    SandboxProcess,
+    files_beside,
+    run_in_sandbox,
+)
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene_data import Elements, load_elements
 from scenelang.output.workers import GivenUp, by_workers
@@ -35,7 +43,7 @@ COARSER: Final = 2.0  # most times the error of the whole that a part may have, 
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class LearnOptions:
     """Options of learning elements.
 
     Args:
@@ -99,7 +107,7 @@ ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "c
 class _Job(NamedTuple):
     """One element to make, and the end of its file's time."""
 
-    wish: Wish
+    options: LearnOptions
     about: dict[str, str | float]
     end_s: float
     tell: Callable[..., None]
@@ -112,7 +120,7 @@ class _Job(NamedTuple):
         """Arguments of the fitting functions."""
         return {
             "budget_s": self.end_s - time.monotonic(),
-            "steps": self.wish.steps,
+            "steps": self.options.steps,
             "about": self.about,
         }
 
@@ -121,18 +129,18 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     """Make the elements of an original's bytes in the sandbox; returns the bytes of their file.
 
     Args:
-        request: the ``suffix``, the ``name`` of the element, its facts (``about``), the options (``wish``),
-            and bytes of the ``files`` that the original names.
+        request: the ``suffix``, the ``name`` of the element, its facts (``about``), the ``options``, and
+            bytes of the ``files`` that the original names.
         tell: called with ``say`` and a line, or with ``progress`` and its arguments.
 
     Raises:
         FitError: no element can be made of it.
     """
-    wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
-    job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
-    if wish.paints(suffix):
+    options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
+    job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
+    if options.paints(suffix):
         return zoo_bytes([_texture(data, name, job)])
-    brought = parts.brought(data, suffix, name, request["files"], wish.sign, wish.parts)
+    brought = parts.brought(data, suffix, name, request["files"], options.sign, options.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
     group, made = list(brought.group), []
     for called, shape in brought.shapes.items():
@@ -160,7 +168,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
             f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
         )
 
-    asked = (job.wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     element, tried = fit(
         shape,
         name,
@@ -189,9 +197,9 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
     element = fit_colours(
         shape,
         name,
-        max_error=job.wish.color_error,
-        report=lambda tried: job.say(
-            f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
+        max_error=job.options.color_error,
+        report=lambda side, size, error: job.say(
+            f"  {side:>4} a side {size:>8,} bytes  colours off by {error:.4f}"
         ),
         **job.terms,
     )
@@ -202,12 +210,12 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
 
 def _texture(data: bytes, name: str, job: _Job) -> Element:
     """The element of a picture."""
-    result = outline.read_picture(data, job.wish.texels)
+    result = outline.read_picture(data, job.options.texels)
     job.say(f"{name}: {', '.join(result.notes)}")
     element, tried = outline.fit_picture(
         result,
         name,
-        max_error=job.wish.max_error,
+        max_error=job.options.max_error,
         report=lambda coded: job.say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
         **job.terms,
     )
@@ -225,7 +233,7 @@ Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
 def learn_files(
     files: Sequence[str | os.PathLike[str]],
     out: str | os.PathLike[str],
-    wish: Wish = Wish(),
+    options: LearnOptions = LearnOptions(),
     *,
     name: str | None = None,
     cluster: str | None = None,
@@ -241,7 +249,7 @@ def learn_files(
         files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
         progress: called with what is done, how much of it, and all.
     """
-    names = names_of(files, wish, name)
+    names = names_of(files, options, name)
     first = held = _writable(out)
     made: dict[int, Zoo] = {}
     troubles: dict[int, str] = {}
@@ -261,8 +269,8 @@ def learn_files(
     def asked() -> Iterator[tuple[int, Asked]]:
         for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
             with noted(index):
-                known = _named(held).get((called, wish.paints(file.suffix)))
-                result = _request(file, called, wish, known)
+                known = _named(held).get((called, options.paints(file.suffix)))
+                result = _request(file, called, options, known)
                 if isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
@@ -285,7 +293,7 @@ def learn_files(
 
 def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
     """Answer requests one after another, in a sandbox of this machine."""
-    with Apart() as apart:
+    with SandboxProcess() as apart:
         for index, (request, data) in asked:
             hear["progress"](request["name"], 0.0, 1.0)
             yield index, partial(apart, request, data, hear)
@@ -302,11 +310,13 @@ def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[
             raise result
         return result
 
-    for index, answer in by_workers(cluster, made_apart, asked, LIBRARIES):
+    for index, answer in by_workers(cluster, run_in_sandbox, asked, LIBRARIES):
         yield index, partial(taken, answer)
 
 
-def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | None = None) -> list[str]:
+def names_of(
+    files: Sequence[str | os.PathLike[str]], options: LearnOptions, name: str | None = None
+) -> list[str]:
     """Names of the elements of files; that of a single file is ``name``.
 
     Raises:
@@ -319,7 +329,7 @@ def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | No
     for file, word in zip(files, names, strict=True):
         if not (word.isascii() and word.isidentifier()):
             raise ValueError(f"`{word}` is not a name; letters, digits and _ are, as --name says them")
-        first = owners.setdefault((word, wish.paints(Path(file).suffix)), file)
+        first = owners.setdefault((word, options.paints(Path(file).suffix)), file)
         if first is not file:
             raise ValueError(f"`{first}` and `{file}` would both be `{word}`")
     return names
@@ -373,7 +383,7 @@ def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Z
     return result
 
 
-def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked | Element:
+def _request(path: Path, name: str, options: LearnOptions, known: Element | None) -> Asked | Element:
     """The request of a file to the sandbox and its bytes, or the element made of it before."""
     suffix = path.suffix.lower()
     if suffix not in MOST_OF:
@@ -381,12 +391,12 @@ def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked 
     data = read_regular(path, MOST_OF[suffix])
     if len(data) > MOST_OF[suffix]:
         raise FitError(f"more than {MOST_OF[suffix] >> 20:,} MiB")
-    about = wish.about(path, data)
-    if known is not None and wish.made(known, about):
+    about = options.about(path, data)
+    if known is not None and options.made(known, about):
         return known
-    usual_s = CPU_S * (4 if wish.parts else 1)
-    limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
-    request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about, "cpu_s": limit_s}
+    usual_s = CPU_S * (4 if options.parts else 1)
+    limit_s = max(usual_s, 2 * options.budget_s) if options.budget_s < 1e6 else usual_s
+    request = {"name": name, "suffix": suffix, "options": asdict(options), "about": about, "cpu_s": limit_s}
     return {**request, "files": files_beside(data, suffix, path.parent)}, data
 
 
@@ -435,10 +445,10 @@ def learn(
         OSError: ``out`` cannot be read or written.
         ValueError: names that scenes cannot say, or twice the same.
     """
-    wish = Wish(
+    options = LearnOptions(
         sign=sign, max_error=max_error, budget_s=budget_s, steps=steps,
         license=license, source=source, pictures=pictures, parts=parts,
     )  # fmt: skip
     listed = [files] if isinstance(files, str | os.PathLike) else files
-    learn_files(listed, out, wish, name=name, cluster=cluster, say=say)
+    learn_files(listed, out, options, name=name, cluster=cluster, say=say)
     return load_elements(os.fspath(out))

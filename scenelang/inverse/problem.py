@@ -17,15 +17,14 @@ from scenelang.compiler.program import Program
 from scenelang.drawing.how import Samples
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.small import draw_small
-from scenelang.inverse.gradient import Rates, numbers_of, softened
-from scenelang.inverse.search import Blur, Picture, Point, Space, Target, blurred, over
+from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
+from scenelang.inverse.search import Blur, Matrix, Picture, Point, SearchBox, Target, blurred, over
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 
-Matrix = npt.NDArray[np.float64]
 LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
 
 
@@ -94,7 +93,7 @@ class Problem:
     def __init__(
         self,
         moment: Moment,
-        space: Space,
+        space: SearchBox,
         target: Target,
         canvas: tuple[int, int],
         *,
@@ -148,11 +147,6 @@ class Problem:
         picture = self.picture(u)
         return None if picture is None else self.residuals(picture, self.levels)
 
-    def pixels(self, u: Point) -> Point | None:
-        """Residuals of pixels alone."""
-        picture = self.picture(u)
-        return None if picture is None else self.residuals(picture)
-
     def residuals(self, picture: Picture, levels: int = 1) -> Point:
         """Residuals of a picture, at so many levels of the pyramid."""
         return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
@@ -166,8 +160,6 @@ class Problem:
         program = self.program(u) if self.soft else None
         if program is None or not len(program) or program.elements or program.palette or program.extended:
             return None
-        from scenelang.inverse.gradient import SoftPlane
-
         rates, known = self._rates.at(u, program)
         change = SoftPlane(program, self.under)(numbers_of(program), rates)[1].astype(np.float64)
         self.frames += 1

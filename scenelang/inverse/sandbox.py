@@ -49,13 +49,13 @@ Hear = Callable[..., None]
 Asked = tuple[dict[str, Any], bytes]  # a request, and the bytes that it is about
 
 
-class Apart:
+class SandboxProcess:
     """The process; it starts with the first request, and again after it has ended."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> Apart:
+    def __enter__(self) -> SandboxProcess:
         return self
 
     def __exit__(
@@ -124,10 +124,10 @@ def _environment() -> dict[str, str]:
     return result
 
 
-def made_apart(asked: Asked) -> tuple[list[str], bytes | FitError]:
+def run_in_sandbox(asked: Asked) -> tuple[list[str], bytes | FitError]:
     """Run one request in a sandbox, as workers do; returns its lines, and the bytes or the error."""
     lines: list[str] = []
-    with Apart() as apart:
+    with SandboxProcess() as apart:
         try:
             return lines, apart(*asked, {"say": lines.append, "progress": lambda *_: None})
         except FitError as error:

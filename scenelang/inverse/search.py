@@ -45,7 +45,7 @@ Point = npt.NDArray[np.float64]
 MOST_AXES: Final = 64
 
 
-class Space:
+class SearchBox:
     """Box of the values of some params.
 
     Args:
@@ -65,7 +65,7 @@ class Space:
         self.most = np.array([max(1, len(axis.choices) - 1) for axis in self.axes], np.float64)
         self.wraps = np.array([axis.wraps for axis in self.axes], bool)
 
-    def beside(self, axis: Axis) -> Space:
+    def beside(self, axis: Axis) -> SearchBox:
         """The same box with a continuous axis that belongs to no param, behind the others."""
         wide = copy.copy(self)
         wide.axes = (*self.axes, axis)
@@ -124,7 +124,7 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, bool | str) else round(unpack(value)[0], 9)
 
 
-def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> Space:
+def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> SearchBox:
     """The box of a scene's params.
 
     Args:
@@ -139,7 +139,9 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
         named = [param_named(evaluation, name) for name in dict.fromkeys(names)]
         chosen = named or [stmt for stmt in params_of(evaluation).values() if stmt.range is not None]
         kept = set(fixed)
-        space = Space([knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in kept])
+        space = SearchBox(
+            [knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in kept]
+        )
     except ParamError as error:
         raise FitError(str(error)) from None
     if not space.axes:
@@ -285,7 +287,6 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
 
 Residuals = Callable[[Point], Point | None]
 Report = Callable[[str, int, int], None]
-Look = Callable[[Residuals, Space, Sequence["Found"], int, float, Report], "list[Found]"]
 Matrix = npt.NDArray[np.float64]
 
 
@@ -336,7 +337,7 @@ class Found(Record):
         return Found(self.point, self.cost, before.way + self.way)
 
 
-def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
+def spread(space: SearchBox, count: int, seed: int) -> Iterator[Point]:
     """Points all over the box: the generalised golden ratio's sequence, moved by a seed.
 
     Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
@@ -354,13 +355,12 @@ def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
 
 def slopes(
     residuals: Residuals,
-    space: Space,
+    space: SearchBox,
     u: Point,
     at: Point,
     step: float,
     free: npt.NDArray[np.bool_],
     fine: bool = False,
-    many: int = MANY,
 ) -> Matrix:
     """Derivatives (R, n) of residuals, by differences or reverse passes; columns of axes that are not free 0.
 
@@ -368,10 +368,9 @@ def slopes(
         at: the residuals at u.
         step: in shares of a range; away from an end.
         fine: true takes central differences of `FINE` of the step.
-        many: axes from which on reverse passes are taken, where there are any.
     """
     result = np.zeros((len(at), len(u)))
-    if np.count_nonzero(free) >= many and isinstance(residuals, Steep):
+    if np.count_nonzero(free) >= MANY and isinstance(residuals, Steep):
         exact = residuals.slopes(u)
         if exact is not None:
             result, free = exact[0], free & ~exact[1]
@@ -387,7 +386,7 @@ def slopes(
 
 
 def central(
-    residuals: Residuals, space: Space, u: Point, step: float, free: npt.NDArray[np.bool_]
+    residuals: Residuals, space: SearchBox, u: Point, step: float, free: npt.NDArray[np.bool_]
 ) -> Matrix | None:
     """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
     columns = np.zeros((0, 0))
@@ -407,13 +406,12 @@ def central(
 
 def descend(
     residuals: Residuals,
-    space: Space,
+    space: SearchBox,
     u: Point,
     *,
     step: float,
     most: int = 12,
     fine: bool = False,
-    many: int = MANY,
     enough: float = _ENOUGH,
 ) -> Found | None:
     """Follow the continuous axes down from a point; None where that has no picture.
@@ -423,7 +421,6 @@ def descend(
         most: number of steps at most.
         fine: true takes central differences of a third of the step: twice the pictures, but they follow a
             narrow valley that others lose.
-        many: as of `slopes`.
         enough: least relative gain of a step; the first with less is the last.
     """
     at = residuals(u)
@@ -434,7 +431,7 @@ def descend(
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
             break
-        j = slopes(residuals, space, u, at, step, space.smooth, fine, many)
+        j = slopes(residuals, space, u, at, step, space.smooth, fine)
         pull = j.T @ at
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
@@ -459,7 +456,7 @@ def descend(
     return Found(u, cost, tuple(way))
 
 
-def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) -> Found:
+def stepped(residuals: Residuals, space: SearchBox, start: Found, *, step: float) -> Found:
     """Try the neighbours of choices, and follow the continuous axes from each that is nearly as good."""
     best, better = start, True
     while better:
@@ -476,7 +473,7 @@ def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) ->
     return best
 
 
-def apart(space: Space, places: list[Found], most: int) -> list[Found]:
+def apart(space: SearchBox, places: list[Found], most: int) -> list[Found]:
     """The best distinct places, best first."""
     kept: list[Found] = []
     for one in sorted(places, key=lambda one: one.cost):
@@ -485,7 +482,7 @@ def apart(space: Space, places: list[Found], most: int) -> list[Found]:
     return kept[:most]
 
 
-def scanned(coarse: Residuals, space: Space, known: Found) -> list[Found]:
+def scanned(coarse: Residuals, space: SearchBox, known: Found) -> list[Found]:
     """The best other valley along each axis through a known place.
 
     In a picture of several things one may still be wrong while the others are right already.
@@ -511,7 +508,7 @@ def scanned(coarse: Residuals, space: Space, known: Found) -> list[Found]:
 
 
 def look(
-    coarse: Residuals, space: Space, known: Sequence[Found], seed: int, until: float, report: Report
+    coarse: Residuals, space: SearchBox, known: Sequence[Found], seed: int, until: float, report: Report
 ) -> list[Found]:
     """Look around in small pictures and descend from the best places.
 
@@ -542,7 +539,7 @@ def look(
 
 def solve(
     problems: Sequence[Residuals],
-    space: Space,
+    space: SearchBox,
     start: Point,
     *,
     seed: int = 0,
@@ -550,7 +547,6 @@ def solve(
     near: float = NEAR,
     noise: Callable[[Found], bool] = lambda place: False,
     report: Report = lambda what, done, count: None,
-    look: Look = look,
 ) -> tuple[list[Found], bool]:
     """Places with the nearest pictures, the best first.
 
@@ -565,7 +561,6 @@ def solve(
         near: sum of squares that is near enough.
         noise: returns whether only noise is left at a place of the last size, so that none is nearer.
         report: called with what is done, how much of it, and all.
-        look: finds near places in the smallest pictures, once a round.
 
     Returns:
         Distinct places, none where no place has a picture, and whether the search converged by itself.

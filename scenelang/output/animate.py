@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol, Unpack
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 from scenelang.assets.files import output_place, write_whole
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
@@ -33,10 +33,9 @@ from scenelang.output.frames import (
     find_target,
     put_frame,
 )
-from scenelang.output.painting import Drawable, Errand, Painter
+from scenelang.output.painting import Cluster, Drawable, Errand, Painter, Workers
 
 if TYPE_CHECKING:
-    from scenelang.compiler.program import Program
     from scenelang.drawing.image import Image
     from scenelang.output.encoders import Palette
 
@@ -109,27 +108,6 @@ class RenderResult:
             f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
             f"encode {self.encode_s * each:.1f}",
         ]
-
-
-class Helpers(Protocol):
-    """Other processes that draw frames, here or on other machines."""
-
-    @property
-    def count(self) -> int:
-        """Number of processes."""
-
-    @property
-    def waiting(self) -> int:
-        """Frames that were submitted and are not known to be done."""
-
-    def submit(self, program: Program, errand: Errand) -> None:
-        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
-
-    def take(self) -> None:
-        """Wait until more is done; raises the `RenderError` or `OSError` by which something failed."""
-
-    def close(self) -> None:
-        """Stop all processes."""
 
 
 def make(
@@ -213,7 +191,7 @@ class _Run:
     made: RenderResult
     alpha: bool = False  # whether any frame has
     suffixes: tuple[str, ...] = ()  # of the files next to each picture
-    others: Helpers | None = None  # the processes that draw besides this one
+    others: Workers | Cluster | None = None  # the processes that draw besides this one
     spent_s: float = 0.0  # time spent drawing here
 
     def draw(self, numbers: range) -> None:
@@ -276,16 +254,13 @@ class _Run:
             errand = Errand(str(file), frame.place, split, painter.outputs, painter.how)
             self.others.submit(frame.program, errand)
         else:
-            share = partial(_part, self.progress, index, total)
-            put_frame(painter.files(frame, file, share))
+            put_frame(painter.files(frame, file, lambda share: self._say(index + share, total)))
             self.spent_s += time.perf_counter() - started
         self.made.drawn += 1
 
-    def _helpers(self, frame: Drawable, left: int) -> Helpers | None:
+    def _helpers(self, frame: Drawable, left: int) -> Workers | Cluster | None:
         """The processes that draw from here on: a given cluster, or other processes where they pay."""
         if self.cluster is not None:
-            from scenelang.output.painting import Cluster
-
             return Cluster(self.cluster)
         painter, jobs = self.painter, self.jobs
         if frame.program is None or jobs == 1 or frame.place == "cuda":
@@ -302,17 +277,11 @@ class _Run:
         if count < 2:
             self.jobs = 1
             return None
-        from scenelang.output.painting import Workers
-
         return Workers(count)
 
-    def _say(self, done: int, total: int) -> None:
+    def _say(self, done: float, total: int) -> None:
         waiting = self.others.waiting if self.others is not None else 0
         self.progress(Progress("drawing", done - waiting, total))
-
-
-def _part(progress: Callable[[Progress], None], index: int, total: int, share: float) -> None:
-    progress(Progress("drawing", index + share, total))
 
 
 def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[Path]:

@@ -36,7 +36,7 @@ Colours = npt.NDArray[np.uint8]
 
 PER_SECOND = 100
 SHORTEST = 2  # hundredths of a second; browsers take shorter ones for a tenth
-_LONGEST = 65535  # hundredths of a second that a delay holds
+_LONGEST = 65535  # largest number of a delay, 16 bits: hundredths of a second, or a part of a fraction
 _KEEP, _CLEAR = 1, 2  # disposal methods: keep a frame under the next one, or clear it
 _SAMPLE = 1 << 18  # pixels from which a palette is chosen
 _MOST_KNOWN = 1 << 20  # colours that are counted; more are thinned to the most frequent half
@@ -53,8 +53,8 @@ def write_gif(
     """Encode a film; in transparent frames, pixels of less than half coverage are left out.
 
     Args:
-        palette: ``"global"`` has one for all frames, ``"frame"`` one for each. ``"auto"`` takes the exact one,
-            and a global one where neither is, as it keeps still parts still.
+        palette: ``"global"`` has one for all frames, ``"frame"`` one for each. ``"auto"`` takes the one
+            that is exact, and a global one where neither is, as it keeps still parts still.
         dither: diffuse the errors of a palette over neighbouring pixels.
     """
     lengths = delays(len(film.files), film.fps, PER_SECOND, SHORTEST)
@@ -234,9 +234,6 @@ class Mapper:
         return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
 
 
-_LONGEST_APNG = 65535  # of either part of a delay's fraction
-
-
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
     """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
     shown = [
@@ -273,18 +270,16 @@ def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> Non
 
 def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
     """Time of ``count`` frames as fractions of 16-bit numbers; several where one cannot hold it."""
-    whole = (count / Fraction(fps).limit_denominator(1_000_000)).limit_denominator(_LONGEST_APNG)
-    if whole.numerator <= _LONGEST_APNG:
+    whole = (count / Fraction(fps).limit_denominator(1_000_000)).limit_denominator(_LONGEST)
+    if whole.numerator <= _LONGEST:
         yield whole.numerator, whole.denominator
         return
     for share in (count // 2, count - count // 2):
-        yield from _pieces(share, fps) if count > 1 else [(min(_LONGEST_APNG, round(float(whole))), 1)]
+        yield from _pieces(share, fps) if count > 1 else [(min(_LONGEST, round(float(whole))), 1)]
 
 
 def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
     """The chunks of a picture."""
-    from PIL import Image
-
     data = io.BytesIO()
     Image.fromarray(pixels).save(data, "PNG")
     raw, at, result = data.getvalue(), len(SIGNATURE), []

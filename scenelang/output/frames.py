@@ -177,8 +177,6 @@ def find_target(out: str, stem: str = "frame") -> Target:
     """
     path = Path(out)
     if is_pattern(out):
-        from scenelang.drawing.image import image_format
-
         bare = path.name.replace("%%", "")
         if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
             raise TargetError(
@@ -376,7 +374,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class FixedFrames:
     """Frames that are Scenes already."""
 
     scenes: tuple[Scene, ...]  # at least one
@@ -426,10 +424,10 @@ class Clip:
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         self.reuse = reuse
-        self._evaluation: Evaluation | Given = (
+        self._evaluation: Evaluation | FixedFrames = (
             source.evaluation(self.diagnostics, replays=reuse)
             if isinstance(source, Source)
-            else Given(source, fps)
+            else FixedFrames(source, fps)
             if isinstance(source, tuple)
             else source
         )
@@ -452,12 +450,12 @@ class Clip:
     def texts(self) -> tuple[str, ...]:
         """Texts of its files."""
         given = self._evaluation
-        return () if isinstance(given, Given) else tuple(source.text for source in given.sources)
+        return () if isinstance(given, FixedFrames) else tuple(source.text for source in given.sources)
 
     @property
     def animation(self) -> Animation:
         """Length, frames a second and whether it is a loop."""
-        if isinstance(self._evaluation, Given):
+        if isinstance(self._evaluation, FixedFrames):
             return self._evaluation.animation
         return self.first.scene.animation or STILL
 
@@ -465,7 +463,7 @@ class Clip:
     def frames(self) -> int:
         """Number of frames, at least 1."""
         given = self._evaluation
-        return len(given.scenes) if isinstance(given, Given) else self.animation.frames
+        return len(given.scenes) if isinstance(given, FixedFrames) else self.animation.frames
 
     def numbers(self, frames: FrameRange) -> range:
         """Numbers of the requested frames; raises `SceneError` where some do not exist."""

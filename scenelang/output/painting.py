@@ -26,8 +26,9 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from scenelang.compiler.program import Program, program_bytes
-from scenelang.drawing.how import DEFAULT, How, RenderError
+from scenelang.compiler.program import Program, parse_program, program_bytes
+from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
+from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import Kept
 from scenelang.output.frames import Clip, Shot, frame_key, put_frame
 from scenelang.output.workers import AHEAD, Link
@@ -113,8 +114,6 @@ class Painter:
         """Number of threads for which a picture is split; it affects the last bits of its pixels."""
         if self.how.threads is not None:
             return self.how.threads
-        from scenelang.drawing.how import threads_for
-
         return threads_for(program.canvas)
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
@@ -123,7 +122,6 @@ class Painter:
             from scenelang.drawing.render import draw_exact
 
             return draw_exact(frame.shot.scene, spans=frame.shot.spans)
-        from scenelang.drawing.neural.draw import Kept
         from scenelang.drawing.render import draw
 
         if self.kept is None and self.clip.reuse:
@@ -139,7 +137,6 @@ class Painter:
         program = frame.program
         if program is None or program.stage is None or min(program.canvas) < DRAFT * DRAFT:
             return None
-        from scenelang.drawing.image import enlarged
         from scenelang.drawing.small import draw_small
 
         width, height = program.canvas
@@ -148,7 +145,6 @@ class Painter:
 
     def files(self, frame: Drawable, file: Path, progress: Progress | None = None) -> dict[Path, bytes]:
         """Bytes of the files of the picture and its outputs; raises as `scenelang.render_outputs`."""
-        from scenelang.drawing.image import packed
         from scenelang.drawing.render import outputs_of
 
         shot, drawn = frame.shot, frame.program or frame.shot.scene
@@ -167,8 +163,6 @@ class Errand(NamedTuple):
 
     def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
         """Draw a Program's bytes; returns those of its files and raises as `scenelang.render_outputs`."""
-        from scenelang.compiler.program import parse_program
-        from scenelang.drawing.image import packed
         from scenelang.drawing.render import draw, outputs_of
 
         read, how = parse_program(program), How(*self.how)._replace(threads=1)
@@ -286,7 +280,7 @@ _local = threading.local()
 
 
 class Cluster:
-    """The workers of a scheduler that draw frames, as `Helpers`; arguments and errors are those of `Link`."""
+    """Workers of a scheduler that draw frames, with the methods of `Workers`; raises as `Link`."""
 
     def __init__(self, address: str) -> None:
         self._link = Link(address)
@@ -354,8 +348,6 @@ def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[
     Raises:
         RenderError: one cannot be drawn.
     """
-    from scenelang.drawing.neural.draw import Kept
-
     kept = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
     result = [

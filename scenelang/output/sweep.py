@@ -46,7 +46,7 @@ TEXTS: Final = {"scene": ".nsg", "program": ".safetensors"}
 _REPORTED: Final = 3  # rows whose errors are reported in full
 
 
-class Book:
+class SweepTable:
     """Table of a sweep, updated as rows are compiled.
 
     It is written before anything is drawn, and again when all rows are compiled, before pictures are moved to
@@ -329,18 +329,20 @@ def render_many(
     clip = Variants(source, rows, frame, diagnostics)
     beside: list[Output] = [name for name in BESIDE if name in outputs]
     painter = Painter(clip, How(**how).checked(), outputs=tuple(beside), single=True)
-    book = Book(target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem)
+    sweep_table = SweepTable(
+        target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem
+    )
     made = make(
         painter, target, range(len(rows)), jobs=jobs, cluster=cluster,
-        beside=book.beside, failed=book.failed, progress=progress,
+        beside=sweep_table.beside, failed=sweep_table.failed, progress=progress,
     )  # fmt: skip
-    names, lines = rows.names, book.lines
+    names, lines = rows.names, sweep_table.lines
     if table is not None:
         write_table(Path(table), names, lines)
     if sheet is not None:
         last = len(tuple(rows.grid.values())[-1]) if len(rows.grid) > 1 else 0  # a row of the sheet
         write_sheet(Path(sheet), target.path, names, lines, last)
-    return Sweep(book.file, names, lines, book.told, clip.diagnostics.items, made)
+    return Sweep(sweep_table.file, names, lines, sweep_table.told, clip.diagnostics.items, made)
 
 
 def _target(out: str, stem: str) -> Target:
