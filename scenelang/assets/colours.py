@@ -58,9 +58,9 @@ def packed(
         apart = (len(near) - 1) // (side - 1)
         expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid)
         wanted = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / widths)
-        kept = (wanted.clip(-127, 127) * (_around(near, apart) if result else True)).astype(np.int8)
-        grid = expected + kept * widths
-        result.append(kept.tobytes())
+        clipped = (wanted.clip(-127, 127) * (_around(near, apart) if result else True)).astype(np.int8)
+        grid = expected + clipped * widths
+        result.append(clipped.tobytes())
     return replace(element, data=bz2.compress(b"".join(result), 9))
 
 

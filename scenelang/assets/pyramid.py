@@ -79,8 +79,8 @@ def refine(
     """
     expected = np.zeros((side,) * dimension, np.float32) if grid is None else between(grid)
     steps = np.rint((true(expected) - expected) / _widths(expected, finer))
-    kept = np.clip(steps, -127, 127).astype(np.int8)
-    return _stepped(expected, kept, finer), kept
+    clipped = np.clip(steps, -127, 127).astype(np.int8)
+    return _stepped(expected, clipped, finer), clipped
 
 
 def packed(

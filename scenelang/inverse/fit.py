@@ -94,23 +94,23 @@ def task_of(
     if not 0 < len(targets) <= MOST_TARGETS:
         raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
     moments = [Moment(source, number) for number in sorted(targets)]
-    evaluation, made = moments[0].evaluated(start)
+    evaluation, first_scene = moments[0].evaluated(start)
     space = space_of(evaluation, params, fixed)
     for name in start:
         if name not in space.names:
             raise FitError(f"a start for `{name}`, which is not among the params to find")
     first = space.point({})
-    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in moments}
+    solid = True in {_is_solid(each, space.values(first), first_scene.canvas) for each in moments}
     goals = [
-        target_of(targets[each.frame], made.canvas, mask=mask, crop=crop, under=background)
+        target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
         for each in moments
     ]
     smallest = min(min(goal.weights.shape) for goal in goals)
-    short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, smallest)
+    short = min(MOST_SOLID if solid else SIDES[-1], *first_scene.canvas, smallest)
     sides = [side for side in SIDES if side < short] + [short]
 
     def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
-        canvas = _sized(made.canvas, side)
+        canvas = _sized(first_scene.canvas, side)
         return Together(
             [
                 Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
@@ -325,7 +325,7 @@ def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float
         return ()
     seen = np.flatnonzero(np.linalg.norm(slopes, axis=0) > _UNSEEN)
     unit = slopes[:, seen] / np.linalg.norm(slopes[:, seen], axis=0)
-    spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # the same columns may stand twice
+    spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # equal columns would be singular
     size = np.sqrt(np.diag(spread))
     result = []
     for i in range(len(seen)):

@@ -47,6 +47,7 @@ def softened(name: str, width: float) -> FramedArrays:
     soft = copy.copy(network)
     cell = Cell(*network.cell_weights())
     unit = float(np.linalg.norm(cell.candidate[UNION, 0]))  # growth of the state per world unit
+    # coverage rises from 0 to 1 over 4 / exp(slope) of the state: make that at least the width
     soft.read_slope = np.float32(min(float(network.read_slope), math.log(4 / (unit * width))))
     features = network.config.features
     steep = np.linalg.norm(cell.lines[..., :features], axis=-1)  # (TOKENS, S + L), per world unit
@@ -199,6 +200,7 @@ def _scale(last: tuple[Tensor, ...], middle: tuple[Tensor, ...]) -> Tensor:
     """World distance per leaf distance (N, M or 1): one over the most by which the maps back stretch."""
     (a, b, c, d), (e, f, g, h) = middle, last
     p, q, r, s = a * e + b * g, a * f + b * h, c * e + d * g, c * f + d * h
+    # half the sum of the two roots is the largest singular value of [p q; r s]
     squares = (p + s).square() + (r - q).square(), (p - s).square() + (r + q).square()
     one, other = (square.clamp(_LEAST).sqrt() for square in squares)
     return 2.0 / (one + other)

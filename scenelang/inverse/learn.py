@@ -142,21 +142,21 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
         return zoo_bytes([_texture(data, name, job)])
     brought = parts.brought(data, suffix, name, request["files"], options.sign, options.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
-    group, made = list(brought.group), []
+    group, elements = list(brought.group), []
     for called, shape in brought.shapes.items():
         part = next((part for part in group if part.geometry == called), None)
         number = {"part": brought.numbers[called]} if called in brought.numbers else {}
         own = job._replace(about=job.about | number)
         try:
-            made.append(_shape(shape, called, 1.0 if part is None else part.size, own))
+            elements.append(_shape(shape, called, 1.0 if part is None else part.size, own))
             if part is not None and part.material and isinstance(shape, Mesh):
-                made.append(_colours(shape, called, own))
+                elements.append(_colours(shape, called, own))
         except FitError as error:
             if called == name:
                 raise
             job.say(f"{called}: left out: {error}")
             group = [part for part in group if part.geometry != called]
-    return zoo_bytes(made, {name: tuple(group)} if group else {})
+    return zoo_bytes(elements, {name: tuple(group)} if group else {})
 
 
 def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
@@ -251,7 +251,7 @@ def learn_files(
     """
     names = names_of(files, options, name)
     first = held = _writable(out)
-    made: dict[int, Zoo] = {}
+    results: dict[int, Zoo] = {}
     troubles: dict[int, str] = {}
 
     @contextmanager
@@ -274,7 +274,7 @@ def learn_files(
                 if isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
-                    made[index] = replace(Zoo.of([result]), groups=groups)
+                    results[index] = replace(Zoo.of([result]), groups=groups)
                 else:
                     yield index, result
 
@@ -282,13 +282,13 @@ def learn_files(
     with closing(_by_workers(cluster, asked(), hear) if cluster else _here(asked(), hear)) as answers:
         for index, answer in answers:
             with noted(index):
-                made[index] = read_zoo(answer())
-                held = _written(out, first, [(names[at], made[at]) for at in sorted(made)])
+                results[index] = read_zoo(answer())
+                held = _written(out, first, [(names[at], results[at]) for at in sorted(results)])
             if cluster:
-                progress("files", len(made) + len(troubles), len(files))
+                progress("files", len(results) + len(troubles), len(files))
     if troubles:
         raise FitError("\n".join(troubles[index] for index in sorted(troubles)))
-    return [element for index in sorted(made) for element in made[index].elements]
+    return [element for index in sorted(results) for element in results[index].elements]
 
 
 def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:

@@ -85,12 +85,12 @@ class SandboxProcess:
             process.stdin.writelines([data, *files.values()])
             process.stdin.flush()
         while line := process.stdout.readline():
-            kind, *told = json.loads(line)
+            kind, *values = json.loads(line)
             if kind == "made":
-                return process.stdout.read(*told)
+                return process.stdout.read(*values)
             if kind == "error":
-                raise FitError(*told)
-            hear[kind](*told)
+                raise FitError(*values)
+            hear[kind](*values)
         raise FitError(_ended(self._end()))
 
     def _begun(self) -> subprocess.Popen[bytes]:
@@ -157,14 +157,14 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
         )
         limits = iter([request["cpu_s"]])
 
-        def tell(kind: str, *told: Any, limits: Iterator[float] = limits) -> None:
+        def tell(kind: str, *values: Any, limits: Iterator[float] = limits) -> None:
             nonlocal memory
             if kind == "say" and (limit_s := next(limits, None)):
                 memory = _bound(limit_s, MEMORY)
-            _tell(out, kind, *told)
+            _tell(out, kind, *values)
 
         try:
-            made = make(request, data, tell)
+            result = make(request, data, tell)
         except FitError as error:
             _tell(out, "error", str(error))
         except MemoryError:
@@ -173,11 +173,11 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
             said = " ".join(f"{type(error).__name__}: {error}".split())
             _tell(out, "error", f"what reads it has failed ({said[:200]})")
         else:
-            _tell(out, "made", len(made), then=made)
+            _tell(out, "made", len(result), then=result)
 
 
-def _tell(out: IO[bytes], *told: Any, then: bytes = b"") -> None:
-    out.write(json.dumps(told).encode() + b"\n" + then)
+def _tell(out: IO[bytes], *values: Any, then: bytes = b"") -> None:
+    out.write(json.dumps(values).encode() + b"\n" + then)
     out.flush()
 
 

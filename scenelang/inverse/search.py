@@ -138,9 +138,9 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
     try:
         named = [param_named(evaluation, name) for name in dict.fromkeys(names)]
         chosen = named or [stmt for stmt in params_of(evaluation).values() if stmt.range is not None]
-        kept = set(fixed)
+        excluded = set(fixed)
         space = SearchBox(
-            [knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in kept]
+            [knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in excluded]
         )
     except ParamError as error:
         raise FitError(str(error)) from None
@@ -343,7 +343,7 @@ def spread(space: SearchBox, count: int, seed: int) -> Iterator[Point]:
     Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
     """
     n = len(space.axes)
-    phi = 2.0
+    phi = 2.0  # becomes the root of x^(n + 1) = x + 1, the golden ratio for n = 1
     for _ in range(50):
         phi = (1 + phi) ** (1 / (n + 1))
     step, first = phi ** -np.arange(1.0, n + 1), np.random.default_rng(seed).random(n)
@@ -432,7 +432,8 @@ def descend(
         if cost < _GRAIN or not space.smooth.any():
             break
         j = slopes(residuals, space, u, at, step, space.smooth, fine)
-        pull = j.T @ at
+        pull = j.T @ at  # half the gradient of the cost
+        # axes at an end of the box whose descent leads outwards
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
         if not len(free):
@@ -440,10 +441,11 @@ def descend(
         square = j[:, free].T @ j[:, free]
         before = cost
         for _ in range(_TRIES):
+            # Marquardt's scaling; the second term holds axes with almost no slope
             scale = np.diag(damping * np.diag(square) + 1e-9 * np.trace(square))
             move = np.zeros_like(u)
             move[free] = -np.linalg.solve(square + scale, pull[free])
-            move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))
+            move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))  # at most 0.3 of a range
             moved = space.inside(u + move)
             there = residuals(moved)
             if there is not None and (lower := float(there @ there)) < cost:
@@ -475,11 +477,11 @@ def stepped(residuals: Residuals, space: SearchBox, start: Found, *, step: float
 
 def apart(space: SearchBox, places: list[Found], most: int) -> list[Found]:
     """The best distinct places, best first."""
-    kept: list[Found] = []
+    chosen: list[Found] = []
     for one in sorted(places, key=lambda one: one.cost):
-        if all(float(space.gap(one.point, other.point).max()) > APART for other in kept):
-            kept.append(one)
-    return kept[:most]
+        if all(float(space.gap(one.point, other.point).max()) > APART for other in chosen):
+            chosen.append(one)
+    return chosen[:most]
 
 
 def scanned(coarse: Residuals, space: SearchBox, known: Found) -> list[Found]:

@@ -150,16 +150,16 @@ def make(
     if cluster is not None and painter.how.backend == "reference":
         raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
-    made = RenderResult([], len(numbers))
+    result = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
-        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, made)
+        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, result)
         run.draw(numbers)
         started = time.perf_counter()
         if target.kind == "sequence":
-            made.files = _numbered(store, target, numbers, run)
+            result.files = _numbered(store, target, numbers, run)
         else:
             animation = painter.clip.animation
-            files = [store.file(key) for key in made.keys]
+            files = [store.file(key) for key in result.keys]
             film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, run.alpha)
             part = store.folder / f"film{target.path.suffix}"
             encoders: dict[str, Encoder] = {
@@ -170,10 +170,10 @@ def make(
             }
             encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
             deliver(part, target.path)
-            made.files = [target.path]
-        made.encode_s = time.perf_counter() - started
+            result.files = [target.path]
+        result.encode_s = time.perf_counter() - started
         store.remove()
-    return made
+    return result
 
 
 @dataclass(slots=True)
@@ -188,7 +188,7 @@ class _Run:
     beside: Beside | None
     failed: Failed | None
     progress: Callable[[Progress], None]
-    made: RenderResult
+    result: RenderResult
     alpha: bool = False  # whether any frame has
     suffixes: tuple[str, ...] = ()  # of the files next to each picture
     others: Workers | Cluster | None = None  # the processes that draw besides this one
@@ -196,28 +196,28 @@ class _Run:
 
     def draw(self, numbers: range) -> None:
         """Draw all missing frames into the store, and note the key of each in the result."""
-        made, total = self.made, len(numbers)
+        result, total = self.result, len(numbers)
         asked: set[str] = set()
         try:
             for index, number in enumerate(numbers):
                 frame = self._prepared(number)
-                made.keys.append(frame.key if frame else "")
+                result.keys.append(frame.key if frame else "")
                 if frame is not None and frame.key not in asked:
                     asked.add(frame.key)
                     started = time.perf_counter()
                     if self.store.has(frame.key, frame.shot.scene.canvas):
-                        made.resumed += 1
+                        result.resumed += 1
                     else:
                         self._one(frame, index, total)
-                    made.draw_s += time.perf_counter() - started
+                    result.draw_s += time.perf_counter() - started
                 self._say(index + 1, total)
             started = time.perf_counter()
             if self.others is not None:
-                made.jobs = self.others.count
+                result.jobs = self.others.count
                 while self.others.waiting:
                     self.others.take()
                     self._say(total, total)
-            made.draw_s += time.perf_counter() - started
+            result.draw_s += time.perf_counter() - started
         finally:
             if self.others is not None:
                 self.others.close()
@@ -235,7 +235,7 @@ class _Run:
                 raise
             self.failed(number, error)
             return None
-        self.made.compile_s += time.perf_counter() - painter.load_s - started
+        self.result.compile_s += time.perf_counter() - painter.load_s - started
         self.alpha |= frame.shot.scene.background is None
         if self.beside is not None:
             files = self.beside(frame, self.store)
@@ -256,7 +256,7 @@ class _Run:
         else:
             put_frame(painter.files(frame, file, lambda share: self._say(index + share, total)))
             self.spent_s += time.perf_counter() - started
-        self.made.drawn += 1
+        self.result.drawn += 1
 
     def _helpers(self, frame: Drawable, left: int) -> Workers | Cluster | None:
         """The processes that draw from here on: a given cluster, or other processes where they pay."""
@@ -266,14 +266,14 @@ class _Run:
         if frame.program is None or jobs == 1 or frame.place == "cuda":
             return None
         if jobs is None:
-            drawn = self.made.drawn
+            drawn = self.result.drawn
             if painter.how.threads is not None or usable_cores() < 2 or drawn < _TRIED:
                 return None
             if self.spent_s / drawn * left <= WORTH_S:
                 return None
         count = min(jobs or left, max(2, usable_cores()), left)
         if jobs is not None and jobs > count:
-            self.made.asked = jobs
+            self.result.asked = jobs
         if count < 2:
             self.jobs = 1
             return None
@@ -287,15 +287,15 @@ class _Run:
 def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[Path]:
     """Move the files of frames to their places; of equal frames all but the last are copies."""
     target.path.mkdir(parents=True, exist_ok=True)
-    keys = run.made.keys
+    keys = run.result.keys
     last = {key: index for index, key in enumerate(keys)}
     files: list[Path] = []
     for index, (number, key) in enumerate(zip(numbers, keys, strict=True)):
         if not key:
             continue
-        file, kept = target.file(number), store.file(key)
-        pairs = {output_file(file, name): output_file(kept, name) for name in run.painter.outputs}
-        pairs[file] = kept
+        file, stored = target.file(number), store.file(key)
+        pairs = {output_file(file, name): output_file(stored, name) for name in run.painter.outputs}
+        pairs[file] = stored
         for name, frame in pairs.items():
             if last[key] == index:
                 os.replace(frame, name)

@@ -168,8 +168,8 @@ class Census:
         np.add.at(total, index, np.concatenate([self.counts, counts * weight]))
         self.counts = total
         if len(self.colours) > _MOST_KNOWN:
-            kept = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
-            self.colours, self.counts, self.thinned = self.colours[kept], total[kept], True
+            frequent = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
+            self.colours, self.counts, self.thinned = self.colours[frequent], total[frequent], True
 
     @property
     def fits(self) -> bool:

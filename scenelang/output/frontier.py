@@ -213,12 +213,12 @@ def front(figures: Sequence[tuple[float, float]]) -> list[bool]:
     Of equal points the first one counts.
     """
     order = sorted(range(len(figures)), key=lambda i: (*figures[i], i))
-    kept = [False] * len(figures)
+    mask = [False] * len(figures)
     best = math.inf
     for i in order:
         if figures[i][1] < best:
-            best, kept[i] = figures[i][1], True
-    return kept
+            best, mask[i] = figures[i][1], True
+    return mask
 
 
 def between(points: Iterable[Point]) -> int:
@@ -339,8 +339,8 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
     fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
     """
     if not offers:
-        told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
-        raise NothingFits("nothing on the frontier draws this scene" + (f" ({told})" if told else ""))
+        reasons = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
+        raise NothingFits("nothing on the frontier draws this scene" + (f" ({reasons})" if reasons else ""))
     good = [offer for offer in offers if not _lacks(offer, limits)]
     if not good:
         raise NothingFits(_nearest(offers, limits))
@@ -374,12 +374,12 @@ def _nearest(offers: Sequence[Offer], limits: Limits) -> str:
     asked += [f"FLIP {limits.flip:g}"] if limits.flip is not None else []
     exact = [o for o in offers if limits.flip is not None and o.flip <= limits.flip]
     if exact:
-        told = f"exact enough is {min(exact, key=lambda o: o.ms).told()}"
+        nearest = f"exact enough is {min(exact, key=lambda o: o.ms).told()}"
     elif limits.flip is not None:
-        told = f"the most exact is {min(offers, key=lambda o: (o.flip, o.ms)).told()}"
+        nearest = f"the most exact is {min(offers, key=lambda o: (o.flip, o.ms)).told()}"
     else:
-        told = f"the fastest is {min(offers, key=lambda o: o.ms).told()}"
-    return f"nothing draws this scene within {' and '.join(asked)}; {told}"
+        nearest = f"the fastest is {min(offers, key=lambda o: o.ms).told()}"
+    return f"nothing draws this scene within {' and '.join(asked)}; {nearest}"
 
 
 # ---------------------------------------------------------------- predicted times

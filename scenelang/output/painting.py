@@ -245,23 +245,23 @@ def main() -> None:
     # Answers go to standard output; prints of libraries go to standard error.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    kept, source = Kept(), sys.stdin.buffer
+    cache, source = Kept(), sys.stdin.buffer
     while line := source.readline():
         head = json.loads(line)
         program = source.read(head["bytes"])
         if len(program) < head["bytes"]:
             return
         try:
-            answers.write(json.dumps(_answer(head, program, kept)).encode() + b"\n")
+            answers.write(json.dumps(_answer(head, program, cache)).encode() + b"\n")
             answers.flush()
         except BrokenPipeError:  # the parent process is gone
             os._exit(0)
 
 
-def _answer(head: dict[str, Any], program: bytes, kept: Kept) -> dict[str, Any]:
+def _answer(head: dict[str, Any], program: bytes, cache: Kept) -> dict[str, Any]:
     errand = Errand(*head["errand"])
     try:
-        put_frame(errand.run(program, kept))
+        put_frame(errand.run(program, cache))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:
@@ -348,9 +348,9 @@ def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[
     Raises:
         RenderError: one cannot be drawn.
     """
-    kept = _local.__dict__.setdefault("kept", Kept())
+    cache = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
     result = [
-        {file.name: data for file, data in errand.run(program, kept).items()} for program, errand in batch
+        {file.name: data for file, data in errand.run(program, cache).items()} for program, errand in batch
     ]
     return time.process_time() - started, result

@@ -138,8 +138,8 @@ class SweepTable:
 
     def _adopt(self, frame: Drawable, store: Store) -> None:
         """Reuse the files of an existing picture."""
-        file, kept = self.target.file(frame.number), store.file(frame.key)
-        files = {output_file(kept, name): output_file(file, name) for name in self.outputs} | {kept: file}
+        file, stored = self.target.file(frame.number), store.file(frame.key)
+        files = {output_file(stored, name): output_file(file, name) for name in self.outputs} | {stored: file}
         if all(path.is_file() for path in files.values()):
             for into, path in files.items():
                 store.adopt(into, path)
@@ -198,9 +198,9 @@ def write_sheet(
                 f"{name} {value}" for name, value in zip(names, line.values, strict=True) if value
             )
             draw.text((x, y + size[1]), _cut(label, size[0], font), "#444444", font)
-    made = io.BytesIO()
-    sheet.save(made, image_format(path))
-    write_output(path, made.getvalue())
+    buffer = io.BytesIO()
+    sheet.save(buffer, image_format(path))
+    write_output(path, buffer.getvalue())
     return len(lines)
 
 
@@ -332,7 +332,7 @@ def render_many(
     sweep_table = SweepTable(
         target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem
     )
-    made = make(
+    run = make(
         painter, target, range(len(rows)), jobs=jobs, cluster=cluster,
         beside=sweep_table.beside, failed=sweep_table.failed, progress=progress,
     )  # fmt: skip
@@ -342,7 +342,7 @@ def render_many(
     if sheet is not None:
         last = len(tuple(rows.grid.values())[-1]) if len(rows.grid) > 1 else 0  # a row of the sheet
         write_sheet(Path(sheet), target.path, names, lines, last)
-    return Sweep(sweep_table.file, names, lines, sweep_table.told, clip.diagnostics.items, made)
+    return Sweep(sweep_table.file, names, lines, sweep_table.told, clip.diagnostics.items, run)
 
 
 def _target(out: str, stem: str) -> Target:

@@ -355,9 +355,9 @@ def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
         values, unit = (texts, "") if name in (*_FRONT, *_BACK) else _typed(texts)
         arrays.append(arrow.array(values))
         fields.append(arrow.field(name, arrays[-1].type, metadata={"unit": unit} if unit else None))
-    made = io.BytesIO()
-    pyarrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), made)
-    return made.getvalue()
+    buffer = io.BytesIO()
+    pyarrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), buffer)
+    return buffer.getvalue()
 
 
 def _typed(texts: Sequence[str]) -> tuple[Sequence[Any], str]:

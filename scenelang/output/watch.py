@@ -166,9 +166,9 @@ class Easel:
     def _film(
         self, painter: Painter, target: Target, numbers: range, outcome: Outcome, before: Stamps
     ) -> None:
-        made = make(painter, target, numbers, progress=checking(before))
-        outcome.good, outcome.files = True, made.files
-        outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s
+        run = make(painter, target, numbers, progress=checking(before))
+        outcome.good, outcome.files = True, run.files
+        outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
 
 
 # ---------------------------------------------------------------- waiting for changes
