@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from lab import RESULTS, ROOT
@@ -65,7 +66,7 @@ def at(name: str, keys: str = "", /, **where: object) -> Any:
 
 def kilobytes(name: str) -> Figure:
     """Size of a file of the package, named without its ending."""
-    return Figure((PACKAGE / f"{name}.safetensors").stat().st_size / 1000)
+    return Figure(_file(name).stat().st_size / 1000)
 
 
 def numbers(name: str) -> Figure:
@@ -78,8 +79,13 @@ def told(name: str) -> Any:
     return json.loads(_header(f"models/{name}/weights")["__metadata__"]["scenelang"])
 
 
+def _file(name: str) -> Path:
+    folder = ROOT / "scenelang/language" if name.startswith("std/") else PACKAGE
+    return folder / f"{name}.safetensors"
+
+
 def _header(name: str) -> Any:
-    with open(PACKAGE / f"{name}.safetensors", "rb") as file:
+    with open(_file(name), "rb") as file:
         return json.loads(file.read(int.from_bytes(file.read(8), "little")))
 
 
