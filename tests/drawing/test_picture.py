@@ -13,8 +13,8 @@ from lab.sets.plane import SETS
 from lab.sets.scenes import sets_of
 from scenelang.assets.zoo import zoo_bytes
 from scenelang.compiler.manifest import load_manifest
-from scenelang.drawing.exact import proof as errors
-from scenelang.drawing.exact import proof as picture
+from scenelang.drawing import proof as errors
+from scenelang.drawing import proof as picture
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED
 from scenelang.drawing.proof import Stream
