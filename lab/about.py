@@ -1,4 +1,4 @@
-"""What every record says of where it was made, and how measurements say how far they are."""
+"""Facts of the machine and the revision for every record, and reports of progress."""
 
 from __future__ import annotations
 

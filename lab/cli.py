@@ -214,18 +214,18 @@ def stability(
     earlier = [json.loads(path.read_text("utf-8")) for path in known]
     try:
         with Bar() as bar:
-            found = run_stability(loaded, scenes, seed, only, bar, earlier)
+            result = run_stability(loaded, scenes, seed, only, bar, earlier)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    write_json(out / "stability.json", found)
-    for name, probe in found["probes"].items():
+    write_json(out / "stability.json", result)
+    for name, probe in result["probes"].items():
         figures = [(row["value"], row["psnr"]["mean"], row["psnr"]["worst"]) for row in probe["rows"]]
         cells = "; ".join(f"{value:g} {mean:.1f} ({worst:.1f})" for value, mean, worst in figures)
         click.echo(f"{name}: PSNR by {probe['quantity']}, mean (worst): {cells}")
-    for name, figures in found["invariants"].items():
+    for name, figures in result["invariants"].items():
         click.echo(f"{name}: " + ", ".join(f"{k} {v:g}" for k, v in figures.items()))
-    if found["probes"]:
-        _write_chart(out / "stability.png", lambda: stability_chart([found]))
+    if result["probes"]:
+        _write_chart(out / "stability.png", lambda: stability_chart([result]))
 
 
 @command.command()
@@ -272,10 +272,10 @@ def plans(files: tuple[Path, ...], out: Path) -> None:
     need_metrics()
     from lab.parsimony import measure_examples
 
-    found = measure_examples(
+    result = measure_examples(
         files, lambda plan: click.echo(f"{plan['file']}: {plan['drawing']['ms']:.0f} ms", err=True)
     )
-    write_json(out, found)
+    write_json(out, result)
 
 
 @command.command()
@@ -305,11 +305,11 @@ def fit(model: str, scenes: int, counts: tuple[int, ...], side: int, name: str, 
 
     _model_to_measure(model, None)
     with Bar() as bar:
-        found = measure(model, counts, scenes, seed, side, bar)
-    write_json(out / f"{name}.json", found)
+        result = measure(model, counts, scenes, seed, side, bar)
+    write_json(out / f"{name}.json", result)
     click.echo(
-        f"{model}: {found['found']} of {scenes} found ({found['share']:.0%} ± {found['interval']:.0%}), "
-        f"median {found['median_seconds']} s and {found['median_frames']} pictures"
+        f"{model}: {result['found']} of {scenes} found ({result['share']:.0%} ± {result['interval']:.0%}), "
+        f"median {result['median_seconds']} s and {result['median_frames']} pictures"
     )
 
 
@@ -410,18 +410,18 @@ def _verify(
         raise click.UsageError(f"`{path}` is not a frontier: {error}") from None
     try:
         with Bar() as bar:
-            found = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, bar, kept)
+            result = verify(frontier, base, scenes, VERIFY_SEED if seed is None else seed, bar, kept)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    write_json(out / "verified.json", found)
-    for case, rows in found["cases"].items():
+    write_json(out / "verified.json", result)
+    for case, rows in result["cases"].items():
         click.echo(case)
         for name, row in rows.items():
             share = f"{100 * row['kept']:5.1f} % of {row['scenes']}"
             click.echo(f"  {name:40} kept in {share}, at worst {row['worst']:.2f} of the promise")
     least = f"every promise is kept in at least {100 * KEPT:.0f} % of the scenes"
-    click.echo(least if found["held"] else f"not {least}")
-    return bool(found["held"])
+    click.echo(least if result["held"] else f"not {least}")
+    return bool(result["held"])
 
 
 # ---------------------------------------------------------------- trainings

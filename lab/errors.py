@@ -53,7 +53,7 @@ def proved_errors(
     nearest = np.maximum(np.maximum(corner, -(corner + side)), 0.0)
     cells = cells[np.hypot(*nearest.T) <= RADIUS + 1e-9]
     seen = np.full((2, CELLS, CELLS), np.inf)  # the least of f - e, and of e - f
-    found = -seen
+    result = -seen
 
     def wide(cells: npt.NDArray[np.intp], p: Floats, half: float) -> npt.NDArray[np.bool_]:
         place = cells[:, 1], cells[:, 0]
@@ -66,12 +66,12 @@ def proved_errors(
         least = np.stack([off, -off]) - most
         room = near - slack * (seen[0] + seen[1])[place]
         left: npt.NDArray[np.bool_] = (least < seen[:, place[0], place[1]] - room).any(0) & (half > _FINEST)
-        for own, value in zip(found, -least, strict=True):
+        for own, value in zip(result, -least, strict=True):
             np.maximum.at(own, (place[0][~left], place[1][~left]), value[~left])
         return left
 
     bounded(cells, (cells + 0.5) * side - RADIUS, side / 2, wide)
-    low, high = np.where(np.isfinite(found), found, _UNSEEN)
+    low, high = np.where(np.isfinite(result), result, _UNSEEN)
     return -low, high
 
 

@@ -105,7 +105,7 @@ def run_everything(
         Of each step ``command``, and ``seconds``, those of the processor (``processor_s``) and ``exit``, or
         ``needs`` where it was left out.
     """
-    found: list[dict[str, Any]] = []
+    result: list[dict[str, Any]] = []
     for words, step in command_lines(out.resolve(), budget, scenes):
         shown = shlex.join(words).replace(str(out.resolve()), str(out))
         missing = [name for name in step.needs if not _there(name)]
@@ -117,9 +117,9 @@ def run_everything(
             row["exit"] = subprocess.run([sys.executable, "-m", *words], cwd=ROOT).returncode
             row["seconds"] = round(time.perf_counter() - started, 1)
             row["processor_s"] = round(_children_s() - before, 1)
-        found.append(row)
-        done(found)
-    return found
+        result.append(row)
+        done(result)
+    return result
 
 
 def _children_s() -> float:

@@ -81,19 +81,19 @@ def measure(
         report("fitting", index, scenes)
         case = random_case(manifest, index, counts[index % len(counts)], seed, side)
         started = time.process_time()
-        found = fit(SourceFile("scene", case.text), case.target, seed=seed)
+        result = fit(SourceFile("scene", case.text), case.target, seed=seed)
         spent = time.process_time() - started
-        off = max(_off(number, case.truth[number.label]) for number in found.numbers)
+        off = max(_off(number, case.truth[number.label]) for number in result.numbers)
         rows.append(
             {
                 "set": case.set,
                 "params": len(case.truth),
                 "start_db": round(case.start_db, 2),
-                "db": round(found.psnr, 2),
+                "db": round(result.psnr, 2),
                 "off": round(off, 5),
-                "found": bool(off <= NEAR or found.psnr >= NEAR_DB),
-                "done": found.done,
-                "frames": found.frames,
+                "found": bool(off <= NEAR or result.psnr >= NEAR_DB),
+                "done": result.done,
+                "frames": result.frames,
                 "seconds": round(spent, 2),
             }
         )
@@ -115,7 +115,7 @@ def measure(
 
 
 def _off(number: Number, truth: float) -> float:
-    """How far a value is from the true one, in shares of its range; a full turn is none."""
+    """Distance of a value from the true one, in shares of its range, modulo a full turn."""
     off = abs((number.value - number.low) / (number.high - number.low) - truth)
     return min(off, 1 - off) if math.isclose(number.high - number.low, math.tau, rel_tol=1e-6) else off
 
@@ -135,14 +135,14 @@ def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Ca
     made = random_solid(rng, SOLID_SETS[name]) if manifest.dimension == 3 else random_scene(rng, SETS[name])
     text, word, slots = to_nsg(made), "", []
     for line in re.finditer(r"[^\n]+", text):
-        words = {found.end(): found[1] for found in _WORD.finditer(line[0])}
-        for found in _NUMBER.finditer(line[0]):
-            word = next((w for end, w in reversed(words.items()) if end <= found.start()), word)
+        words = {result.end(): result[1] for result in _WORD.finditer(line[0])}
+        for result in _NUMBER.finditer(line[0]):
+            word = next((w for end, w in reversed(words.items()) if end <= result.start()), word)
             low, high = ranges.get(word, (1.0, 0.0))
-            value = float(found[0].removesuffix(found[1] or ""))
-            value = math.degrees(value) if found[1] == "rad" else value
-            if low <= value <= high and bool(found[1]) == (word == "rotate"):
-                slots.append((line.start() + found.start(), line.start() + found.end(), value, (low, high)))
+            value = float(result[0].removesuffix(result[1] or ""))
+            value = math.degrees(value) if result[1] == "rad" else value
+            if low <= value <= high and bool(result[1]) == (word == "rotate"):
+                slots.append((line.start() + result.start(), line.start() + result.end(), value, (low, high)))
         word = next(reversed(words.values()), word)
     if len(slots) < count:
         return None

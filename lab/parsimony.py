@@ -41,7 +41,7 @@ def shown_frame(path: Path) -> int:
 
 
 def example_plan(path: Path) -> dict[str, Any]:
-    """What `scenelang dump --costs` says of a scene on one thread, and what each of `WAYS` costs."""
+    """Result of `scenelang dump --costs` for a scene on one thread, and the cost of each of `WAYS`."""
     frame = shown_frame(path)
     scene = load(path, frame=frame)
     graphs: dict[str, Graph] = {}
@@ -59,7 +59,7 @@ def example_plan(path: Path) -> dict[str, Any]:
 def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
     """``meetings``, ``ms`` (the better of two) and ``psnr`` (dB) of a scene by each of `WAYS`."""
     exact = over_white(reference_of(scene, model.manifest))
-    found = {}
+    result = {}
     for name, options in WAYS.items():
         arguments = dict(options)
         without = arguments.pop("without", ())
@@ -70,8 +70,8 @@ def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
             drawing = draw(model.framed, p, **arguments)
             best = min(best, 1000 * (time.perf_counter() - started))
         error = psnr(over_white(drawing.image), exact)
-        found[name] = {"meetings": drawing.pairs, "ms": round(best, 2), "psnr": round(error, 2)}
-    return found
+        result[name] = {"meetings": drawing.pairs, "ms": round(best, 2), "psnr": round(error, 2)}
+    return result
 
 
 def measure_examples(
@@ -92,11 +92,11 @@ def measure_examples(
             digests[plans[-1]["model"]] = open_model(plans[-1]["model"]).digest
             if report is not None:
                 report(plans[-1])
-        found = about()
+        result = about()
     finally:
         torch.set_num_threads(before)
     return {
-        **found,
+        **result,
         "weights": digests,
         "plans": plans,
     }

@@ -1,4 +1,4 @@
-"""What the stability suite varies: one quantity at a time, from what was trained to far beyond.
+"""Probes of the stability suite: each varies one quantity from its trained range to far beyond.
 
 A probe makes a random scene for a value of its quantity; the same index gives the same random numbers at
 every value, so that a curve differs by the quantity alone. The base is that of the set `shapes2d`, or of
@@ -158,7 +158,7 @@ class Probe:
 
 @dataclass(frozen=True, slots=True)
 class Kit:
-    """What the suite measures models of a dimension with.
+    """Probes and counts for models of a dimension.
 
     Args:
         probes: by name.
@@ -241,13 +241,13 @@ def cell_of(i: int, count: int) -> Translate:
 def apart(rng: Rng, count: int = 9) -> list[Object]:
     """Objects that do not overlap, in cells of a grid: what order they come in makes no difference."""
     size = 0.42 * (2.0 / (math.isqrt(count - 1) + 1))
-    found = []
+    result = []
     config = SetConfig(warp=0.0, deformed=False)
     for i in range(count):
         node = random_object(rng, config)
         turn = next(t for t in node.transforms if isinstance(t, Rotate))
-        found.append(node.model_copy(update={"transforms": (Scale.uniform(size), turn, cell_of(i, count))}))
-    return found
+        result.append(node.model_copy(update={"transforms": (Scale.uniform(size), turn, cell_of(i, count))}))
+    return result
 
 
 def union_of(nodes: list[Object]) -> Scene:

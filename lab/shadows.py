@@ -1,4 +1,4 @@
-"""What a medium's shadow on a solid looks like, and the error inside it: the paper's Figure 5.
+"""Pictures of a medium's shadow on a solid, and the error inside it: the paper's Figure 5.
 
 The shadow's mask is found from exact pictures alone: pixels that show the solid and no medium, and that are
 lit otherwise where the medium is taken away. Beside the error of the pixels stands the share of the shadow
@@ -32,7 +32,7 @@ Array = npt.NDArray[np.float64]
 
 
 def shadow_mask(scene: Scene, manifest: Manifest) -> tuple[npt.NDArray[np.bool_], Array, Array]:
-    """Which pixels (H, W) show a solid in a medium's shadow; exact pictures (H, W, 3) with and without it.
+    """Mask (H, W) of solids in a medium's shadow, and exact pictures (H, W, 3) with and without it.
 
     Args:
         scene: a solid, then a medium.
@@ -64,10 +64,10 @@ def measure_shadows(
     Returns:
         A summary for JSON, and the first scenes: network, exact picture and FLIP map.
     """
-    found: list[dict[str, float]] = []
+    result: list[dict[str, float]] = []
     rows: list[Image] = []
     attempt = 0
-    while len(found) < count:
+    while len(result) < count:
         made = shadow(np.random.default_rng([seed, attempt])).sized((side, side))
         attempt += 1
         mask, exact, lit = shadow_mask(made, model.manifest)
@@ -75,7 +75,7 @@ def measure_shadows(
             continue
         picture = np.asarray(draw_scene(model, made)[1], np.float64)
         inside, whole = picture[mask], exact[mask]
-        found.append(
+        result.append(
             {
                 "psnr": psnr(inside, whole, MOST_DB),
                 "psnr_uncapped": psnr(inside, whole, UNCAPPED_DB),
@@ -86,10 +86,10 @@ def measure_shadows(
             }
         )
         if len(rows) < SHOWN:
-            rows.append(side_by_side(picture, exact, f"{found[-1]['psnr_uncapped']:.1f} dB in shadow"))
-        report("shadow", len(found), count)
+            rows.append(side_by_side(picture, exact, f"{result[-1]['psnr_uncapped']:.1f} dB in shadow"))
+        report("shadow", len(result), count)
     summary = {"scenes": count, "seed": seed, "canvas": [side, side], "tried": attempt}
-    return {**summary, **about(), "model": model.manifest.name, **_summary(found)}, contact_sheet(rows)
+    return {**summary, **about(), "model": model.manifest.name, **_summary(result)}, contact_sheet(rows)
 
 
 def _summary(found: Sequence[dict[str, float]]) -> dict[str, Any]:

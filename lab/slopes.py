@@ -41,11 +41,11 @@ _BATCH = 1 << 15  # boxes at a time
 
 
 def distances(layers: Layers, p: Floats) -> Floats:
-    """What a decoder answers (M,) at points (M, 2)."""
+    """Distances (M,) of a decoder at points (M, 2)."""
     (w1, b1), (w2, b2), (w3, b3) = layers
     x = np.maximum(p @ w1.T + b1, 0.0)
-    found: Floats = np.maximum(x @ w2.T + b2, 0.0) @ w3[0] + b3[0]
-    return found
+    result: Floats = np.maximum(x @ w2.T + b2, 0.0) @ w3[0] + b3[0]
+    return result
 
 
 def proved_slack(layers: Layers, near: float = 0.0015, slack: float = 1.25) -> Floats:
@@ -63,7 +63,7 @@ def proved_slack(layers: Layers, near: float = 0.0015, slack: float = 1.25) -> F
     error = _error(layers, nodes, axis, near, slack)
     # nodes of cells that the disc meets
     seen = np.hypot(*points.T).reshape(nodes.shape) <= RADIUS + 2**0.5 * NODE
-    excess, found = np.zeros(nodes.shape, np.float32), []
+    excess, result = np.zeros(nodes.shape, np.float32), []
     values = np.where(seen, nodes, np.nan).astype(np.float32)
     inner = 0.0
     for radius in RADII:
@@ -74,8 +74,8 @@ def proved_slack(layers: Layers, near: float = 0.0015, slack: float = 1.25) -> F
         cells = np.maximum(
             np.maximum(excess[1:, 1:], excess[:-1, :-1]), np.maximum(excess[1:, :-1], excess[:-1, 1:])
         )
-        found.append(_pooled(cells) + _pooled(error) + _pooled(_spread(error, rim)) + ROUNDING)
-    return np.stack(found)
+        result.append(_pooled(cells) + _pooled(error) + _pooled(_spread(error, rim)) + ROUNDING)
+    return np.stack(result)
 
 
 def _compare(
@@ -99,24 +99,24 @@ def _compare(
 def _spread(values: Floats, rim: int) -> Floats:
     """The largest within so many rows and columns."""
     for axis in (0, 1):
-        found, reach = values, 1
+        result, reach = values, 1
         while reach <= rim:  # windows of twice the reach, and of what is left
             step = min(reach, rim + 1 - reach)
-            ahead, behind = np.copy(found), np.copy(found)
+            ahead, behind = np.copy(result), np.copy(result)
             cut = [slice(None)] * 2
             keep = [slice(None)] * 2
             cut[axis], keep[axis] = slice(step, None), slice(None, -step)
-            ahead[tuple(keep)] = np.maximum(found[tuple(keep)], found[tuple(cut)])
-            behind[tuple(cut)] = np.maximum(found[tuple(cut)], found[tuple(keep)])
-            found, reach = np.maximum(ahead, behind), reach + step
-        values = found
+            ahead[tuple(keep)] = np.maximum(result[tuple(keep)], result[tuple(cut)])
+            behind[tuple(cut)] = np.maximum(result[tuple(cut)], result[tuple(keep)])
+            result, reach = np.maximum(ahead, behind), reach + step
+        values = result
     return values
 
 
 def _pooled(values: npt.NDArray[np.floating]) -> Floats:
     """The largest of the nodes' cells within each cell of `Slopes`."""
-    found: Floats = values.reshape(CELLS, len(values) // CELLS, CELLS, -1).max((1, 3)).astype(np.float64)
-    return found
+    result: Floats = values.reshape(CELLS, len(values) // CELLS, CELLS, -1).max((1, 3)).astype(np.float64)
+    return result
 
 
 def _error(layers: Layers, nodes: Floats, axis: Floats, near: float, slack: float) -> Floats:
@@ -131,8 +131,8 @@ def _error(layers: Layers, nodes: Floats, axis: Floats, near: float, slack: floa
     for dx, dy in ((0, 0), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (-0.3, -0.3)):
         p = centres + NODE * np.array([dx, dy])
         seen = np.maximum(seen, abs(distances(layers, p) - _bilinear(nodes, cells, p, axis)[0]))
-    found = np.zeros((len(at), len(at)))
-    seen_at = np.zeros_like(found)
+    result = np.zeros((len(at), len(at)))
+    seen_at = np.zeros_like(result)
     seen_at[cells[:, 1], cells[:, 0]] = seen
 
     def wide(cells: npt.NDArray[np.intp], p: Floats, half: float) -> npt.NDArray[np.bool_]:
@@ -141,11 +141,11 @@ def _error(layers: Layers, nodes: Floats, axis: Floats, near: float, slack: floa
         np.maximum.at(seen_at, place, here)
         left: npt.NDArray[np.bool_] = most > np.maximum(near, slack * seen_at[place])
         left &= half > _FINEST
-        np.maximum.at(found, (place[0][~left], place[1][~left]), most[~left])
+        np.maximum.at(result, (place[0][~left], place[1][~left]), most[~left])
         return left
 
     bounded(cells, centres, NODE / 2, wide)
-    return found
+    return result
 
 
 def bounded(
@@ -200,29 +200,29 @@ def answered(layers: Layers, p: Floats, half: float) -> tuple[Floats, Floats, Fl
 
 
 def _open(inputs: Floats, radius: Floats) -> tuple[Floats, Floats]:
-    """How far open units with inputs within a radius are: a middle, and a spread about it."""
+    """Bounds on how open units are for inputs within a radius: a middle, and a spread about it."""
     sure = (inputs >= radius) | (inputs <= -radius)
     return np.where(sure, inputs > 0, 0.5), np.where(sure, 0.0, 0.5)
 
 
 def short(values: Floats, end: float) -> npt.NDArray[np.float16]:
     """Numbers in 16 bits, rounded towards an infinite end."""
-    found = values.astype(np.float16)
-    past = np.sign(end) * (values - found) > 0
-    return np.where(past, np.nextafter(found, np.float16(end)), found)
+    result = values.astype(np.float16)
+    past = np.sign(end) * (values - result) > 0
+    return np.where(past, np.nextafter(result, np.float16(end)), result)
 
 
 def slopes_file(model: str) -> bytes:
     """The file of a shipped model: s of its geometries (geometries, radii, cells, cells), rounded up."""
     network, digest = load_arrays(model)
-    found = []
+    result = []
     assert isinstance(network, FramedArrays)
     for code in network.codes:  # one by one, as their weights are mixed where one is drawn alone
         layers = [(w[0], b[0]) for w, b in network.decoder_weights(code[None]).layers]
-        found.append(proved_slack(layers))
+        result.append(proved_slack(layers))
     header = {"weights": digest, "node": NODE, "steep": STEEP}
     data: bytes = save(
-        {"cells": short(np.stack(found), np.inf)}, {"scenelang": json.dumps({"format": 1, **header})}
+        {"cells": short(np.stack(result), np.inf)}, {"scenelang": json.dumps({"format": 1, **header})}
     )
     return data
 

@@ -1,4 +1,4 @@
-"""What the stability suite varies of solids. The base is the set `solids3d`, on 64 x 64 pixels."""
+"""Probes of the stability suite for solids. The base is the set `solids3d`, on 64 x 64 pixels."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _beside(rng: Rng, *before: SceneNode | Link, **settings: object) -> Scene:
 
 
 def links(made: Scene) -> Sequence[Link]:
-    """Those of a scene of one chain."""
+    """Links of a scene of one chain."""
     (chain,) = made.nodes
     assert isinstance(chain, Chain)
     return chain.children

@@ -52,7 +52,7 @@ Row = dict[str, Any]
 
 
 def kit_of(manifest: Manifest) -> Kit:
-    """What a model is measured with."""
+    """The sets and probes of a model."""
     return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.elements else FLAT
 
 
@@ -80,13 +80,13 @@ def exact_picture(
     """
     solid = model.manifest.dimension == 3
     clear = scene.model_copy(update={"nodes": ()} if solid else {"background": None})
-    found = np.asarray(reference_of(clear, model.manifest, per_side=per_side), np.float64)
+    result = np.asarray(reference_of(clear, model.manifest, per_side=per_side), np.float64)
     if solid:
         picture = np.asarray(reference_of(scene, model.manifest, per_side=per_side), np.float64)
-        alpha = (np.abs(picture - found).max(2, keepdims=True) > EDGE).astype(np.float64)
+        alpha = (np.abs(picture - result).max(2, keepdims=True) > EDGE).astype(np.float64)
     else:
-        alpha = found[..., 3:]
-        picture = found[..., :3] * alpha + (1 - alpha)
+        alpha = result[..., 3:]
+        picture = result[..., :3] * alpha + (1 - alpha)
     edge = np.zeros(alpha.shape[:2], bool)
     for axis in (0, 1):
         step = np.abs(np.diff(np.concatenate([picture, alpha], 2), axis=axis)).max(2) > EDGE
@@ -184,11 +184,11 @@ def run_probe(
         if value in before:
             rows.append(before[value])
             continue
-        found, ideal, changes = [], [], []
+        result, ideal, changes = [], [], []
         for index in range(scenes):
             scene = scene_of(probe, value, index, seed, model)
             picture = _drawn(model, scene, probe.folded)
-            found.append(compare(picture, exact_picture(scene, model, IDEAL if probe.sampled else 2)))
+            result.append(compare(picture, exact_picture(scene, model, IDEAL if probe.sampled else 2)))
             if probe.sampled:
                 changes.append(_change(model, drifting(scene, FRAMES), IDEAL))
             if fine:
@@ -196,12 +196,12 @@ def run_probe(
         rows.append(
             {
                 "value": value,
-                "worst_scene": int(np.argmax([e.square for e in found])),
-                "psnr": spread([e.psnr for e in found], 5),
-                "flip": spread([e.flip for e in found], 95),
-                "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in found])))), 3),
-                "per_edge": round(float(np.mean([e.per_edge for e in found])), 6),
-                "per_covered": round(float(np.mean([e.per_covered for e in found])), 6),
+                "worst_scene": int(np.argmax([e.square for e in result])),
+                "psnr": spread([e.psnr for e in result], 5),
+                "flip": spread([e.flip for e in result], 95),
+                "db": round(-10 * math.log10(max(1e-12, float(np.mean([e.square for e in result])))), 3),
+                "per_edge": round(float(np.mean([e.per_edge for e in result])), 6),
+                "per_covered": round(float(np.mean([e.per_covered for e in result])), 6),
                 "revision": revision(),
             }
         )
@@ -263,7 +263,7 @@ def _change(model: Model, frames: Sequence[Scene], per_side: int = 2) -> float:
 
 
 def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
-    """What tiles, threads and skipping change of a picture at most, on base scenes."""
+    """Largest changes of a picture by tiles, threads and skipping, on base scenes."""
     probe = kit_of(model.manifest).probes["objects"]
     ways: dict[str, dict[str, Any]] = {"threads": {"threads": 2}}
     if isinstance(model.network, Framed):
@@ -389,7 +389,7 @@ BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side o
 def measured_ranges(
     found: Mapping[str, Any], dimension: int = 2
 ) -> tuple[dict[str, list[float]], dict[str, str]]:
-    """What the suite says of a model.
+    """Ranges of a model as the suite measured them.
 
     Args:
         found: of `lab.stability.run_stability`.

@@ -53,8 +53,8 @@ class Leaf(NamedTuple):
 
     def distance(self, p: Floats) -> Floats:
         """Exact distances (P,) at points (2, P)."""
-        found: Floats = np.hypot(*p) - 1.0
-        return found if not self.inner else sector_distance(p, self.order, 0.0, 1.0, self.inner)
+        result: Floats = np.hypot(*p) - 1.0
+        return result if not self.inner else sector_distance(p, self.order, 0.0, 1.0, self.inner)
 
     def points(self, count: int, rng: Rng) -> Floats:
         """Points (2, count) of the half sector: half of them near the outline at all scales."""
@@ -122,8 +122,8 @@ class Decoder:
         """Learned distances (P,) at points (2, P)."""
         w1, b1, w2, b2, w3, b3 = self.numbers(parameters)
         units = np.maximum(p.T @ w1.T + b1, 0.0)
-        found: Floats = np.maximum(units @ w2.T + b2, 0.0) @ w3[0] + b3[0]
-        return found
+        result: Floats = np.maximum(units @ w2.T + b2, 0.0) @ w3[0] + b3[0]
+        return result
 
     def slopes(self, parameters: Floats, p: Floats) -> tuple[Floats, Floats]:
         """Learned distances (P,) at points (2, P), and their derivatives (P, T) by the parameters."""
@@ -140,7 +140,7 @@ class Decoder:
 
 
 def _moves(n: int, kinds: str) -> Index:
-    """Where each of the 2n moves carries each unit (2n, H); the second n mirror before they turn."""
+    """Permutation of units (2n, H) by each of the 2n moves; the second n mirror before they turn."""
     move = np.arange(2 * n)[:, None]
     mirrored, orbits, first = move >= n, [], 0
     for kind in kinds:
@@ -166,11 +166,11 @@ def _ways(n: int, kinds: str) -> Floats:
             axes = [np.stack([np.cos(turned), np.sin(turned)])[None]]
         columns += [(at, axis.swapaxes(1, 2).ravel()) for axis in axes]
     sizes = [next(len(own) for where, own in columns if where == at) for at in range(len(kinds))]
-    found = np.zeros((sum(sizes), len(columns)))
+    result = np.zeros((sum(sizes), len(columns)))
     for column, (at, own) in enumerate(columns):
         first = sum(sizes[:at])
-        found[first : first + len(own), column] = own
-    return found
+        result[first : first + len(own), column] = own
+    return result
 
 
 def _ties(moves: Index) -> Floats:
@@ -202,8 +202,8 @@ class Start:
                 p = self.leaf.points(count, self.rng)
                 exact = self.leaf.distance(p)
                 weight = np.where(exact > BEYOND, 0.5, 1.0) * (abs(exact) + SOFT) ** -POWER
-            found, by = self.decoder.slopes(self.parameters, p)
-            wrong = (found - exact) * weight
+            result, by = self.decoder.slopes(self.parameters, p)
+            wrong = (result - exact) * weight
             by *= weight[:, None]
             loss = float(wrong @ wrong)
             square, down = by.T @ by / count, by.T @ wrong / count
@@ -219,7 +219,7 @@ class Start:
 
 
 class Fit(NamedTuple):
-    """How a leaf's decoder is fitted.
+    """Settings of the fit of a leaf's decoder.
 
     Args:
         layers: orbits of its hidden layers.
@@ -247,8 +247,8 @@ def placed(numbers: list[Floats], width: int) -> list[Floats]:
     """A decoder with so many units in each layer, of which those after its own are never above zero."""
     w1, b1, w2, b2, w3, b3 = numbers
     more, most = (0, width - len(b1)), (0, width - len(b2))
-    found = [np.pad(w1, (more, (0, 0))), np.pad(b1, more, constant_values=-1.0), np.pad(w2, (most, more))]
-    return [*found, np.pad(b2, most, constant_values=-1.0), np.pad(w3, ((0, 0), most)), b3]
+    result = [np.pad(w1, (more, (0, 0))), np.pad(b1, more, constant_values=-1.0), np.pad(w2, (most, more))]
+    return [*result, np.pad(b2, most, constant_values=-1.0), np.pad(w3, ((0, 0), most)), b3]
 
 
 def hiding(a: list[Floats], b: list[Floats], third: list[Floats], width: int) -> list[list[Floats]]:
@@ -263,7 +263,7 @@ def hiding(a: list[Floats], b: list[Floats], third: list[Floats], width: int) ->
     w2, b2, w3 = np.pad(w2, ((0, 1), (0, 0))), np.append(b2, 1.0), np.append(w3[0], b3 - (2 * a[5] - b[5]))
     shut = [2 * (RADIUS * np.hypot(*w1.T) + 1) + abs(b1), 2 + abs(b2)]
     ups, downs = (max(int((sign * own[4] > 0).sum()) for own in (a, b)) for sign in (1, -1))
-    found = []
+    result = []
     for own, size in ((a, 1.0), (b, 2.0)):
         up = own[4][0] > 0
         at = np.where(up, up.cumsum() - 1, ups + (~up).cumsum() - 1)
@@ -275,8 +275,8 @@ def hiding(a: list[Floats], b: list[Floats], third: list[Floats], width: int) ->
         parts[0][one], parts[2][two, one], parts[4][0, two] = w1, w2, w3
         for part, place, bias, gap in ((parts[1], one, b1, shut[0]), (parts[3], two, b2, shut[1])):
             part[place] = (bias - gap) / 2 if own is a else -gap
-        found.append(parts)
-    return found
+        result.append(parts)
+    return result
 
 
 FITS: Final = {
@@ -300,9 +300,9 @@ def trained(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict[str, 
     """
     header, arrays = open_weights(data)
     width = header["config"]["network"]["decoder_width"]
-    found = {leaf: fit.run(leaf) for leaf, fit in FITS.items()}
-    pair = hiding(found["square"], found["triangle"], found["hexagon"], width)
-    goals = [*pair, *(placed(found[leaf], width) for leaf in ("star", "pentagon", "disc"))]
+    result = {leaf: fit.run(leaf) for leaf, fit in FITS.items()}
+    pair = hiding(result["square"], result["triangle"], result["hexagon"], width)
+    goals = [*pair, *(placed(result[leaf], width) for leaf in ("star", "pentagon", "disc"))]
     codes = np.concatenate([arrays["codes"].astype(np.float64), [DISC]])
     one = np.concatenate([codes, np.ones((len(codes), 1))], 1)
     for i in range(3):

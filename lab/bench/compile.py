@@ -1,4 +1,4 @@
-"""How time and memory of compiling grow with the number of objects.
+"""Growth of the time and memory of compiling with the number of objects.
 
 ``python -m lab bench compile [COUNT …]`` compiles flat scenes and scenes of composites, each in a fresh
 process, and prints a table; ``--json FILE`` also writes it. Building the Scene is not counted.

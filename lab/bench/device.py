@@ -41,7 +41,7 @@ class Watched:
         self.launched = time.perf_counter()
 
     def kernel_ms(self) -> float:
-        """What the device took, when it is done."""
+        """Milliseconds of the device, once it is done."""
         return float(self.first.elapsed_time(self.last)) if HERE else 0.0
 
 

@@ -44,7 +44,7 @@ Rival = Callable[[int], "Frame"]
 
 
 class Frame(NamedTuple):
-    """What a frame took; ``picture`` is (H, W, 3)."""
+    """Times of a frame; ``picture`` is (H, W, 3)."""
 
     seconds: float
     pairs: int
@@ -108,23 +108,23 @@ SCENES: dict[str, Callable[[int], Any]] = {
 
 
 def model_of(name: str) -> str:
-    """What draws a scene."""
+    """Name of the model that draws a scene."""
     return "solids3d" if name in SOLIDS or name.startswith("solids") else "shapes2d"
 
 
 def programs(name: str, frames: int) -> list[Program]:
     """Programs of scenes that something is seen of; one more than frames, as the first one warms up."""
-    found: list[Program] = []
+    result: list[Program] = []
     for frame in range(10 * frames + 10):
         with contextlib.suppress(nsg.SceneError):
-            found.append(nsg.compile(SCENES[name](frame), model=model_of(name)))
-        if len(found) > frames:
+            result.append(nsg.compile(SCENES[name](frame), model=model_of(name)))
+        if len(result) > frames:
             break
-    return found
+    return result
 
 
 def network(library: str, model: str) -> Any:
-    """What draws, on one core."""
+    """The renderer on one core."""
     keep_memory()
     if library == "exact":
         from scenelang.drawing.closed import closed_forms
@@ -189,13 +189,13 @@ def elsewhere(root: str, name: str, frames: int, library: str) -> Iterator[Rival
 
 def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
     """The frames of each rival; they draw in turn, several times, of which the least counts."""
-    found: list[list[Frame]] = [[] for _ in rivals]
+    result: list[list[Frame]] = [[] for _ in rivals]
     for index in range(frames + 1):
         turns = [[rival(index) for rival in rivals] for _ in range(ROUNDS)]
-        for own, drawn in zip(found, zip(*turns, strict=True), strict=True):
+        for own, drawn in zip(result, zip(*turns, strict=True), strict=True):
             least = min(drawn, key=lambda frame: frame.seconds)
             own.append(least._replace(first=drawn[0].seconds))
-    return [own[1:] for own in found]
+    return [own[1:] for own in result]
 
 
 def told(title: str, frames: Sequence[Frame]) -> str:
@@ -212,7 +212,7 @@ def middle(frames: Sequence[Frame]) -> dict[str, float]:
 
 
 def against(ours: Sequence[Frame], theirs: Sequence[Frame], title: str) -> str:
-    """How two rivals compare, frame by frame."""
+    """Comparison of two rivals, frame by frame."""
     ratio = statistics.median(b.seconds / a.seconds for a, b in zip(ours, theirs, strict=True))
     off = [abs(a.picture - b.picture).max(2) for a, b in zip(ours, theirs, strict=True)]
     worst, many = 255 * max(one.max() for one in off), sum(int((one > 1 / 255).sum()) for one in off)

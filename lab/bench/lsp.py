@@ -1,4 +1,4 @@
-"""What a keystroke costs: ``python -m lab bench lsp [LINES] [KEYS]``.
+"""Cost of a keystroke: ``python -m lab bench lsp [LINES] [KEYS]``.
 
 A server process is driven over its pipes, as an editor drives it. A statement is typed in the middle of a
 file, letter by letter. Measured are, by wall clock from the first byte sent to the last byte read:
@@ -53,7 +53,7 @@ def chain(lines: int) -> str:
 
 
 def keys(closing: bool) -> Iterator[tuple[int, str]]:
-    """What each key inserts, and where; with ``closing`` a brace brings its other half."""
+    """Text that each key inserts, and its place; with ``closing`` a brace brings its other half."""
     for at, letter in enumerate(TYPED):
         if closing and letter == "}":
             continue  # it is there: the cursor steps over it
@@ -63,7 +63,7 @@ def keys(closing: bool) -> Iterator[tuple[int, str]]:
 def measure(text: str, at: int, count: int, closing: bool) -> dict[str, list[float]]:
     """Times in ms of the first ``count`` keys typed at an offset."""
     client = Client(options={"debounceMs": DEBOUNCE_MS})
-    found: dict[str, list[float]] = {"syntax": [], "completion": [], "check": []}
+    result: dict[str, list[float]] = {"syntax": [], "completion": [], "check": []}
     try:
         uri = client.open("untitled:bench", text)
         client.diagnostics(uri, 120)
@@ -72,16 +72,16 @@ def measure(text: str, at: int, count: int, closing: bool) -> dict[str, list[flo
             client.change(uri, at + shift, at + shift, new)
             request = client.start("textDocument/completion", _behind(client, uri, at + shift + 1))
             client.next_diagnostics(uri)
-            found["syntax"].append(1000 * (time.perf_counter() - start))
+            result["syntax"].append(1000 * (time.perf_counter() - start))
             client.answer(request)
-            found["completion"].append(1000 * (time.perf_counter() - start))
+            result["completion"].append(1000 * (time.perf_counter() - start))
             if number % 8 == 7:
                 client.diagnostics(uri, 120)
-                found["check"].append(1000 * (time.perf_counter() - start) - DEBOUNCE_MS)
+                result["check"].append(1000 * (time.perf_counter() - start) - DEBOUNCE_MS)
         assert client.stop() == 0
     finally:
         client.kill()
-    return found
+    return result
 
 
 def _behind(client: Client, uri: str, offset: int) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""How well one mistake is reported: ``python -m lab bench mutations [--count N | --all] [--worst N]``.
+"""Quality of reports of one mistake: ``python -m lab bench mutations [--count N | --all] [--worst N]``.
 
 Makes slips in all examples and in the sound scenes of the tests, lets Lark and the evaluator judge which of
 them are mistakes, and prints for each kind how many gave exactly one diagnostic, within one line of the

@@ -68,7 +68,7 @@ def main(scene: Path, keys: int, out: Path | None) -> None:
     times = sorted(ms for ms, _ in took)
     print(f"{scene.name}: {len(times)} keys; load before {load:.1f}, after {os.getloadavg()[0]:.1f}")
     print(f"median {statistics.median(times):.0f} ms, from {times[0]:.0f} to {times[-1]:.0f} ms")
-    drawn = [int(found[1]) for _, told in took if (found := re.search(r"(\d+) ms", told))]
+    drawn = [int(result[1]) for _, told in took if (result := re.search(r"(\d+) ms", told))]
     print(f"of which the server compiles and draws {statistics.median(drawn):.0f} ms; {took[-1][1]}")
     if out:
         figures = {"median_ms": statistics.median(times), "slowest_ms": times[-1], "load": load}

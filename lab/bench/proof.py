@@ -1,4 +1,4 @@
-"""What is proved of pictures of evaluation sets, whether a pixel breaks its proof, and what proofs cost.
+"""Proofs of pictures of evaluation sets: proved shares, pixels that break their proof, and costs.
 
     python -m lab bench proof [--scenes N] [--set NAME ...] [--seed N] [-o docs/results/proof.json]
 
@@ -47,8 +47,8 @@ class Formulas(Stream):
 
 def timed(function: Callable[[], Any]) -> tuple[float, Any]:
     start = time.process_time()
-    found = function()
-    return time.process_time() - start, found
+    result = function()
+    return time.process_time() - start, result
 
 
 def over(picture: Any) -> Any:
@@ -78,14 +78,14 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     }
     image = ways["frame"]()
     times: dict[str, list[float]] = {way: [] for way in ways}
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for _ in range(ROUNDS):
         for way, function in ways.items():
-            seconds, found[way] = timed(function)
+            seconds, result[way] = timed(function)
             times[way].append(seconds)
     least = {way: min(values) for way, values in times.items()}
     reference_s, reference = timed(lambda: over(reference_image(graphs["lower"])))
-    (_, proof), (again, whole) = found["proof"], found["both"]
+    (_, proof), (again, whole) = result["proof"], result["both"]
     off, mended = (abs(over(picture) - reference).max(-1) for picture in (image, again))
     return {
         "pixels": proof.bound.size,
@@ -112,7 +112,7 @@ def main() -> int:
     parser.add_argument("-o", "--out", type=Path, metavar="FILE")
     given = parser.parse_args()
     keep_memory()
-    found = []
+    result = []
     for name in given.set or SETS:
         cases = [measured(name, index, given.seed) for index in range(given.scenes)]
         row: dict[str, Any] = {"set": name, "scenes": len(cases), "pixels": sum(c["pixels"] for c in cases)}
@@ -124,11 +124,11 @@ def main() -> int:
                 function = np.max if key in ("bound", "off") else np.median if key[:2] == "x_" else np.mean
                 row[key] = round(float(function(values)), 2 if key[:2] == "x_" else 5)
         row["proved_interval"] = interval([case["proved"] for case in cases])
-        found.append(row)
+        result.append(row)
         print(json.dumps(row), flush=True)
     if given.out:
-        write_json(given.out, {**about(), "seed": given.seed, "sets": found})
-    return int(any(row["broken"] for row in found))
+        write_json(given.out, {**about(), "seed": given.seed, "sets": result})
+    return int(any(row["broken"] for row in result))
 
 
 if __name__ == "__main__":

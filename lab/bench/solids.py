@@ -79,11 +79,11 @@ class Renderer(NamedTuple):
 
 
 def timed(draw: Callable[[], Any], who: int = resource.RUSAGE_SELF) -> tuple[Any, float]:
-    """What was drawn, and the processor time that this process, or its children, took."""
+    """Draw; returns the result and the processor time of this process and its children."""
     before = resource.getrusage(who)
-    found = draw()
+    result = draw()
     after = resource.getrusage(who)
-    return found, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return result, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def graph_of(scene: Scene) -> Graph:
@@ -95,7 +95,7 @@ def graph_of(scene: Scene) -> Graph:
 
 
 class Net(NamedTuple):
-    """What answers where rays meet objects: a network or formulas, and the codes of Programs for it."""
+    """A network or formulas for distances along rays, and the codes of Programs for it."""
 
     field: Any
     codes: Codes | None = None
@@ -107,7 +107,7 @@ def nets(weights: Sequence[Path]) -> dict[str, Net]:
     network, manifest = load_arrays(MODEL).network, load_manifest(MODEL)
     marched = copy.copy(network)
     marched.__dict__["segment_w"] = []
-    found = {
+    result = {
         "network": Net(network),
         "marched": Net(marched, samples=("adaptive",)),
         "formulas": Net(closed_forms(MODEL)),
@@ -115,8 +115,8 @@ def nets(weights: Sequence[Path]) -> dict[str, Net]:
     for path in weights:
         data = path.read_bytes()
         other = solid_arrays(data, len(manifest.geometries), len(manifest.materials))
-        found[f"width {other.config.width}"] = Net(other, codes_of(manifest, data), ("adaptive", "one"))
-    return found
+        result[f"width {other.config.width}"] = Net(other, codes_of(manifest, data), ("adaptive", "one"))
+    return result
 
 
 def ours(known: dict[str, Net], scene: Scene) -> Renderer:
@@ -210,7 +210,7 @@ def kept(folder: Path | None, name: str, scene: Scene, make: Callable[[], Pictur
 def one_scene(
     renderers: Renderers, scene: Scene, turn: int, folder: Path | None
 ) -> dict[str, dict[str, float]]:
-    """What every way took of a scene, and how far its picture is off."""
+    """Time and error of every way on a scene."""
     defined = over_white(reference_image(graph_of(scene)))
     rows: dict[str, dict[str, float]] = {}
     each = [(name, make(scene)) for name, make in renderers.items()]
@@ -231,7 +231,7 @@ def one_scene(
 def summary(rows: list[dict[str, float]], ours_ms: list[float]) -> dict[str, Any]:
     """Figures of a way over the scenes that it drew; times also as multiples of ours of the same scenes."""
     ratios = [row["ms"] / ms for row, ms in zip(rows, ours_ms, strict=True)]
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "scenes": len(rows),
         "ms": {"median": statistics.median(row["ms"] for row in rows)},
         "start_ms": statistics.median(row["start_ms"] for row in rows),
@@ -240,8 +240,8 @@ def summary(rows: list[dict[str, float]], ours_ms: list[float]) -> dict[str, Any
     for name in ("flip", "psnr", "flip_defined"):
         values = [row[name] for row in rows if name in row]
         if values:
-            found[name] = {"mean": round(float(np.mean(values)), 5), "interval": interval(values)}
-    return found
+            result[name] = {"mean": round(float(np.mean(values)), 5), "interval": interval(values)}
+    return result
 
 
 def measured(renderers: Renderers, name: str, count: int, side: int, folder: Path | None) -> dict[str, Any]:
@@ -292,12 +292,16 @@ def main() -> None:
         name: measured(renderers, name, given.scenes or count, given.side, given.kept)
         for name, count in SETS.items()
     }
-    drawn = {"set": ", ".join(sets), "scenes": sum(found["scenes"] for found in sets.values()), "seed": SEED}
+    drawn = {
+        "set": ", ".join(sets),
+        "scenes": sum(result["scenes"] for result in sets.values()),
+        "seed": SEED,
+    }
     record = {**drawn, "side": given.side, **about(), **others, "machine": machine(), "sets": sets}
     write_json(given.out, record)
-    for name, found in sets.items():
+    for name, result in sets.items():
         print(name)
-        for way, row in sorted(found["ways"].items(), key=lambda each: each[1]["ms"]["median"]):
+        for way, row in sorted(result["ways"].items(), key=lambda each: each[1]["ms"]["median"]):
             ms, error = row["ms"]["median"], row["flip"]
             print(
                 f"  {way:30} {ms:9.1f} ms  start {row['start_ms']:6.0f} ms  FLIP {error['mean']:.4f}"

@@ -1,4 +1,4 @@
-"""What whole commands cost, beside what Python, and ``import torch``, cost on the same machine.
+"""Costs of whole commands, next to those of Python and ``import torch`` on the same machine.
 
 Each round runs every command once, in a process of its own, so that a busy or slow machine slows all of
 them alike; the figures that matter are the ratios of the medians. Bytecode is cached, as after an install.

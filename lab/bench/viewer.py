@@ -65,8 +65,8 @@ def scene(name: str, side: int) -> nsg.Scene:
 def timed(page: Any, name: str, side: int, frames: int) -> dict[str, float]:
     """Milliseconds of the first frame and of the fastest other, and multiply-adds a pixel."""
     view = view_of(nsg.compile(scene(name, side)))
-    found: dict[str, float] = page.evaluate(TIMED, [view.message(), side, frames])
-    return found
+    result: dict[str, float] = page.evaluate(TIMED, [view.message(), side, frames])
+    return result
 
 
 def in_chromium(work: Callable[[Any], None]) -> None:
@@ -98,8 +98,8 @@ def main() -> None:
     def work(page: Any) -> None:
         print(f"{'scene':20} {'first ms':>9} {'frame ms':>9} {'operations a pixel':>19}")
         for name in given.names:
-            found = rows[name] = timed(page, name, given.side, given.frames)
-            print(f"{name:20} {found['first']:9.0f} {found['least']:9.1f} {found['operations']:19,.0f}")
+            result = rows[name] = timed(page, name, given.side, given.frames)
+            print(f"{name:20} {result['first']:9.0f} {result['least']:9.1f} {result['operations']:19,.0f}")
 
     print(f"{given.side} x {given.side} pixels; {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     in_chromium(work)

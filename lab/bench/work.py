@@ -1,4 +1,4 @@
-"""How near what `scenelang.drawing.small` foretells of a frame comes, and the numbers that come nearest.
+"""Accuracy of the times that `scenelang.drawing.small` predicts, and a fit of its numbers.
 
     python -m lab bench work [--share S]
 
@@ -66,8 +66,8 @@ def main() -> None:
         loads.append(load_of(program))
         told.append(work_ms(program))
         ms.append(frame_ms(program))
-        for samples, found in shares.items() if at % 4 == 0 else ():
-            found.append(frame_ms(program, samples) / ms[-1])
+        for samples, result in shares.items() if at % 4 == 0 else ():
+            result.append(frame_ms(program, samples) / ms[-1])
     cost = fit_cost(loads, ms, skip=True)
     terms = np.array([cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline])
     fitted = np.array([load.row(True) for load in loads]) @ (terms / UNITS)
@@ -76,7 +76,9 @@ def main() -> None:
     for name, guess in ((str(_NS), told), (f"({numbers})", fitted)):
         low, middle, high = np.percentile(np.array(ms) / guess, (5, 50, 95))
         print(f"{name} ns: {low:.2f}, {middle:.2f}, {high:.2f} times what is foretold")
-    print(", ".join(f"{samples} {np.median(found):.2f}" for samples, found in shares.items()), "of adaptive")
+    print(
+        ", ".join(f"{samples} {np.median(result):.2f}" for samples, result in shares.items()), "of adaptive"
+    )
 
 
 if __name__ == "__main__":

@@ -188,16 +188,16 @@ class LongTraining:
         """
         side = self.measured_side
         generator = torch.Generator().manual_seed(999)
-        found: list[Tensor] = []
-        while sum(len(part) for part in found) < count:
+        result: list[Tensor] = []
+        while sum(len(part) for part in result) < count:
             scenes = random_scenes(SEEN_AT_ONCE, self.config.data, generator)
             exact = prefixes(scenes, *grid(SEEN_AT_ONCE, side), side)[
                 torch.arange(SEEN_AT_ONCE), scenes.count - 1
             ]
             covered = (exact.amin(1) < 1).flatten(1).float().mean(1) >= LEAST_COVER
             error = (self.averaged.image(scenes, side).clamp(0, 1) - exact).square().mean((1, 2, 3))
-            found.append(-10 * error[covered].clamp_min(1e-5).log10())
-        return float(torch.cat(found)[:count].mean())
+            result.append(-10 * error[covered].clamp_min(1e-5).log10())
+        return float(torch.cat(result)[:count].mean())
 
     def _phase(self) -> tuple[LongPhase, int]:
         into = self.step
@@ -224,8 +224,8 @@ class LongTraining:
         if isinstance(self.student, ReadingStudent):
             x, y = torch.rand((2, phase.scenes, phase.side), generator=self.generator) * 2 - 1
             with torch.autocast("cpu", torch.bfloat16, enabled=self.config.halves):
-                found = self.student.points(scenes, x, y).float()
-            gap = found - shown(scenes, x, y)
+                result = self.student.points(scenes, x, y).float()
+            gap = result - shown(scenes, x, y)
             loss: Tensor = gap.square().mean() + 0.1 * gap.abs().mean()
             return loss
         assert isinstance(self.student, StreamingStudent)
@@ -234,8 +234,8 @@ class LongTraining:
         x, y = grid(phase.scenes, side, corner, window)
         seen = maps(self.student, scenes, side, corner, window, halves=halves)
         exact = prefixes(scenes, x, y, window or side)
-        found = draw(self.student, scenes, side, seen, halves=halves)
-        error = (found - exact).square().flatten(2).mean(2)  # (B, N)
+        result = draw(self.student, scenes, side, seen, halves=halves)
+        error = (result - exact).square().flatten(2).mean(2)  # (B, N)
         return (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
 
     def _lifting_loss(self, scenes: Scenes) -> Tensor:
@@ -361,7 +361,7 @@ def export_long(training: LongTraining, model: str, path: Path) -> None:
 
 
 def trained_model(path: Path) -> Model:
-    """What draws with exported weights, whatever ships under their model's name.
+    """The model of exported weights, whatever ships under its name.
 
     Scenes are compiled as for `shapes2d`, or of a learned lifting as for `shapes2d-reading`: on any canvas.
     """

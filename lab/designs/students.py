@@ -94,7 +94,7 @@ RendererName = Literal["streaming", "reading"]
 
 @dataclass(frozen=True, slots=True)
 class StudentConfig:
-    """Which lifting and renderer, and their sizes; those of the others are not looked at."""
+    """Names and sizes of the lifting and the renderer; sizes of others are ignored."""
 
     renderer: RendererName
     lifting: LiftingName
@@ -194,8 +194,8 @@ class ReadingStudent(Student):
         b = len(scenes.leaf)
         x, y = pixel_centres(r, scenes.leaf.device)
         offsets = [(dx, dy) for dx in (-0.5 / r, 0.5 / r) for dy in (-0.5 / r, 0.5 / r)]
-        found = [self.points(scenes, (x + dx).expand(b, -1), (y + dy).expand(b, -1)) for dx, dy in offsets]
-        return torch.stack(found).mean(0).transpose(1, 2).reshape(b, 3, r, r)
+        result = [self.points(scenes, (x + dx).expand(b, -1), (y + dy).expand(b, -1)) for dx, dy in offsets]
+        return torch.stack(result).mean(0).transpose(1, 2).reshape(b, 3, r, r)
 
 
 def make_student(config: StudentConfig, *, grown: bool = False) -> Student:

@@ -77,7 +77,7 @@ def maps(
 
 
 def draw(student: StreamingStudent, scenes: Scenes, side: int, found: Tensor, *, halves: bool) -> Tensor:
-    """What the student draws of all prefixes (B, N, 3, W, W), of what `maps` found."""
+    """Pictures of all prefixes (B, N, 3, W, W) by the student, from the result of `maps`."""
     level: Any = student.renderer.stages[str(side)]
     marks = one_hot(scenes.tokens, len(TOKENS)).float()
     with torch.autocast("cpu", torch.bfloat16, enabled=halves):
@@ -96,7 +96,7 @@ def cut(maps: Tensor, corner: Tensor, window: int) -> Tensor:
 
 
 def inside(corner: Tensor, window: int, side: int) -> Tensor:
-    """Which pixels (M, W, W) of windows lie on a canvas."""
+    """Mask (M, W, W) of the windows' pixels that lie on a canvas."""
     at = corner[..., None] + torch.arange(window)  # (M, 2, W)
     on = (at >= 0) & (at < side)
     return on[:, 0, :, None] & on[:, 1, None, :]

@@ -14,9 +14,9 @@ def cluster() -> str:
     """A table of runs and a paragraph for what else was measured, with the commands."""
     if not (RESULTS / "cluster.json").exists():
         return "*Not measured yet.*"
-    found = read("cluster")
+    result = read("cluster")
     parts = {"compared": _compared, "many": _many, "gone": _gone}
-    told = (part(found[name]) + _made(found[name]) for name, part in parts.items() if name in found)
+    told = (part(result[name]) + _made(result[name]) for name, part in parts.items() if name in result)
     return "\n\n".join(told)
 
 

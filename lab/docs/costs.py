@@ -16,10 +16,9 @@ def measured(name: str, told: Callable[[Any], str]) -> Callable[[], str]:
     def block() -> str:
         if not (RESULTS / f"{name}.json").exists():
             return "*Not measured yet.*"
-        found = read(name)
-        return (
-            f"{told(found)}\n\n`{found['command']}`, revision `{found['revision'][:8]}`, {found['machine']}"
-        )
+        result = read(name)
+        source = f"`{result['command']}`, revision `{result['revision'][:8]}`, {result['machine']}"
+        return f"{told(result)}\n\n{source}"
 
     return block
 
@@ -42,7 +41,7 @@ def viewer(found: Any) -> str:
 
 
 def proof(found: Any) -> str:
-    """What is proved of the pictures of each set, and what it costs."""
+    """Proved shares of the pictures of each set, and their cost."""
     heads = ("set", "scenes", "proved, %", "right, %", "largest bound", "largest error")
     heads += ("proof", "drawn again", "exact field", "reference")
     rows = []

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from lab import RESULTS, ROOT
@@ -52,56 +53,61 @@ def read(name: str) -> Any:
 
 
 def at(name: str, keys: str = "", /, **where: object) -> Any:
-    """What lies in a record at keys joined by slashes; of a list the entry in which ``where`` holds."""
-    found = read(name)
+    """Value in a record at keys joined by slashes; of a list the entry in which ``where`` holds."""
+    result = read(name)
     for key in filter(None, keys.split("/")):
-        if isinstance(found, list):
-            found = next(row for row in found if all(row[k] == v for k, v in where.items()))
-        found = found[key]
-    if isinstance(found, int | float):
-        return Figure(found)
-    return Word(found) if isinstance(found, str) else found
+        if isinstance(result, list):
+            result = next(row for row in result if all(row[k] == v for k, v in where.items()))
+        result = result[key]
+    if isinstance(result, int | float):
+        return Figure(result)
+    return Word(result) if isinstance(result, str) else result
 
 
 def kilobytes(name: str) -> Figure:
     """Size of a file of the package, named without its ending."""
-    return Figure((PACKAGE / f"{name}.safetensors").stat().st_size / 1000)
+    return Figure(_file(name).stat().st_size / 1000)
 
 
 def numbers(name: str) -> Figure:
-    """How many numbers a file of the package holds, named without its ending."""
+    """Count of numbers in a file of the package, named without its ending."""
     return Figure(sum(math.prod(e["shape"]) for key, e in _header(name).items() if key != "__metadata__"))
 
 
 def told(name: str) -> Any:
-    """What the header of a model's weights tells of their training."""
+    """Facts about training in the header of a model's weights."""
     return json.loads(_header(f"models/{name}/weights")["__metadata__"]["scenelang"])
 
 
+def _file(name: str) -> Path:
+    folder = ROOT / "scenelang/language" if name.startswith("std/") else PACKAGE
+    return folder / f"{name}.safetensors"
+
+
 def _header(name: str) -> Any:
-    with open(PACKAGE / f"{name}.safetensors", "rb") as file:
+    with open(_file(name), "rb") as file:
         return json.loads(file.read(int.from_bytes(file.read(8), "little")))
 
 
 def _pattern(claim: str) -> re.Pattern[str]:
-    """What finds a claim in a page, whatever figures stand there and wherever its lines break."""
+    """Pattern of a claim in a page, for any figures and line breaks."""
     parts = re.split(f"{OPEN}(.*?){CLOSE}", claim)
-    found = []
+    result = []
     for index, part in enumerate(parts):
         if index % 2 == 0:
-            found.append(r"\s+".join(map(re.escape, re.split(r"\s+", part))))
+            result.append(r"\s+".join(map(re.escape, re.split(r"\s+", part))))
         else:
             number = re.fullmatch(r"[-+−]?[\d.,]+(?:e[-+]?\d+)?", part)
-            found.append(r"([-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)" if number else "(.+?)")
-    return re.compile("".join(found))
+            result.append(r"([-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?)" if number else "(.+?)")
+    return re.compile("".join(result))
 
 
 def _match(claim: str, text: str) -> re.Match[str]:
-    found = list(_pattern(claim).finditer(text))
-    if len(found) != 1:
+    result = list(_pattern(claim).finditer(text))
+    if len(result) != 1:
         shown = re.sub(f"[{OPEN}{CLOSE}]", "", claim)
-        raise LookupError(f"claimed {len(found)} times where once is meant: {shown}")
-    return found[0]
+        raise LookupError(f"claimed {len(result)} times where once is meant: {shown}")
+    return result[0]
 
 
 def filled(text: str, claims: Iterable[str]) -> str:
@@ -160,10 +166,10 @@ def uncovered(text: str, claims: Iterable[str], given: Mapping[str, str]) -> Ite
         match = _match(claim, text)
         covered += [match.span(index) for index in range(1, (match.re.groups) + 1)]
     for piece in given:
-        found = [match.span() for match in _pattern(piece).finditer(text)]
-        if not found:
+        result = [match.span() for match in _pattern(piece).finditer(text)]
+        if not result:
             raise LookupError(f"given and not in the page: {piece}")
-        covered += found
+        covered += result
     plain = prose(text)
     spans = {match.span() for match in _FIGURE.finditer(plain)}
     spans |= {match.span(1) for match in _CELL.finditer(plain)}

@@ -22,7 +22,7 @@ BASES = {"shapes2d": "", "solids3d": "-solids"}  # models that sets are named af
 
 
 def verified_path(base: str) -> Path:
-    """What was found of a set's promises."""
+    """Record of the verified promises of a set."""
     return RESULTS / f"frontier-verified{BASES[base]}.json"
 
 
@@ -69,7 +69,7 @@ def savings_text(frontier: Frontier, base: str) -> str:
     both = [
         (words, frontier.ratio(name + slowest, name)) for words, name in (("network", base), (FIELD, FIELD))
     ]
-    told = [f"{_ratio(found)} for the {name}" for name, found in both if found is not None]
+    told = [f"{_ratio(result)} for the {name}" for name, result in both if result is not None]
     buy = f" Both savings together divide the time of a frame by {' and by '.join(told)}." if told else ""
     return (
         "\n".join(lines) + f"\n\nTimes are ratios of the same scene, ± the 95 % interval of their mean.{buy}"

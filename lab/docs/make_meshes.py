@@ -25,7 +25,7 @@ import numpy as np
 import trimesh
 
 from lab import ROOT
-from scenelang.inverse.learn import Wish, learn_files
+from scenelang.inverse.learn import LearnOptions, learn_files
 
 OUT = ROOT / "scenelang/language/std/meshes.safetensors"
 ERROR = 0.00004  # which takes 193 distances a side
@@ -94,7 +94,9 @@ def main(folder: Path) -> None:
     (folder / "monkey.obj").write_text(obj(mesh.vertices, mesh.faces))
     OUT.unlink(missing_ok=True)
     for name, (license, source) in SAID.items():
-        learn_files([folder / name], OUT, Wish(max_error=ERROR, license=license, source=source), say=print)
+        learn_files(
+            [folder / name], OUT, LearnOptions(max_error=ERROR, license=license, source=source), say=print
+        )
 
 
 if __name__ == "__main__":

@@ -173,14 +173,14 @@ def tiled(pictures: list[pillow.Image], columns: int, side: tuple[int, int]) -> 
 
 def strips(path: Path) -> dict[str, list[tuple[str, Source]]]:
     """(label, scene) of each cell, for each strip of a scene of the reference."""
-    found = {}
+    result = {}
     for name, cells in _SHOWN.findall(path.read_text("utf-8")):
         parts = [cell.rpartition(": -D ") for cell in cells.split(" | ")]
-        found[name.strip() or path.stem] = [
+        result[name.strip() or path.stem] = [
             (label.strip(), Source(path, params=tuple(re.findall(r"([\w.]+)=(\S+)", values))))
             for label, _, values in parts
         ]
-    return found
+    return result
 
 
 def strip(cells: list[tuple[str, Source]]) -> bytes:
@@ -247,10 +247,10 @@ def frontier(model: str) -> bytes:
 
 def fit_scene(name: str) -> SourceFile:
     """A scene of docs/fit.md."""
-    found = re.search(
+    result = re.search(
         rf'^```nsg title="{name}"\n(.*?)```', (DOCS / "fit.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
-    return SourceFile(name, found[1] if found else "")
+    return SourceFile(name, result[1] if result else "")
 
 
 def fitted() -> bytes:
@@ -261,9 +261,9 @@ def fitted() -> bytes:
     soft = blurred(np.asarray(exact, np.float64), Blur(1.2))
     photo = np.clip(soft + np.random.default_rng(7).normal(0.0, 0.04, soft.shape), 0.0, 1.0)
     names = ("x", "y", "size", "turn", "ink", "stones")
-    found = nsg.fit(text, photo.astype(np.float32), params=names)
+    result = nsg.fit(text, photo.astype(np.float32), params=names)
     return png(
-        found.sheet().to_pil().quantize(100, pillow.Quantize.MEDIANCUT, kmeans=2)
+        result.sheet().to_pil().quantize(100, pillow.Quantize.MEDIANCUT, kmeans=2)
     )  # noise keeps its own
 
 
@@ -291,18 +291,18 @@ def way_of(found: nsg.Fit) -> bytes:
 
 def swept() -> bytes:
     """The contact sheet of docs/sweep.md, of the scene and the grid that stand there."""
-    found = re.search(
+    result = re.search(
         r"^```nsg[^\n]*\n(.*?)```", (DOCS / "sweep.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
     with tempfile.TemporaryDirectory() as folder:
         scene, sheet = Path(folder) / "flowers.nsg", Path(folder) / "sheet.png"
-        scene.write_text(found[1] if found else "", "utf-8")
+        scene.write_text(result[1] if result else "", "utf-8")
         nsg.render_many(scene, f"{folder}/out/", grid={"petals": "", "turn": "../7"}, sheet=sheet)
         return _few_colours(sheet.read_bytes())
 
 
 def plan() -> dict[str, Callable[[], bytes]]:
-    """What `docs/pictures` holds, and how each file of it is made."""
+    """Files of `docs/pictures`, with the function that makes each."""
     made: dict[str, Callable[[], bytes]] = {}
     for path in sorted(EXAMPLES.glob("*.nsg")):
         animation = nsg.load(path).animation

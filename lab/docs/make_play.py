@@ -42,8 +42,8 @@ def server() -> Iterator[str]:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         try:
             assert process.stdout is not None
-            found = next(filter(None, (re.search(r"http://\S+", line) for line in process.stdout)))
-            yield found[0]
+            result = next(filter(None, (re.search(r"http://\S+", line) for line in process.stdout)))
+            yield result[0]
         finally:
             process.send_signal(signal.SIGINT)
             process.wait(20)

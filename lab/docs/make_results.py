@@ -89,16 +89,16 @@ def accuracy(folder: str = "", what: dict[str, str] = WHAT) -> str:
 
 
 def smallest_run() -> str:
-    """What everything took at its smallest, and most of it."""
+    """Time of the smallest run of everything, and its longest steps."""
     path = RESULTS / "all.json"
     if not path.exists():
         return "*Not measured yet.*"
-    found = json.loads(path.read_text())
-    steps = sorted((s for s in found["steps"] if "exit" in s), key=lambda step: -step["processor_s"])
+    result = json.loads(path.read_text())
+    steps = sorted((s for s in result["steps"] if "exit" in s), key=lambda step: -step["processor_s"])
     longest = "; ".join(f"`{step['command']}` {step['processor_s']:.0f} s" for step in steps[:3])
     return (
-        f"`{found['command']}` at revision `{found['revision'][:8]}`: {len(steps)} commands, "
-        f"{sum(bool(step['exit']) for step in steps)} failed, {found['processor_s'] / 60:.0f} minutes of "
+        f"`{result['command']}` at revision `{result['revision'][:8]}`: {len(steps)} commands, "
+        f"{sum(bool(step['exit']) for step in steps)} failed, {result['processor_s'] / 60:.0f} minutes of "
         f"processor time; the longest are {longest}."
     )
 
@@ -123,8 +123,8 @@ def filled(text: str) -> str:
     """The page with every block written again."""
     for name, block in BLOCKS.items():
         begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
-        before, found, rest = text.partition(begin)
-        if found:
+        before, result, rest = text.partition(begin)
+        if result:
             _, _, after = rest.partition(end)
             text = f"{before}{begin}\n\n{block()}\n\n{end}{after}"
     return text

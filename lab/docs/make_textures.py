@@ -35,8 +35,8 @@ ROSE, PLUM, SAND, LEAF = "#dd9a92", "#5b3f66", "#d9c19b", "#3f7d4f"
 
 def rgb(*words: str) -> Array:
     """Colours (K, 3) in [0, 1], of one word (3,)."""
-    found = np.array([[int(word[k : k + 2], 16) / 255 for k in (1, 3, 5)] for word in words])
-    return found if len(words) > 1 else found[0]
+    result = np.array([[int(word[k : k + 2], 16) / 255 for k in (1, 3, 5)] for word in words])
+    return result if len(words) > 1 else result[0]
 
 
 def over(below: Array, mask: Array, colour: Array | str) -> Array:

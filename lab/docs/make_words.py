@@ -88,9 +88,9 @@ def script() -> str:
 
 def _between(text: str, start: str, end: str, new: str) -> str:
     """A text with what stands between two lines replaced."""
-    head, found, rest = text.partition(f"{start}\n")
-    assert found, start
-    return head + found + new + rest[rest.index(end) :]
+    head, result, rest = text.partition(f"{start}\n")
+    assert result, start
+    return head + result + new + rest[rest.index(end) :]
 
 
 def made() -> dict[Path, str]:

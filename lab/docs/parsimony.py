@@ -29,7 +29,7 @@ def read(name: str) -> Record | None:
 
 
 def passes_text(proof: Record, plans: Record) -> str:
-    """What each pass does in random scenes and in the examples."""
+    """Effect of each pass in random scenes and in the examples."""
     rows = []
     for name, tally in proof["passes"].items():
         if tally["changed"]:
@@ -47,7 +47,7 @@ def passes_text(proof: Record, plans: Record) -> str:
 
 
 def proof_text(proof: Record) -> str:
-    """How the passes were proven, in one paragraph."""
+    """Proof of the passes, in one paragraph."""
     differing = sum(tally["differing"] for tally in proof["passes"].values())
     words = ", ".join(f"{number:,} {word}" for word, number in proof["words"].items())
     return (
@@ -61,7 +61,7 @@ def proof_text(proof: Record) -> str:
 
 
 def _saved(plans: Sequence[Record], name: str) -> dict[str, int]:
-    """What a pass took away from all examples, and from how many."""
+    """Reduction by a pass over all examples, and the number of examples that it changed."""
     saved = dict.fromkeys(("examples", "objects", "matrices", "folds"), 0)
     for plan in plans:
         rows = plan["stages"]
@@ -73,12 +73,12 @@ def _saved(plans: Sequence[Record], name: str) -> dict[str, int]:
 
 
 def ways_text(plans: Record) -> str:
-    """What skipping and adaptive sampling save, over all examples together."""
-    found = [plan["ways"] for plan in plans["plans"] if plan["ways"]]
-    shipped = _way(found, "as shipped")
+    """Savings of skipping and adaptive sampling, over all examples together."""
+    result = [plan["ways"] for plan in plans["plans"] if plan["ways"]]
+    shipped = _way(result, "as shipped")
     rows = []
     for name in WAYS:
-        meetings, ms, error, worst = _way(found, name)
+        meetings, ms, error, worst = _way(result, name)
         rows.append(
             [
                 name,
@@ -90,7 +90,7 @@ def ways_text(plans: Record) -> str:
             ]
         )
     head = ("how it is drawn", "meetings", "of those shipped", "time", "PSNR, dB", "worst")
-    about = f"All {len(found)} examples together, one thread, one run on {plans['machine']}."
+    about = f"All {len(result)} examples together, one thread, one run on {plans['machine']}."
     return f"{markdown(head, rows)}\n\n{about}"
 
 

@@ -74,7 +74,7 @@ def plus_minus(found: Mapping[str, float], digits: int) -> str:
 
 
 def budgets() -> str:
-    """What each network has and took."""
+    """Parameters and training cost of each network."""
     rows = []
     for model, decoder in (("shapes2d", "2, 32, 32, 1"), ("solids3d", "3, 8, 8, 1; ways 5, 32, 32, 1")):
         path, minutes = f"models/{model}/weights", told(model)["seconds"] / 60
@@ -85,8 +85,8 @@ def budgets() -> str:
 
 def front(base: str, names: tuple[str, ...]) -> str:
     """Chosen points of a frontier."""
-    found = read(f"models/{base}/frontier")
-    points, rows = {point["name"]: point for point in found["points"]}, []
+    result = read(f"models/{base}/frontier")
+    points, rows = {point["name"]: point for point in result["points"]}, []
     for name in names:
         point = points.get(name)
         if point is None:
@@ -102,13 +102,13 @@ def unions() -> str:
     """A rasteriser of polygons beside ours, where all is unions."""
     if not (RESULTS / "unions-rivals.json").exists():
         return "*Not measured yet.*"
-    found = read("unions-rivals")
+    result = read("unions-rivals")
     rows = [
         [name, f"{way['ms']:.3g}", plus_minus(way["flip"], 4), plus_minus(way["flip64"], 4)]
-        for name, way in found["ways"].items()
+        for name, way in result["ways"].items()
     ]
     heads = ("unions drawn by", "ms", "FLIP, 4 samples", "FLIP, 64 samples", "n")
-    return markdown(heads, [[*row, str(found["scenes"])] for row in rows])
+    return markdown(heads, [[*row, str(result["scenes"])] for row in rows])
 
 
 def rivals() -> str:
@@ -132,14 +132,14 @@ def stability() -> str:
     rows = []
     for name, probe, values in STABILITY:
         record = read(name)
-        found = record["probes"].get(probe)
-        by_value = {row["value"]: row for row in found["rows"]} if found else {}
+        result = record["probes"].get(probe)
+        by_value = {row["value"]: row for row in result["rows"]} if result else {}
         cells = [f"{v:g}: {plus_minus(by_value[v]['psnr'], 1)}" for v in values if v in by_value]
-        if found and cells:
+        if result and cells:
             lowest = min(by_value[v]["psnr"]["worst"] for v in values if v in by_value)
-            scenes = found.get("scenes", record["scenes"])
+            scenes = result.get("scenes", record["scenes"])
             rows.append(
-                [f"`{record['model']}`: {found['title']}", ", ".join(cells), f"{lowest:.1f}", str(scenes)]
+                [f"`{record['model']}`: {result['title']}", ", ".join(cells), f"{lowest:.1f}", str(scenes)]
             )
     return markdown(("model and quantity", "value: mean PSNR, dB", "worst", "n"), rows)
 

@@ -13,14 +13,14 @@ def by_bytes() -> str:
     """The best of each form at so many bytes, of meshes and of pictures."""
     if not (RESULTS / "element-bytes.json").exists():
         return "*Not measured yet.*"
-    found, tables = read("element-bytes"), []
+    result, tables = read("element-bytes"), []
     for kind, what, digits in (
         ("meshes", "mean distance off, radii", 4),
         ("pictures", "PSNR of texels, dB", 1),
     ):
         cells = {
             (row["form"], row["bytes"]): f"{row['mean']:.{digits}f} ± {row['interval']:.{digits}f}"
-            for row in found[kind]["rows"]
+            for row in result[kind]["rows"]
         }
         forms = dict.fromkeys(form for form, _ in cells)
         rows = [
@@ -28,9 +28,9 @@ def by_bytes() -> str:
             for size in sorted({size for _, size in cells})
         ]
         tables.append(
-            f"{found[kind]['files']} {kind}, {what}:\n\n{markdown(('bytes at most', *forms), rows)}"
+            f"{result[kind]['files']} {kind}, {what}:\n\n{markdown(('bytes at most', *forms), rows)}"
         )
-    said = f"`{found['command']}`, ± 95 % over files, revision `{found['revision'][:8]}`"
+    said = f"`{result['command']}`, ± 95 % over files, revision `{result['revision'][:8]}`"
     return "\n\n".join([*tables, said])
 
 

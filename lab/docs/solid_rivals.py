@@ -30,24 +30,24 @@ Ways = Mapping[str, Any]
 
 
 def ways_of(set_: str) -> Ways:
-    """What was measured on a set, each setting of POV-Ray once where there are no media."""
-    found = read(NAME)["sets"][set_]["ways"]
-    same = {way for way in found if set_ == "diffuse" and way.endswith(("10 in media", "3 in media"))}
+    """Measured ways on a set, each setting of POV-Ray once where there are no media."""
+    result = read(NAME)["sets"][set_]["ways"]
+    same = {way for way in result if set_ == "diffuse" and way.endswith(("10 in media", "3 in media"))}
     return {
         way.removesuffix(", 40 in media") if same else way: row
-        for way, row in found.items()
+        for way, row in result.items()
         if way not in same
     }
 
 
 def of(ways: Ways, renderer: str) -> dict[str, Any]:
     """A renderer's ways, the fastest first."""
-    found = {way: row for way, row in ways.items() if way.startswith(renderer)}
-    return dict(sorted(found.items(), key=lambda each: each[1]["ms"]["median"]))
+    result = {way: row for way, row in ways.items() if way.startswith(renderer)}
+    return dict(sorted(result.items(), key=lambda each: each[1]["ms"]["median"]))
 
 
 def on_front(ways: Ways) -> list[str]:
-    """Those of a renderer's ways that no other one beats in time and error."""
+    """Ways of a renderer that none of its others beats in time and error."""
     points = [(row["ms"]["median"], row["flip"]["mean"]) for row in ways.values()]
     return [way for way, yes in zip(ways, front(points), strict=True) if yes]
 

@@ -131,7 +131,7 @@ def _chart(
 
 
 def mark_of(point: Point) -> str:
-    """Which of `MARKS` a point has."""
+    """The entry of `MARKS` for a point."""
     if point.renderer in ("framed", "exact field") and not point.skip:
         return "unskipped four" if point.samples == "four" else "unskipped"
     return point.samples
@@ -148,7 +148,7 @@ def short_name(point: Point, base: str) -> str:
 
 
 def _legend(figure: Any, frontier: Frontier) -> int:
-    """What colours and marks mean; returns how many rows it has."""
+    """Draw the legend of colours and marks; returns its number of rows."""
     from matplotlib.lines import Line2D
 
     drawn = [p for p in frontier.points if p.flip is not None]
@@ -260,10 +260,10 @@ def _place_labels(figure: Any, axis: Any) -> None:
             return Bbox.from_bounds(left, y + dy * dots - size.height / 2, size.width, size.height)
 
         def cost(place: tuple[float, float], box: Any = box) -> float:
-            found = box(*place)
-            inside = Bbox.intersection(found, window)
-            outside = found.width * found.height - (inside.width * inside.height if inside else 0.0)
-            shared = (Bbox.intersection(found, other) for other in taken)
+            result = box(*place)
+            inside = Bbox.intersection(result, window)
+            outside = result.width * result.height - (inside.width * inside.height if inside else 0.0)
+            shared = (Bbox.intersection(result, other) for other in taken)
             return float(50 * outside + sum(both.width * both.height for both in shared if both))
 
         dx, dy = min(PLACES, key=cost)

@@ -36,10 +36,10 @@ def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: b
     guess = times
     for _ in range(ROUNDS):
         weight = 1 / np.sqrt(guess * times)
-        found = _at_least_zero(rows * weight[:, None], times * weight)
-        guess = np.maximum(rows @ found, 1e-9)
+        result = _at_least_zero(rows * weight[:, None], times * weight)
+        guess = np.maximum(rows @ result, 1e-9)
     spread = max(1.0, float(np.percentile(times / guess, 95)))
-    frame, objects, pixels, meetings, outline = found.tolist()
+    frame, objects, pixels, meetings, outline = result.tolist()
     return Cost(frame, objects, pixels, meetings, outline, spread)
 
 
@@ -56,6 +56,6 @@ def _at_least_zero(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> np
             x[i] = max(0.0, x[i] + aim[i] - gram[i] @ x)  # the diagonal of the Gram matrix is 1
         if np.abs(x - before).max(initial=0.0) < 1e-12:
             break
-    found = np.zeros(a.shape[1])
-    found[used] = x / size[used]
-    return found
+    result = np.zeros(a.shape[1])
+    result[used] = x / size[used]
+    return result

@@ -72,7 +72,7 @@ class Case(NamedTuple):
     solid: float = 1 / 3  # of solids, whose exact pictures take long
 
     def scenes(self, asked: int, dimension: int) -> int:
-        """How many of its scenes are drawn where so many are asked for."""
+        """Number of its scenes to draw for a requested number."""
         return max(1, round(asked * (self.share if dimension == 2 else self.solid)))
 
     def on(self, scene: Scene) -> Scene:
@@ -90,7 +90,7 @@ CASES: tuple[Case, ...] = (
 
 @dataclass(slots=True)
 class Record:
-    """What was measured of a way."""
+    """Measurements of a way."""
 
     ms: list[float] = field(default_factory=list)  # of each scene
     # of each scene
@@ -183,7 +183,7 @@ def _timed(run: Draw, threads: int) -> tuple[float, Image]:
 
 
 def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
-    """How many scenes a way draws; its first frames, which load and warm up, are not counted."""
+    """Number of scenes that a way draws, without its first frames, which load and warm up."""
     for _ in range(2):
         ms, _ = _timed(way.prepare(scene), threads)
     most = TIMED if not way.drawn else scenes if way.offered or way.backend == "neural" else COMPARED
@@ -323,12 +323,12 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
 def _ratios(base: str, records: dict[str, Record]) -> Iterator[Ratio]:
     for slow, fast in paired(base):
         if slow in records and fast in records:
-            found = _over(records[slow], records[fast])
-            yield Ratio(slow, fast, len(found), float(np.mean(found)), interval(found))
+            result = _over(records[slow], records[fast])
+            yield Ratio(slow, fast, len(result), float(np.mean(result)), interval(result))
 
 
 def _over(slow: Record, fast: Record) -> list[float]:
-    """How many times as long one way took as another, of each scene that both drew."""
+    """Ratios of the times of two ways, for each scene that both drew."""
     return [a / b for a, b in zip(slow.ms, fast.ms, strict=False)]
 
 

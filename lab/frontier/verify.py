@@ -1,4 +1,4 @@
-"""Whether the promised errors hold on scenes that the frontier never saw."""
+"""Check of the promised errors on scenes that the frontier never saw."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def verify(
                 point = points[way.name]
                 if point.ms.median > 500 and (case.set or case.canvas or index >= SLOW):
                     continue
-                found = point.flip
-                assert found is not None
-                promise = found.bound * scale
+                result = point.flip
+                assert result is not None
+                promise = result.bound * scale
                 error = flip(over_white(way.prepare(scene)()), exact)
                 ratios[way.name].append(error / promise if promise > 0 else (1.0 if error <= 0 else 2.0))
             report(case.name, index + 1, count)

@@ -76,11 +76,11 @@ def ways_of(base: str, threads: int) -> list[Way]:
         RenderError: a model's weights are missing or damaged.
     """
     manifests = [m for m in map(load_manifest, available()) if m.set == load_manifest(base).set]
-    found: list[Way] = []
+    result: list[Way] = []
     for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
-        found += _of_model(manifest, base, threads)
-    found += [*_references(load_manifest(base)), *_paper(base)]
-    return found
+        result += _of_model(manifest, base, threads)
+    result += [*_references(load_manifest(base)), *_paper(base)]
+    return result
 
 
 def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:

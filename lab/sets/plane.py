@@ -46,7 +46,7 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True, slots=True)
 class SetConfig:
-    """What the scenes of a set are like."""
+    """Distribution of the scenes of a set."""
 
     objects: tuple[int, int] = (1, 4)  # fewest and most objects
     deformed: bool = True  # with twirl and bend

@@ -45,7 +45,7 @@ def coverage(scene: Scene, manifest: Manifest) -> float:
 
 
 def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
-    """What makes a random scene of each set that a model of a dimension draws."""
+    """Generators of random scenes, by set, for models of a dimension."""
     if manifest.dimension == 3:
         return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
     known = {name: config for name, config in SETS.items() if manifest.elements or not config.textures}

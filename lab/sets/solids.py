@@ -43,7 +43,7 @@ WARP = 0.8  # of deformed objects
 
 @dataclass(frozen=True, slots=True)
 class SolidConfig:
-    """What the scenes of a set are like.
+    """Distribution of the scenes of a set.
 
     Args:
         objects: fewest and most objects.

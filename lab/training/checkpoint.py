@@ -30,11 +30,11 @@ def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], di
     """
     data = read_regular(path, _MOST_BYTES)
     try:
-        found = read_tensors(data, _MOST_BYTES)
-        arrays = found.arrays(finite=False)
+        result = read_tensors(data, _MOST_BYTES)
+        arrays = result.arrays(finite=False)
     except TensorError as error:
         raise ModelError(f"`{path}` is damaged: {error}") from None
-    return {name: torch.from_numpy(array).to(device) for name, array in arrays.items()}, found.header
+    return {name: torch.from_numpy(array).to(device) for name, array in arrays.items()}, result.header
 
 
 def pack_training(

@@ -77,7 +77,7 @@ def config_data(name: str) -> bytes:
 
 
 def is_solids(data: bytes) -> bool:
-    """Whether a configuration is a `SolidsConfig`."""
+    """Return whether a configuration is a `SolidsConfig`."""
     return b'"polish"' in data
 
 

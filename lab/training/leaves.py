@@ -1,4 +1,4 @@
-"""What training asks of leaves in space: distances of random points, lengths of random half rays."""
+"""Training samples of leaves in space: distances of random points, lengths of random half rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of the network: the images of each object alone and of every prefix of the stream.
+"""Losses of the network: images of each object alone and of every prefix of the stream.
 
 An image here has colour, coverage and distance, as renderers write them side by side.
 """

@@ -66,13 +66,13 @@ def fit_decoders(
 
 def polish_decoders(network: Solids, steps: int, g: torch.Generator, points: int = 4000) -> dict[str, float]:
     """Fit the decoder of each leaf further by Gauss-Newton steps; returns the last mean squared errors."""
-    found, wanted = {}, []
+    result, wanted = {}, []
     with torch.no_grad():
         for leaf, code in zip(LEAVES, network.codes, strict=True):
             layers = network.decoder(code)
             shapes = [part.shape for layer in layers for part in layer]
             weights = torch.cat([part.double().reshape(-1) for layer in layers for part in layer])
-            weights, found[leaf] = _gauss_newton(leaf, weights, shapes, steps, points, g)
+            weights, result[leaf] = _gauss_newton(leaf, weights, shapes, steps, points, g)
             wanted.append(weights)
         start = 0
         for w, b in zip(network.decoder_w, network.decoder_b, strict=True):
@@ -83,7 +83,7 @@ def polish_decoders(network: Solids, steps: int, g: torch.Generator, points: int
                     goal = goal.view(-1, part.shape[2], part.shape[1]).mT.reshape(len(goal), -1)
                 start += size
                 _write(network, part, goal)
-    return found
+    return result
 
 
 def _write(network: Solids, part: Tensor, goal: Tensor) -> None:
@@ -225,13 +225,13 @@ def _fit_cell(
         blank, losses = torch.zeros(points, 1), []
         for token in TOKENS.values():
             cell = network.cell(token, BLEND)[Wanted.ALL]
-            found, _ = network.join(own, memory, torch.ones(4, 1), cell, Wanted.ALL)
+            result, _ = network.join(own, memory, torch.ones(4, 1), cell, Wanted.ALL)
             depth, paint = combine(past, blank, own, blank + 1, token)
             kind = paint.round()  # of a blend the nearer one's
             losses.append(
-                ((found[0] - depth).abs() / (depth.abs() + 0.02)).mean()
-                + (found[1] - paint[:, 0]).abs().mean()
-                + (found[4] - kind[:, 0]).abs().mean()
+                ((result[0] - depth).abs() / (depth.abs() + 0.02)).mean()
+                + (result[1] - paint[:, 0]).abs().mean()
+                + (result[4] - kind[:, 0]).abs().mean()
             )
         looks = (network.look(network.material_codes) - known).square().sum()
         optimiser.zero_grad()

@@ -22,7 +22,7 @@ _LUMA: Final = np.array([[0.25, 0.5, 0.25], [1.0, 0.0, -1.0], [-0.5, 1.0, -0.5]]
 
 
 def between(grid: Grid) -> Grid:
-    """The grid (3, 2 n - 1, …) of a grid's nodes and of what lies linearly between them."""
+    """Grid (3, 2 n - 1, …) of a grid's nodes and the linear means between them."""
     for axis in (1, 2, 3):
         a = np.moveaxis(grid, axis, 0)
         out = np.empty((2 * len(a) - 1, *a.shape[1:]), np.float32)
@@ -37,7 +37,7 @@ def _turned(matrix: npt.NDArray[np.float32], grid: Grid) -> Grid:
 
 
 def _widths(element: Element) -> Grid:
-    """How much a step is, for luma and for both differences."""
+    """Size of a step, for luma and for both differences."""
     return np.array([1.0, 2.0, 2.0], np.float32).reshape(3, 1, 1, 1) / np.float32(element.sizes[1])
 
 
@@ -47,25 +47,25 @@ def packed(
     """The element of colours, 0 to 1.
 
     Args:
-        near: (n, n, n), whether a node counts. One of a coarser grid does where any around it do, and of the
-            coarsest all.
-        steps: of luma from 0 to 1; half a step is the farthest that a node that counts comes to lie off.
+        near: (n, n, n), true where a node counts. A node of a coarser grid counts where any around it does;
+            in the coarsest grid all count.
+        steps: steps of luma from 0 to 1; nodes that count are off by half a step at most.
     """
     element = Element(name, "colours", (len(near), steps), "bzip2", b"", about)
     true, widths, grid = _turned(_LUMA, colours), _widths(element), None
-    found: list[bytes] = []
+    result: list[bytes] = []
     for side in element.sides:
         apart = (len(near) - 1) // (side - 1)
         expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid)
         wanted = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / widths)
-        kept = (wanted.clip(-127, 127) * (_around(near, apart) if found else True)).astype(np.int8)
-        grid = expected + kept * widths
-        found.append(kept.tobytes())
-    return replace(element, data=bz2.compress(b"".join(found), 9))
+        clipped = (wanted.clip(-127, 127) * (_around(near, apart) if result else True)).astype(np.int8)
+        grid = expected + clipped * widths
+        result.append(clipped.tobytes())
+    return replace(element, data=bz2.compress(b"".join(result), 9))
 
 
 def _around(near: npt.NDArray[np.bool_], apart: int) -> npt.NDArray[np.bool_]:
-    """Which of the nodes that are so far apart have one of ``near`` closer than that, along each axis."""
+    """Mask of every ``apart``-th node: true where a node of ``near`` is closer than that along each axis."""
     for axis in (0, 1, 2) if apart > 1 else ():
         a = np.moveaxis(near, axis, 0)
         padded = np.pad(a, [(apart - 1, apart - 1), (0, 0), (0, 0)])

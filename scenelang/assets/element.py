@@ -18,12 +18,12 @@ TEXELS: Final = 256  # along the longer side of one that is learned, where nothi
 
 
 class Form(NamedTuple):
-    """What an element can be.
+    """Form of elements: the fields of a header and the codings of the bytes.
 
     Args:
-        sizes: its numbers, as headers call them.
-        codings: of its bytes; the first is meant where a header says none.
-        kinds: what manifests call its like, by dimension.
+        sizes: names of its numbers in headers.
+        codings: codings of its bytes; the first is the default of a header without one.
+        kinds: its names in manifests, by dimension.
     """
 
     sizes: tuple[str, ...]
@@ -50,15 +50,15 @@ class Element:
     """A geometry in the unit ball of its own space, or a material, that a user brought.
 
     Args:
-        name: what scenes call it, behind the name of the import.
+        name: its name in scenes, after the name of the import.
         form: one of `FORMS`.
         sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
             coarsest grid along an axis, and grids, each of twice as many cells as the one before; a picture
             height and width in texels; colours nodes along an axis, and steps from dark to light.
         coding: of its bytes, one of the form's.
         data: the bytes.
-        about: what its maker says of it: license, source, errors; text and numbers by their names.
-        digest: SHA-256, hex, of all that decides its shape or its colours.
+        about: facts from its maker: license, source, errors; text and numbers by name.
+        digest: SHA-256, hex, of everything that determines its shape or its colours.
     """
 
     name: str
@@ -76,26 +76,26 @@ class Element:
 
     @property
     def material(self) -> bool:
-        """Whether it is a material, and no geometry."""
+        """True of a material, false of a geometry."""
         return self.form != "pyramid"
 
     @property
     def names_coding(self) -> bool:
-        """Whether it is written how its bytes are coded; grids of distances were once all deflated."""
+        """True where a header names the coding; early files have none, as all grids were deflated."""
         return self.material or self.coding != FORMS[self.form].codings[0]
 
     @property
     def dimension(self) -> int:
-        """Of the space that it fills."""
+        """Dimension of the space that it fills."""
         return self.sizes[0] if self.form == "pyramid" else 2 if self.form == "picture" else 3
 
     @property
     def kind(self) -> str:
-        """What manifests call its like."""
+        """Its kind, as manifests name it."""
         return FORMS[self.form].kinds[self.dimension]
 
     def told(self) -> str:
-        """What there is to say of it, a line each."""
+        """Kind, sizes and facts of the element, a line each."""
         sides = self.sizes[::-1] if self.form == "picture" else (self.sides[-1],) * self.dimension
         what = "colours" if self.material else "distances"
         lines = [f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"]
@@ -109,10 +109,10 @@ class Element:
             return tuple(cells * 2**level + 1 for level in range(levels))
         if self.form == "picture":
             return self.sizes
-        found = [self.sizes[0]]
-        while found[0] % 2 and found[0] >= 9:  # halved as far as that leaves 4 cells
-            found.insert(0, found[0] // 2 + 1)
-        return tuple(found)
+        result = [self.sizes[0]]
+        while result[0] % 2 and result[0] >= 9:  # halved as far as that leaves 4 cells
+            result.insert(0, result[0] // 2 + 1)
+        return tuple(result)
 
     @property
     def held(self) -> int:
@@ -123,23 +123,23 @@ class Element:
         return 3 * nodes if self.material else nodes
 
     def inflated(self) -> bytes:
-        """The bytes of all nodes, of a form that has such.
+        """The decompressed bytes of all nodes, of a form with nodes.
 
         Raises:
             TensorError: they are damaged, fewer or more.
         """
         inflate = bz2.BZ2Decompressor() if self.coding == "bzip2" else zlib.decompressobj()
         try:
-            found = inflate.decompress(self.data, self.held + 1)
+            result = inflate.decompress(self.data, self.held + 1)
         except (zlib.error, OSError, EOFError) as error:
             raise TensorError(f"element `{self.name}` is damaged: {error}") from None
-        if len(found) != self.held or not inflate.eof or inflate.unused_data:
+        if len(result) != self.held or not inflate.eof or inflate.unused_data:
             raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")
-        return found
+        return result
 
 
 def credit_of(elements: Iterable[Element]) -> str:
-    """What elements say of their licenses and sources, a line each; those that say neither are left out."""
+    """Licenses and sources of elements, a line each; elements with neither are left out."""
     said = [
         (element.name, [str(element.about[key]) for key in ("license", "source") if key in element.about])
         for element in elements
@@ -148,7 +148,7 @@ def credit_of(elements: Iterable[Element]) -> str:
 
 
 def in_range(form: str, sizes: tuple[int, ...]) -> bool:
-    """Whether sizes are ones that a form takes."""
+    """Return whether a form allows these sizes."""
     if form == "picture":
         return all(1 <= side <= MOST_PIXELS for side in sizes)
     if form == "colours":
@@ -171,7 +171,7 @@ class Part(NamedTuple):
         geometry: its name in the file.
         place: of its middle.
         size: of its unit ball or disc.
-        turn: rows of what it is multiplied by before, a rotation or a reflection; empty for none.
+        turn: rows of a rotation or reflection that is applied first; empty for none.
         color: sRGB, 0 to 1; empty for none.
         material: the name of one in the file; empty for none.
     """
@@ -190,7 +190,7 @@ Group = tuple[Part, ...]  # in the order of painting
 def read_group(
     name: str, entry: Any, geometries: Mapping[str, Element], materials: Mapping[str, Element]
 ) -> Group:
-    """A group as a header has it.
+    """Read a group from its entry in a header.
 
     Raises:
         TensorError: it is damaged, too large, or has what the file does not hold.
@@ -223,7 +223,7 @@ _FIELDS: Final = frozenset(Part._fields)
 
 
 def told(group: Group) -> str:
-    """What there is to say of a group."""
+    """One line about a group."""
     counts = Counter(part.geometry for part in group)
     shown = ", ".join(name if count == 1 else f"{count} {name}" for name, count in counts.items())
     return f"group of {shown}"
@@ -236,7 +236,7 @@ def _frozen(value: Any) -> Any:
 
 
 def _lies(part: Part, d: int) -> bool:
-    """Whether the numbers of a part are such, so many, and within bounds."""
+    """Return whether the numbers of a part have the right types, counts and bounds."""
     rows = (part.place, (part.size,), *(part.turn if isinstance(part.turn, tuple) else (0,)), part.color)
     if not all(isinstance(row, tuple) and all(type(x) in (int, float) for x in row) for row in rows):
         return False
@@ -255,5 +255,5 @@ def _volume(rows: tuple[_Numbers, ...]) -> float:
 
 
 def entry_of(group: Group) -> list[dict[str, Any]]:
-    """A group as a header has it."""
+    """Entry of a group in a header."""
     return [{key: value for key, value in part._asdict().items() if value not in ((), "")} for part in group]

@@ -70,20 +70,21 @@ def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:
 
 
 def depth_of_json(text: str) -> int:
-    """How deep brackets nest, those in strings left out."""
+    """Depth of nested brackets, without those in strings."""
     return max(accumulate(map(_STEPS.__getitem__, _NO_BRACKETS.sub("", text))), default=0)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    result = dict(pairs)
+    if len(result) < len(pairs):
         seen: set[str] = set()
         twice = next(key for key, _ in pairs if key in seen or seen.add(key))  # type: ignore[func-returns-value]
         raise ValueError(f"the key `{repr(twice[:40])[1:-1]}` is given twice")
-    return found
+    return result
 
 
 def no_number(constant: str) -> float:
+    """Refuse the constants of JSON in Python, such as NaN."""
     raise ValueError(f"{constant} is not a JSON number")
 
 
@@ -107,7 +108,7 @@ def write_whole(target: str | os.PathLike[str], data: bytes, *, flush: bool = Tr
     """Write to a temporary file beside ``target``, flush it to the disk, then rename it over ``target``.
 
     For names that no user wrote: a link or pipe in its place is replaced, never written through. A file that
-    is there keeps its permissions. What a killed process left of writing the same file is removed.
+    is there keeps its permissions. Remains of a killed process that wrote the same file are removed.
 
     Args:
         flush: wait until the bytes are on the disk, which for a small file takes longer than all else.
@@ -153,7 +154,7 @@ def output_place(target: str | os.PathLike[str]) -> Path:
 
 
 def followed(path: str | os.PathLike[str]) -> Path:
-    """What a link points at; any other path as it is."""
+    """Target of a link; any other path unchanged."""
     return Path(os.path.realpath(path) if os.path.islink(path) else path)
 
 

@@ -1,7 +1,7 @@
 """Scenes and Programs as notebooks show them.
 
-They stand before what draws them in the order of the package, and know nothing of it: the public `render` and
-the viewer are fetched by their names when a notebook asks.
+This module comes before the renderers in the order of the package. So it imports the public `render` and the
+viewer by name when a notebook asks.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def set_notebook(shows: Shows) -> None:
 
 
 def bundle(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
-    """What stands for a value, by media type: a viewer, a picture, words; never an exception.
+    """Representations of a value by media type: a viewer, a picture, text; never raises.
 
-    Frontends take the richest that they show and trust.
+    Frontends choose the richest that they support and trust.
     """
     width, height = canvas
     text = f"{said}, {width} × {height} pixels"
@@ -42,10 +42,10 @@ def bundle(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
         return {"text/plain": f"{text}: too large to be drawn in passing"}
     try:
         image = importlib.import_module("scenelang").render(value)
-        found = {"image/png": image._repr_png_(), "text/plain": text}
+        result = {"image/png": image._repr_png_(), "text/plain": text}
         if os.environ.get(SWITCH, "viewer") != "picture":
             html = importlib.import_module("scenelang.web.export").frame(value, image)
-            found |= {"text/html": html} if html else {}
+            result |= {"text/html": html} if html else {}
     except Exception as error:  # whatever it is: a cell that ends in a value has not failed
         return {"text/plain": f"{text}\n\n{error}"}
-    return found
+    return result

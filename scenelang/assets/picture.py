@@ -1,11 +1,8 @@
-"""Pictures and grids of colours as materials, and the AV1 still pictures they lie in.
+"""Pictures as materials: lossless WebP files, or AV1 still pictures without their container.
 
-A container tells a size beside that in the frame's own header, and libraries take the memory that the latter
-asks for. So what is kept is a sequence header and a frame, nothing else, and their size is read here first.
-Bits are as section 5.5 of the AV1 specification has them; boxes are those of AVIF 1.1.
-
-A picture's bytes are those of a WebP file, made without loss, or an AV1 still picture
-(`scenelang.assets.picture`). `scenelang.assets.colours` has those of colours of space.
+A container states a size of its own besides that in the frame's header, and libraries allocate the memory
+that the header asks for. So an element stores a sequence header and a frame alone, and their size is checked
+here before anything is decoded. Bits follow section 5.5 of the AV1 specification, boxes AVIF 1.1.
 """
 
 from __future__ import annotations
@@ -27,7 +24,7 @@ _SEQUENCE, _FRAME, _BEGIN = b"\x0a", b"\x32", b"\x12\x00"  # headers of units th
 
 
 def frame_of(avif: bytes) -> bytes:
-    """What a file of one picture, as Pillow writes it, has in its container.
+    """The sequence header and the frame in an AVIF file of one picture, as Pillow writes it.
 
     Raises:
         ValueError: it is not laid out so.
@@ -60,8 +57,8 @@ def size_of(data: bytes) -> tuple[int, int]:
 
 
 def _unit(data: bytes, header: bytes) -> tuple[bytes, bytes]:
-    """What a unit of a kind holds, and what follows."""
-    size, at = 0, 1
+    """Payload of a first unit of a kind, and the bytes after it."""
+    size, at = 0, 1  # leb128: 7 bits a byte, the lowest first, the top bit set on all but the last
     while at < len(data) and at < 5:
         size |= (data[at] & 127) << 7 * (at - 1)
         at += 1

@@ -22,12 +22,13 @@ import numpy.typing as npt
 from scenelang.assets.element import MOST_SIDE, Element
 
 Grid = npt.NDArray[np.float32]
-FINE: Final = 24.0  # steps of a cell's side near the surface
-FINER: Final = 64.0  # and of the last grid, by the coding that has such,
-NEAR: Final = 2.0  # as many cells from the surface
-FAR: Final = 8.0  # steps of the distance, far from it, and
-FIRST: Final = 400.0  # more of them by this over the nodes along an axis, as coarse grids shape blends
-FARTHEST: Final = 4.0  # more than a distance in the cube can be
+FINE: Final = 24.0  # steps in a cell's side near the surface
+FINER: Final = 64.0  # the same in the last grid of the coding with finer steps,
+NEAR: Final = 2.0  # within so many cells of the surface
+# far from the surface a distance has FAR + FIRST / n steps, n nodes along an axis: coarse grids shape blends
+FAR: Final = 8.0
+FIRST: Final = 400.0
+FARTHEST: Final = 4.0  # larger than any distance in the cube
 
 
 def between(grid: Grid) -> Grid:
@@ -52,17 +53,17 @@ def between(grid: Grid) -> Grid:
 
 
 def _widths(expected: Grid, finer: bool) -> Grid:
-    """How much a step is at each node."""
+    """Size of a step at each node."""
     cell, away = 2 / (len(expected) - 1), abs(expected)
-    found = np.maximum(np.float32(cell / FINE), away / np.float32(FAR + FIRST / len(expected)))
+    result = np.maximum(np.float32(cell / FINE), away / np.float32(FAR + FIRST / len(expected)))
     if finer:
-        found[away < np.float32(NEAR * cell)] = np.float32(cell / FINER)
-    return np.asarray(found, np.float32)
+        result[away < np.float32(NEAR * cell)] = np.float32(cell / FINER)
+    return np.asarray(result, np.float32)
 
 
 def _stepped(expected: Grid, steps: npt.NDArray[np.int8], finer: bool) -> Grid:
-    found = expected + steps.astype(np.float32) * _widths(expected, finer)
-    return np.clip(found, -FARTHEST, FARTHEST)
+    result = expected + steps.astype(np.float32) * _widths(expected, finer)
+    return np.clip(result, -FARTHEST, FARTHEST)
 
 
 def refine(
@@ -73,13 +74,13 @@ def refine(
     Args:
         grid: the one before, None for the first.
         side: nodes along an axis.
-        true: of what is expected at the nodes, the distances that are to be there.
-        finer: whether steps near the surface are those of a last grid with finer ones.
+        true: gives the true distances at the nodes from the expected ones.
+        finer: true for a last grid with finer steps near the surface.
     """
     expected = np.zeros((side,) * dimension, np.float32) if grid is None else between(grid)
     steps = np.rint((true(expected) - expected) / _widths(expected, finer))
-    kept = np.clip(steps, -127, 127).astype(np.int8)
-    return _stepped(expected, kept, finer), kept
+    clipped = np.clip(steps, -127, 127).astype(np.int8)
+    return _stepped(expected, clipped, finer), clipped
 
 
 def packed(
@@ -96,7 +97,7 @@ def packed(
 
 
 def has_finer(element: Element) -> bool:
-    """Whether the last steps of a pyramid are finer near the surface."""
+    """Return whether the last grid of a pyramid has finer steps near the surface."""
     return element.coding == "bzip2"
 
 

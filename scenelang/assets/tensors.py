@@ -1,8 +1,8 @@
 """Files of tensors, read as a stranger's: safetensors with a JSON header of ours.
 
-Programs, weights and checkpoints are such files. What is asked for is checked before anything is taken out:
-that nothing is said twice, that each tensor has a type, a shape and bytes which agree, and that the tensors
-fill the file without a gap.
+Programs, weights and checkpoints are such files. A file is checked before anything is read from it: no key
+occurs twice, each tensor has a type, a shape and bytes that agree, and the tensors fill the file without a
+gap.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TYPES: Final = {
 
 
 class TensorError(ValueError):
-    """What is wrong with a file of tensors, and where in it."""
+    """A damaged or foreign file of tensors; the message says where."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def read_tensors(data: bytes, most_bytes: int, formats: Collection[int] = (FORMA
     if not isinstance(text := metadata["scenelang"], str):
         raise TensorError("its metadata are not text")
     header = _object(text.encode("utf-8", "surrogatepass"), "the header")
-    if type(found := header.get("format")) is not int or found not in formats:
+    if type(result := header.get("format")) is not int or result not in formats:
         raise TensorError(f"not of format {' or '.join(map(str, formats))}")
     body = memoryview(data)[8 + length :]
     tensors = {name: _tensor(name, entry) for name, entry in outer.items()}
@@ -102,12 +102,12 @@ def read_tensors(data: bytes, most_bytes: int, formats: Collection[int] = (FORMA
 
 def _object(data: bytes, what: str) -> dict[str, Any]:
     try:
-        found = read_json(data)
+        result = read_json(data)
     except ValueError as error:
         raise TensorError(f"{what}: {str(error).lower()}") from None
-    if not isinstance(found, dict):
+    if not isinstance(result, dict):
         raise TensorError(f"{what} is not an object")
-    return found
+    return result
 
 
 def _tensor(name: str, entry: Any) -> Tensor:

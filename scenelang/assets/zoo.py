@@ -1,10 +1,9 @@
 """Files of elements, which scenes import, checked without numpy as a stranger's.
 
-Such a zoo is a file of tensors (`scenelang.assets.tensors`), one of bytes for each element. The header's
-``elements`` say of each geometry what it is made of, whose tensor has its name, and in files of format 2
-``materials`` likewise, with tensors named ``material.NAME``: a geometry and a material may share a name.
-`scenelang.assets.element` has what an element can be. There ``groups`` may be too
-(`scenelang.assets.element`).
+Such a zoo is a file of tensors (`scenelang.assets.tensors`), one tensor of bytes for each element. The
+header's ``elements`` describe geometries, whose tensors have their names. Files of format 2 also have
+``materials``, with tensors named ``material.NAME``, so that a geometry and a material may share a name, and
+``groups``. `scenelang.assets.element` defines the forms of elements and groups.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ _MOST_TEXT: Final = 2000
 
 @dataclass(frozen=True, slots=True)
 class Zoo:
-    """What a file of elements holds, by name; a geometry and a material may share theirs."""
+    """Contents of a file of elements by name; a geometry and a material may share a name."""
 
     geometries: dict[str, Element]
     digest: str  # SHA-256 of the file, hex
@@ -61,18 +60,18 @@ def load_zoo(path: str | Path) -> Zoo:
         OSError: it cannot be read.
         TensorError: it is damaged, foreign or hostile.
     """
-    found = os.stat(path)
-    return _load(os.fspath(path), found.st_mtime_ns, found.st_size, found.st_ino)
+    stat = os.stat(path)
+    return _load(os.fspath(path), stat.st_mtime_ns, stat.st_size, stat.st_ino)
 
 
 @lru_cache(maxsize=16)
 def _load(path: str, *version: int) -> Zoo:
-    """The elements of a version of a file, which editors and animations ask for again and again."""
+    """Cached elements of one version of a file, which editors and animations read repeatedly."""
     return replace(read_zoo(read_regular(path, MOST_BYTES)), folder=Path(path).parent)
 
 
 _TABLES: Final = {"elements": "", "materials": "material."}
-"""Tables of a header, and what stands in front of the names of their tensors."""
+"""Tables of a header, and the prefixes of their tensors' names."""
 
 
 def read_zoo(data: bytes) -> Zoo:
@@ -94,10 +93,10 @@ def read_zoo(data: bytes) -> Zoo:
     if not 0 < len(entries) <= MOST_ELEMENTS:
         raise TensorError(f"{len(entries):,} elements, where 1 to {MOST_ELEMENTS:,} are allowed")
     listed = [(e[1], e[2], file.tensors[tensor]) for e, tensor in zip(entries, tensors, strict=True)]
-    found = read_elements(listed, file.body)
-    if any(e.material != (key == "materials") for (key, *_), e in zip(entries, found, strict=True)):
+    result = read_elements(listed, file.body)
+    if any(e.material != (key == "materials") for (key, *_), e in zip(entries, result, strict=True)):
         raise TensorError("a material among its geometries, or a geometry among its materials")
-    zoo = Zoo.of(found, hashlib.sha256(data).hexdigest())
+    zoo = Zoo.of(result, hashlib.sha256(data).hexdigest())
     if len(listed_groups) > MOST_ELEMENTS:
         raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
     held = zoo.geometries, zoo.materials
@@ -105,20 +104,20 @@ def read_zoo(data: bytes) -> Zoo:
 
 
 def read_elements(listed: Iterable[tuple[str, Any, Tensor]], body: memoryview) -> tuple[Element, ...]:
-    """The elements that names, entries of a header and tensors of a file tell of; each is unpacked once.
+    """The elements of names, header entries and tensors of a file; each is unpacked once as a check.
 
     Raises:
         TensorError: they are damaged, do not agree, or are more than can be held.
     """
-    found, held = [], 0
+    result, held = [], 0
     for name, entry, tensor in listed:
         element = _element(name, entry, tensor, body)
         held += element.held
         if held > MOST_HELD:
             raise TensorError(f"elements of more than {MOST_HELD:,} bytes unpacked")
         _ = pixels(element) if element.form == "picture" else element.inflated()
-        found.append(element)
-    return tuple(found)
+        result.append(element)
+    return tuple(result)
 
 
 def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element:
@@ -144,14 +143,14 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
 
 
 def is_said(value: Any) -> bool:
-    """Whether an element may say this of itself: text of a bounded length, or a finite number."""
+    """Return whether a value may stand among an element's facts: bounded text or a finite number."""
     if isinstance(value, str):
         return len(value) <= _MOST_TEXT and value.replace("\n", " ").isprintable()
     return type(value) in (int, float) and abs(value) < 1e300
 
 
 def entry_of(element: Element) -> dict[str, Any]:
-    """What a header says of an element."""
+    """Entry of an element in a header."""
     sizes = dict(zip(FORMS[element.form].sizes, element.sizes, strict=True))
     coding = {"coding": element.coding} if element.names_coding else {}
     return {"form": element.form, **sizes, **coding, "about": element.about}

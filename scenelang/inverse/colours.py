@@ -1,14 +1,14 @@
 """The smallest grid of colours in which the surface of a mesh looks as it should.
 
-Nodes beside the surface begin with the colour of the nearest point of it and are brought nearer to what makes
-points of the surface right between them (SIRT, Gilbert 1972). The others are filled from those.
+Nodes next to the surface start with the colour of its nearest point. SIRT (Gilbert 1972) then corrects them
+by the errors at points of the surface between them. The other nodes copy the nearest of these.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,22 +18,23 @@ from scenelang.assets.element import Element
 from scenelang.drawing.exact.mesh import Mesh
 from scenelang.inverse.grids import corners
 
-SIDES: Final = (17, 25, 33, 49, 65, 97, 129, 193)  # nodes along an axis, the last where an error is asked
+SIDES: Final = (
+    17,
+    25,
+    33,
+    49,
+    65,
+    97,
+    129,
+    193,
+)  # nodes along an axis; the last only where an error is asked
 NEAR: Final = 0.025  # root mean square of channels off, 0 to 1, that is near enough
 MOST_BYTES: Final = 150_000  # of a grid that is tried where that is not met
 SAMPLES: Final = 20_000
-_COVER: Final = 60  # points for each square of a grid's side, which find the nodes beside the surface
-_EACH: Final = 4  # points a node, by which they are brought nearer
-_TIMES: Final = 8
-_HOLD: Final = 0.3  # of a point's weight: how much a node stays what it is
-
-
-class Coloured(NamedTuple):
-    """One grid that was tried: nodes along an axis, bytes, and root mean square of channels off."""
-
-    side: int
-    bytes: int
-    error: float
+_COVER: Final = 60  # points for each cell of a grid's face, which find the nodes next to the surface
+_EACH: Final = 4  # points for each of these nodes, by which it is corrected
+_TIMES: Final = 8  # rounds of corrections
+_HOLD: Final = 0.3  # added to a node's weights, so that a node with little evidence moves little
 
 
 def fit_colours(
@@ -44,9 +45,9 @@ def fit_colours(
     budget_s: float = np.inf,
     steps: int | None = None,
     about: dict[str, str | float] | None = None,
-    report: Callable[[Coloured], None] = lambda tried: None,
+    report: Callable[[int, int, float], None] = lambda side, size, error: None,
 ) -> Element:
-    """The smallest material that makes a mesh look as its file says, or the nearest of at most `MOST_BYTES`.
+    """Fit the smallest grid that gives a mesh the look in its file, or the best of at most `MOST_BYTES`.
 
     Args:
         mesh: with a look.
@@ -54,11 +55,11 @@ def fit_colours(
         budget_s: no further grid is begun after so many seconds.
         steps: how many are tried at most, whatever the time.
         about: what the element says of itself, beside its error.
-        report: called with each that was tried.
+        report: called for each grid with nodes along an axis, bytes, and root mean square of channels off.
     """
     assert mesh.look is not None
     started, asked = time.monotonic(), max_error or NEAR
-    fine = round(min(255, max(8, 1 / asked)))  # steps that are off by half of what is asked
+    fine = round(min(255, max(8, 1 / asked)))  # steps of luma, whose rounding is half of the error asked
     at, share = mesh.spread(SAMPLES, 1)
     points, true = mesh.points(at, share), mesh.look.at(at, share)
     best: Element | None = None
@@ -69,7 +70,7 @@ def fit_colours(
         element = packed(name, *_grid(mesh, side), {}, fine)
         drawn = _weights(points, side) @ unpacked(element).reshape(3, -1).T
         error = float(np.sqrt(np.square(drawn - true).mean()))
-        report(Coloured(side, len(element.data), error))
+        report(side, len(element.data), error)
         if best is not None and len(element.data) > MOST_BYTES:
             break
         best = Element(
@@ -82,17 +83,17 @@ def fit_colours(
 
 
 def _weights(points: npt.NDArray[np.float64], side: int) -> Any:
-    """What each node (n³) of a grid counts at points (M, 3) between them: a sparse matrix (M, n³)."""
+    """Weights of a grid's nodes at points (M, 3) between them, as a sparse matrix (M, n³)."""
     from scipy.sparse import csr_matrix
 
     columns, values = zip(*corners(points, side), strict=True)
     start = np.arange(0, 8 * len(points) + 1, 8)
-    found = np.stack(values, 1).astype(np.float32).ravel(), np.stack(columns, 1).ravel(), start
-    return csr_matrix(found, shape=(len(points), side**3))
+    result = np.stack(values, 1).astype(np.float32).ravel(), np.stack(columns, 1).ravel(), start
+    return csr_matrix(result, shape=(len(points), side**3))
 
 
 def _grid(mesh: Mesh, side: int) -> tuple[Grid, npt.NDArray[np.bool_]]:
-    """Colours (3, n, n, n), and which nodes (n, n, n) lie beside the surface."""
+    """Colours (3, n, n, n), and a mask (n, n, n) of the nodes next to the surface."""
     from scipy.ndimage import distance_transform_edt
 
     assert mesh.look is not None

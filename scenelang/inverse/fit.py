@@ -1,6 +1,7 @@
-"""From pictures back to scenes: the values of params whose picture comes nearest to a target.
+"""Fitting: the values of a scene's params whose picture is nearest to a target.
 
-Otherwise sizes and colours make up for the blur, and the nearest picture is not that of the true values.
+A target's blur is fitted with the values. Otherwise sizes and colours would make up for it, and the nearest
+picture would not be that of the true values.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,7 +23,6 @@ from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.how import Samples
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
-from scenelang.inverse import search
 from scenelang.inverse.problem import LEVELS, Moment, Problem, Together
 from scenelang.inverse.search import (
     ALIKE,
@@ -35,9 +35,12 @@ from scenelang.inverse.search import (
     Matrix,
     Picture,
     Point,
-    Space,
+    Report,
+    SearchBox,
     blurred,
+    central,
     descend,
+    solve,
     space_of,
     target_of,
 )
@@ -46,8 +49,8 @@ from scenelang.language.evaluation import Axis, Source, literals_of, rewritten
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 
-SIDES: Final = (32, 64, 128, 256)  # of pictures from coarse to fine, pixels along the shorter side
-MOST_SOLID: Final = 128  # of solids, which take longer
+SIDES: Final = (32, 64, 128, 256)  # pixels along the shorter side, from coarse to fine
+MOST_SOLID: Final = 128  # the same at most of solids, which take longer
 MOST_TARGETS: Final = 64
 
 
@@ -62,7 +65,7 @@ class Task(Record):
     """
 
     problems: tuple[Together, ...]
-    space: Space
+    space: SearchBox
     first: Point
     kept: dict[str, str]
 
@@ -81,33 +84,33 @@ def task_of(
     root: str | os.PathLike[str] | None = None,
     frame: int = 0,
 ) -> Task:
-    """What `scenelang.fit`, whose arguments and errors these are, is to do."""
-    found = Diagnostics()
+    """Prepare the search of `scenelang.fit`, which has the same arguments and errors."""
+    diagnostics = Diagnostics()
     given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
-    source = Source(**given, params=fixed, model=model, root=root).parsed(found)
-    if found.errors:
-        raise SceneError(found)
+    source = Source(**given, params=fixed, model=model, root=root).parsed(diagnostics)
+    if diagnostics.errors:
+        raise SceneError(diagnostics)
     targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
     if not 0 < len(targets) <= MOST_TARGETS:
         raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
     moments = [Moment(source, number) for number in sorted(targets)]
-    evaluation, made = moments[0].evaluated(start)
+    evaluation, first_scene = moments[0].evaluated(start)
     space = space_of(evaluation, params, fixed)
     for name in start:
         if name not in space.names:
             raise FitError(f"a start for `{name}`, which is not among the params to find")
     first = space.point({})
-    solid = True in {_is_solid(each, space.values(first), made.canvas) for each in moments}
+    solid = True in {_is_solid(each, space.values(first), first_scene.canvas) for each in moments}
     goals = [
-        target_of(targets[each.frame], made.canvas, mask=mask, crop=crop, under=background)
+        target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
         for each in moments
     ]
     smallest = min(min(goal.weights.shape) for goal in goals)
-    short = min(MOST_SOLID if solid else SIDES[-1], *made.canvas, smallest)
+    short = min(MOST_SOLID if solid else SIDES[-1], *first_scene.canvas, smallest)
     sides = [side for side in SIDES if side < short] + [short]
 
     def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
-        canvas = _sized(made.canvas, side)
+        canvas = _sized(first_scene.canvas, side)
         return Together(
             [
                 Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
@@ -125,7 +128,7 @@ def task_of(
 
 
 def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
-    """Whether a scene is of solids, if it has pictures that can be compared."""
+    """Return whether a scene is of solids; raises `FitError` where its pictures cannot be compared."""
     program = moment.program(values, canvas)
     if program is None:
         raise SceneError(moment.trouble)
@@ -143,36 +146,36 @@ def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
 
 
 WIDEST: Final = 8.0  # standard deviation, pixels
-ENOUGH: Final = 1e-6  # share of the error by which a step has to lower it: most of it may be noise
+ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the error may be noise
 
 
 class Lens:
-    """The blur of a target, which is found with the values: one more number of a search.
+    """Blur of a target, fitted with the values as one more number of the search.
 
     Args:
         problem: of the last size.
         space: the params.
-        until: nothing is begun after this time, as of `time.monotonic`.
+        until: no descent starts after this time of `time.monotonic`.
     """
 
-    def __init__(self, problem: Together, space: Space, until: float) -> None:
+    def __init__(self, problem: Together, space: SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
         self.finer = problem.finer()
         self._last: tuple[Found, Found, Blur] | None = None
 
     def followed(self, place: Found) -> tuple[Found, Blur]:
-        """Where a place leads to once pictures are blurred, and how; not at all where that leads nowhere."""
+        """The place after a descent with blurred pictures, and the blur; the same place where none helps."""
         if self._last is None or self._last[0] is not place:
             self._last = place, *self._follow(place, (True, False))
         return self._last[1:]
 
     def noise(self, place: Found) -> bool:
-        """Whether what is left is like noise, once the blur is taken into account."""
-        found, blur = self.followed(place)
-        return self.problem.noise(found.point, blur)
+        """Return whether the remaining difference is like noise, once the blur is taken into account."""
+        result, blur = self.followed(place)
+        return self.problem.noise(result.point, blur)
 
     def ended(self, places: Sequence[Found]) -> tuple[list[Found], Blur]:
-        """Places of a search, best first, once more with the blur of the first, if it has one."""
+        """Descend again from the places of a search, best first, with the blur of the first, if any."""
         first, blur = self.followed(places[0])
         if not blur.sigma:
             return list(places), blur
@@ -191,38 +194,38 @@ class Lens:
             if time.monotonic() > self.until:
                 break
             residuals = partial(self._residuals, light)
-            found = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
-            if found is not None and found.cost < best[0].cost:
-                way = place.way + tuple(u[:-1] for u in found.way)
-                ended = Found(found.point[:-1], found.cost, way)
-                best = ended, Blur(WIDEST * float(found.point[-1]), light)
+            result = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
+            if result is not None and result.cost < best[0].cost:
+                way = place.way + tuple(u[:-1] for u in result.way)
+                ended = Found(result.point[:-1], result.cost, way)
+                best = ended, Blur(WIDEST * float(result.point[-1]), light)
         return best
 
     def _residuals(self, light: bool, u: Point) -> Point | None:
-        """Residuals of params and, as a share of `WIDEST`, the blur."""
+        """Residuals at a point whose last number is the blur, as a share of `WIDEST`."""
         drawn = self.finer if light else self.problem
-        found, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
-        if found is None:
+        result, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
+        if result is None:
             return None
         times = drawn.canvas[0] // self.problem.canvas[0]
-        return self.problem.residuals([blurred(one, blur, times) for one in found])
+        return self.problem.residuals([blurred(one, blur, times) for one in result])
 
 
 TIED: Final = 0.9  # correlation from which two numbers explain each other
 LEVEL: Final = 1 / 255
-_UNSEEN: Final = 1e-4  # root mean square change over a whole range that is none
+_UNSEEN: Final = 1e-4  # root mean square change over a whole range up to which the picture does not show it
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One number that was found, or one of a vector.
+    """One fitted number, or one of a vector.
 
     Args:
         label: ``k``, or ``ink.2`` of a vector.
         low, high: its range, in base units.
-        value: what was found, in base units.
-        felt: how far it has to move for the picture to change by 1/255 (root mean square of all channels), in
-            shares of its range; inf where the picture does not show it, NaN of a choice.
+        value: its fitted value, in base units.
+        felt: change, in shares of its range, that changes the picture by 1/255 (root mean square of all
+            channels); inf where the picture does not show it, NaN where it is not known.
     """
 
     label: str
@@ -234,24 +237,24 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What `scenelang.fit` found.
+    """Result of `scenelang.fit`.
 
     Args:
-        text: the scene with what was found as defaults, comments and layout as they were.
-        values: what was found, as text of the language, by param.
-        psnr: how near the picture of ``text`` is to the target, dB, over pixels that count; at most 100.
-        blur: of the target, as far as it tells.
-        blurred_psnr: how near the picture is once it is blurred as much.
-        start_psnr: of the picture before.
-        size: of the pictures that were compared, width and height.
-        done: whether the search came to an end by itself.
-        notes: what stands in the way of a nearer picture or a surer value, in sentences without a full stop.
-        numbers: of continuous params, how much the picture feels them.
-        tied: pairs of their labels and how far they are correlated, from `TIED` on.
+        text: the scene with the values as defaults; comments and layout stay.
+        values: the values as text of the language, by param.
+        psnr: PSNR of the picture of ``text`` to the target in dB, over pixels that count; at most 100.
+        blur: estimated blur of the target.
+        blurred_psnr: PSNR of the picture after the same blur.
+        start_psnr: PSNR of the picture before the search.
+        size: width and height of the pictures that were compared.
+        done: true where the search converged before the time was out.
+        notes: obstacles to a nearer picture or a surer value, in sentences without a full stop.
+        numbers: continuous params and how sensitive the picture is to each.
+        tied: pairs of their labels and their correlation, from `TIED` on.
         others: values of other places whose pictures are about as near.
         frames: pictures that were drawn.
         before, after, target: pictures (H, W, 3) of that size, of several targets one below the other.
-        way: scenes from the start to what was found, as `scenelang.animate` takes them.
+        way: scenes from the start to the result, as `scenelang.animate` takes them.
     """
 
     text: str = field(repr=False)
@@ -304,37 +307,37 @@ class Fit:
         return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
 
 
-def numbers_of(space: Space, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
-    """What is known of each continuous axis."""
-    found = []
+def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
+    """Value and sensitivity of each continuous axis."""
+    result = []
     for at in np.flatnonzero(space.smooth).tolist():
         axis = space.axes[at]
         rate = 0.0 if slopes is None else float(np.linalg.norm(slopes[:, at]))
         share = math.nan if slopes is None else LEVEL / rate if rate > _UNSEEN else math.inf
         value = axis.low + float(u[at]) * (axis.high - axis.low)
-        found.append(Number(axis.label, axis.low, axis.high, value, share))
-    return tuple(found)
+        result.append(Number(axis.label, axis.low, axis.high, value, share))
+    return tuple(result)
 
 
-def ties(space: Space, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
-    """Pairs of axes of which one makes up for what the other does."""
+def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of axes whose effects on the picture are correlated, and the correlation."""
     if slopes is None:
         return ()
     seen = np.flatnonzero(np.linalg.norm(slopes, axis=0) > _UNSEEN)
     unit = slopes[:, seen] / np.linalg.norm(slopes[:, seen], axis=0)
-    spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # the same columns may stand twice
+    spread = np.linalg.inv(unit.T @ unit + 1e-6 * np.eye(len(seen)))  # equal columns would be singular
     size = np.sqrt(np.diag(spread))
-    found = []
+    result = []
     for i in range(len(seen)):
         for j in range(i):
             r = float(spread[i, j] / (size[i] * size[j]))
             if abs(r) >= TIED:
-                found.append((space.axes[seen[j]].label, space.axes[seen[i]].label, r))
-    return tuple(found)
+                result.append((space.axes[seen[j]].label, space.axes[seen[i]].label, r))
+    return tuple(result)
 
 
 def hindrances(
-    space: Space,
+    space: SearchBox,
     u: Point,
     numbers: Sequence[Number],
     psnr: float,
@@ -342,11 +345,11 @@ def hindrances(
     worst: tuple[str, Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
-    """Why the picture is no nearer, as far as can be told.
+    """Reasons why the picture is no nearer, as far as they are known.
 
     Args:
-        worst: which picture of several is farthest off, and the errors (H, W) of its pixels.
-        noise: whether these are like noise.
+        worst: label of the picture that is farthest off, and the errors (H, W) of its pixels.
+        noise: true where these are like noise.
     """
     notes = []
     if not done:
@@ -371,11 +374,7 @@ def hindrances(
     return tuple(notes)
 
 
-GOOD_DB: Final = 35.0
-"""From here on nothing is said of where a picture differs."""
-
-
-Progress = Callable[[str, int, int], None]
+GOOD_DB: Final = 35.0  # PSNR from which no note says where a picture differs
 NEAREST_DB: Final = 45.0  # pictures this near count as alike however they differ
 
 
@@ -394,7 +393,7 @@ def fit(
     frame: int = 0,
     seed: int = 0,
     budget_s: float = 300.0,
-    progress: Progress = lambda what, done, count: None,
+    progress: Report = lambda what, done, count: None,
 ) -> Fit:
     """Find the values of params whose picture comes nearest to a target: ``fit("a.nsg", "a.png")``.
 
@@ -414,7 +413,7 @@ def fit(
         progress: called with what is done, how much of it, and all.
 
     Returns:
-        What was found, also where it is not near.
+        The result, also where its picture is not near.
 
     Raises:
         FitError: there is nothing to find, the target does not fit the scene, or no values give a picture.
@@ -427,7 +426,7 @@ def fit(
         background=background, model=model, root=root, frame=frame,
     )  # fmt: skip
     lens = Lens(task.problems[-1], task.space, until)
-    places, done = search.solve(
+    places, done = solve(
         task.problems,
         task.space,
         task.first,
@@ -442,7 +441,7 @@ def fit(
 
 
 def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) -> Fit:
-    """What there is to say of the places that a search came to, and of the target's blur."""
+    """Result of the places that a search reached and of the target's blur."""
     space, problems, first = task.space, task.problems, task.first
     last, best = problems[-1], places[0].point
     every = [space.literals(place.point) for place in places]
@@ -454,13 +453,13 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
         raise FitError("the scene with the values that were found has no picture")
     near = _db(last, after)
     soft = [blurred(one, blur) for one in after]
-    step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
-    slopes = search.central(last.pixels, space, best, step, space.smooth)
+    step = 2 * STEPS[min(len(problems), len(STEPS)) - 1]
+    slopes = central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
     others = [
         literals
         for place, literals in zip(places[1:], every[1:], strict=True)
-        if place.cost <= max(search.ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+        if place.cost <= max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
     ]
     return Fit(
         text=text,
@@ -485,7 +484,7 @@ def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) ->
     )
 
 
-def _scenes(moment: Moment, space: Space, way: Sequence[Point]) -> Iterator[Scene]:
+def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[Scene]:
     """The scenes of places that have one."""
     for u in way:
         with suppress(SceneError):

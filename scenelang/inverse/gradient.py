@@ -36,7 +36,7 @@ from scenelang.drawing.neural.frames import Affine, Warp, way_back
 from scenelang.drawing.neural.load import load_model
 from scenelang.drawing.neural.network import EMPTY, Cell, FramedArrays
 from scenelang.drawing.neural.torch_networks import Framed
-from scenelang.inverse.search import WHITE, Point, Space
+from scenelang.inverse.search import WHITE, Point, SearchBox
 
 
 @lru_cache(maxsize=64)
@@ -47,6 +47,7 @@ def softened(name: str, width: float) -> FramedArrays:
     soft = copy.copy(network)
     cell = Cell(*network.cell_weights())
     unit = float(np.linalg.norm(cell.candidate[UNION, 0]))  # growth of the state per world unit
+    # coverage rises from 0 to 1 over 4 / exp(slope) of the state: make that at least the width
     soft.read_slope = np.float32(min(float(network.read_slope), math.log(4 / (unit * width))))
     features = network.config.features
     steep = np.linalg.norm(cell.lines[..., :features], axis=-1)  # (TOKENS, S + L), per world unit
@@ -59,13 +60,13 @@ _LEAST: Final = 1e-30  # of a square, whose root has no derivative at 0
 
 
 class _Parts(NamedTuple):
-    """Numbers of N objects and what is behind them, or n rates of these.
+    """Numbers of N objects and of the background, or n rates of these.
 
     Args:
         geometry: geometry vectors (N, G, n).
         colours: (N, 3, n).
-        widths: of the blends by which objects join (N, n).
-        behind: (3, n).
+        widths: widths of the blends by which objects join (N, n).
+        behind: colour of the background (3, n).
     """
 
     geometry: Tensor
@@ -75,12 +76,12 @@ class _Parts(NamedTuple):
 
 
 class SoftPlane:
-    """What a Program of the plane shows.
+    """Soft picture of a Program of the plane as a function of its numbers.
 
     Args:
-        program: of which the tokens and the shapes count here; none is an element or wears a texture.
+        program: gives tokens and shapes; no object is an element or has a texture.
         under: sRGB-encoded, behind what is transparent.
-        dtype: of all that is computed.
+        dtype: type of all computations.
     """
 
     def __init__(
@@ -118,8 +119,8 @@ class SoftPlane:
         moving.colours.mul_((still.colours >= 0) & (still.colours <= 1))
         still.colours.clamp_(0.0, 1.0)
         pieces = torch.split(self.points, max(1, PAIRS // self.count), 1)
-        found = zip(*(self._changes(p, still, moving) for p in pieces), strict=True)
-        pictures, slopes = (torch.cat(part, 1) for part in found)
+        result = zip(*(self._changes(p, still, moving) for p in pieces), strict=True)
+        pictures, slopes = (torch.cat(part, 1) for part in result)
         shape = 3, self.canvas[1], self.canvas[0]
         return (
             pictures.reshape(shape).movedim(0, 2).numpy(),
@@ -170,14 +171,14 @@ class SoftPlane:
                     steps.append(Warp(twirl, tuple(bend)))
         points = way_back(TORCH, steps, [x.expand(self.count, -1) for x in p])
         q = torch.stack(list(points))
-        found: list[Any] = [None] * self.count
+        result: list[Any] = [None] * self.count
         for shape, decoder in enumerate(self.decoders):
             which = np.flatnonzero(self.shapes == shape).tolist()
             own = q[:, which].reshape(2, -1)
             decoded = self.network.decode(own, TORCH.length(list(own)), 1.0, decoder)
             for at, row in zip(which, decoded.reshape(len(which), -1), strict=True):
-                found[at] = row
-        return torch.stack(found) * _scale(*maps)
+                result[at] = row
+        return torch.stack(result) * _scale(*maps)
 
     def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, behind: Tensor) -> Tensor:
         """Channels (3, M) of points, by distances, colours and widths (3, N, M) and what is behind (3, M)."""
@@ -199,6 +200,7 @@ def _scale(last: tuple[Tensor, ...], middle: tuple[Tensor, ...]) -> Tensor:
     """World distance per leaf distance (N, M or 1): one over the most by which the maps back stretch."""
     (a, b, c, d), (e, f, g, h) = middle, last
     p, q, r, s = a * e + b * g, a * f + b * h, c * e + d * g, c * f + d * h
+    # half the sum of the two roots is the largest singular value of [p q; r s]
     squares = (p + s).square() + (r - q).square(), (p - s).square() + (r + q).square()
     one, other = (square.clamp(_LEAST).sqrt() for square in squares)
     return 2.0 / (one + other)
@@ -227,7 +229,7 @@ def numbers_of(program: Program) -> Floats:
 
 
 def alike(a: Program, b: Program) -> bool:
-    """Whether two Programs differ in their numbers alone."""
+    """Return whether two Programs differ in their numbers alone."""
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
     plain = (a.background is None) == (b.background is None)
     named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
@@ -238,11 +240,11 @@ class Rates:
     """Derivatives of a Program's numbers.
 
     Args:
-        program: what draws the scene of a point, None where there is none.
+        program: compiles the scene of a point; gives None where its values have no scene.
         space: the params.
     """
 
-    def __init__(self, program: Callable[[Point], Program | None], space: Space) -> None:
+    def __init__(self, program: Callable[[Point], Program | None], space: SearchBox) -> None:
         self.program, self.space = program, space
         self._moved: dict[int, npt.NDArray[np.bool_]] = {}  # (K,) which numbers an axis changes
 
@@ -255,7 +257,7 @@ class Rates:
             here: the point's Program.
         """
         base = numbers_of(here)
-        found, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)
+        result, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)
         if any(len(mask) != len(base) for mask in self._moved.values()):
             self._moved = {}
         groups = self._groups(len(base))
@@ -269,9 +271,9 @@ class Rates:
             for axis, mask in zip(group, masks, strict=True):
                 if change is not None:
                     column = change[0] * mask if len(group) > 1 else change[0]
-                    found[:, axis], known[axis] = column / change[1][axis], True
+                    result[:, axis], known[axis] = column / change[1][axis], True
                     self._moved[axis] = self._moved.get(axis, False) | (column != 0)
-        return found, known
+        return result, known
 
     def _groups(self, count: int) -> list[list[int]]:
         """Continuous axes, those together that are known to change different numbers."""

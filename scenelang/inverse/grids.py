@@ -1,11 +1,9 @@
-"""The smallest grids of distances that are as near as asked.
+"""The smallest grids of distances within an error.
 
-A grid that is true at its nodes cuts the edges and corners of a shape between them. Moving its nodes by what
-it says at points of the surface, in some rounds (SIRT; Gilbert 1972), halves its error there.
-
-Pyramids of two kinds of coarsest grid grow level by level, the smaller one first. The finest grid of each is
-settled on the surface (`settle.py`), and it is measured as it is drawn: what it says at other points of the
-true surface, and how its normals lie there.
+Pyramids of two kinds of coarsest grid grow level by level, the smaller one first. A grid that is true at its
+nodes cuts the edges and corners of a shape between them. So the nodes of the finest grid are moved by the
+errors at points of the surface, in some rounds (SIRT; Gilbert 1972), which halves the error there. Each grid
+is measured as it is drawn: its distances and its normals at other points of the true surface.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ Corner = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 
 
 def corners(points: Points, side: int) -> list[Corner]:
-    """Nodes around points (M, d) of a grid over [-1, 1]^d, and what each counts between them.
+    """Nodes around points (M, d) of a grid over [-1, 1]^d, and their linear weights.
 
     Args:
         side: nodes along an axis.
@@ -49,7 +47,7 @@ def corners(points: Points, side: int) -> list[Corner]:
 
 
 def settled(grid: Grid, points: Points) -> Grid:
-    """The grid with nodes moved so that what is drawn of it is nearer to 0 at points (M, d)."""
+    """The grid with nodes moved so that its drawn distances at points (M, d) are nearer to 0."""
     around = corners(points, len(grid))
     shares = sum(np.bincount(node, weight, grid.size) for node, weight in around)
     grid, asked = grid.copy(), np.ascontiguousarray(points.T, np.float32)
@@ -63,12 +61,12 @@ def settled(grid: Grid, points: Points) -> Grid:
 
 CELLS: Final = (4, 6)  # of the coarsest grids, along an axis
 FEWEST: Final = {2: 25, 3: 13}  # nodes along an axis of what is measured, by dimension
-BAND: Final = 4.5  # cells from the surface within which distances are true; farther ones are expected
+BAND: Final = 4.5  # cells from the surface within which distances are computed; farther ones are interpolated
 SAMPLES: Final = 20_000  # points of the surface where an element is measured
-SETTLED: Final = {2: 0, 3: 200_000}  # and where it is settled, by dimension
-BLOCK: Final = 100_000  # points that are asked for at a time
-LONG_S: Final = 240.0  # of processor time, into which the grids of a shape fit unless a budget is larger
-DEARER: Final = 4.0  # at most, a grid than the one before
+SETTLED: Final = {2: 0, 3: 200_000}  # further points by which nodes are moved, by dimension
+BLOCK: Final = 100_000  # points for which distances are computed at a time
+LONG_S: Final = 240.0  # processor time for the grids of a shape, unless a budget is larger
+DEARER: Final = 4.0  # most times as long as the grid before that a grid is expected to take
 THIN: Final = 0.02  # share of a surface that may be too thin for a grid
 NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by dimension
 
@@ -79,9 +77,9 @@ class Rung(NamedTuple):
     Args:
         side: nodes along an axis of its finest grid.
         error: mean distance off at the surface, in leaf units.
-        worst: what one point of a hundred exceeds.
+        worst: 99th percentile of the distance off.
         normal_deg: median angle between normals.
-        thin: share of the surface within a cell of which the grid has no inside, or nothing has.
+        thin: share of the surface with no inside of the grid, or of the shape, within a cell.
     """
 
     side: int
@@ -111,14 +109,14 @@ class _Pyramid:
         axis = np.linspace(-1, 1, side)
 
         def true(expected: Grid) -> Grid:
-            found = expected.reshape(-1).copy()
-            near = abs(found) < BAND * 2 / (side - 1) if len(self.steps) > 1 else found < np.inf
+            result = expected.reshape(-1).copy()
+            near = abs(result) < BAND * 2 / (side - 1) if len(self.steps) > 1 else result < np.inf
             at = np.stack(np.unravel_index(np.nonzero(near)[0], expected.shape), 1)
             for first in range(0, len(at), BLOCK):
                 progress(side, first / len(at))
                 part = at[first : first + BLOCK]
-                found[np.ravel_multi_index(tuple(part.T), expected.shape)] = shape.distances(axis[part])
-            self.true = found.reshape(expected.shape)
+                result[np.ravel_multi_index(tuple(part.T), expected.shape)] = shape.distances(axis[part])
+            self.true = result.reshape(expected.shape)
             return self.true
 
         self.before = self.grid
@@ -152,7 +150,7 @@ def fit(
         budget_s: no further pyramid is begun after so many seconds; one is tried in any case. Nor is one,
             without ``steps``, that may end after `LONG_S` of processor time.
         steps: how many are tried at most, whatever the time; the same number gives the same bytes.
-        about: what the element says of itself, beside its figures.
+        about: facts of the element besides its figures.
         report: called with each that was tried.
         progress: called with nodes along an axis of what grows, and the share of it that is done.
     """
@@ -202,7 +200,7 @@ def fit(
 
 
 def measured(element: Element, points: Points, normals: Points, thin: float = 0.0) -> Rung:
-    """How far an element is off at points (M, d) of the true surface and their normals.
+    """Measure an element at points (M, d) of the true surface and their normals.
 
     Args:
         thin: share of the surface that is too thin for any grid, and has no points here.

@@ -1,4 +1,4 @@
-"""Elements from files that users bring."""
+"""Elements learned from meshes, drawings and pictures."""
 
 from __future__ import annotations
 
@@ -25,30 +25,38 @@ from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
 from scenelang.drawing.exact.originals import MOST_OF, said
 from scenelang.inverse.colours import fit_colours
 from scenelang.inverse.grids import NEAR, THIN, Rung, fit
-from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Apart, Asked, Hear, files_beside, made_apart
+from scenelang.inverse.sandbox import (
+    CPU_S,
+    LIBRARIES,
+    Asked,
+    Hear,
+    SandboxProcess,
+    files_beside,
+    run_in_sandbox,
+)
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene_data import Elements, load_elements
 from scenelang.output.workers import GivenUp, by_workers
 
-SEEN: Final = 960  # pixels across which a solid is thought of, to say how small its details may be
-COARSER: Final = 2.0  # times as far as the whole a part may be off, in its own radii
+SEEN: Final = 960  # assumed width of a solid in pixels, by which the report states its smallest details
+COARSER: Final = 2.0  # most times the error of the whole that a part may have, in its own radii
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """How elements are to be made.
+class LearnOptions:
+    """Options of learning elements.
 
     Args:
-        sign: what tells inside of a mesh.
+        sign: rule for the inside of a mesh.
         max_error: mean distance off that is near enough, in leaf units, `NEAR` if left out; of textures root
             mean square off of channels in [0, 1], `NEAR_COLOUR` if left out.
         budget_s: for each file; nothing new is begun after it.
         steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
         license: of the originals.
         source: where they are from.
-        pictures: what they become.
+        pictures: kind of element that a picture becomes.
         texels: most of a texture along its longer side.
-        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        parts: true makes each part of a file an element; if left out, only those of drawings.
         color_error: root mean square off of a mesh's colours that is near enough, of channels in [0, 1];
             `scenelang.inverse.colours.NEAR` if left out.
     """
@@ -70,7 +78,7 @@ class Wish:
                 raise ValueError("a license or a source is at most 2,000 characters, all of them printable")
 
     def about(self, original: Path, data: bytes) -> dict[str, str | float]:
-        """What an element says of where it is from; of one file and one wish it is the same."""
+        """Facts of an element about its origin; equal files and options give equal facts."""
         name = "".join(c if c.isprintable() else "?" for c in original.name)
         said = {"license": self.license, "source": self.source, "original": name}
         said |= {"sha256": hashlib.sha256(data).hexdigest()}
@@ -81,11 +89,11 @@ class Wish:
         return {key: value for key, value in (said | asked).items() if value is not None}
 
     def paints(self, suffix: str) -> bool:
-        """Whether files of a suffix become textures."""
+        """Return whether files of a suffix become textures."""
         return self.pictures == "texture" and suffix.lower() in outline.MOST_OF_PICTURE
 
     def made(self, element: Element, about: dict[str, str | float]) -> bool:
-        """Whether an element is what would be made again."""
+        """Return whether making an element again would give the same one."""
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
@@ -97,9 +105,9 @@ ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "c
 
 
 class _Job(NamedTuple):
-    """What is asked of an element, and when its file's time ends."""
+    """One element to make, and the end of its file's time."""
 
-    wish: Wish
+    options: LearnOptions
     about: dict[str, str | float]
     end_s: float
     tell: Callable[..., None]
@@ -109,50 +117,50 @@ class _Job(NamedTuple):
 
     @property
     def terms(self) -> dict[str, Any]:
-        """As what fits takes them."""
+        """Arguments of the fitting functions."""
         return {
             "budget_s": self.end_s - time.monotonic(),
-            "steps": self.wish.steps,
+            "steps": self.options.steps,
             "about": self.about,
         }
 
 
 def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
-    """The file of what becomes of an original's bytes, in the process that is kept apart.
+    """Make the elements of an original's bytes in the sandbox; returns the bytes of their file.
 
     Args:
-        request: its ``suffix``, the ``name`` of the element, what it says ``about`` itself, the ``wish``, and
-            bytes of the ``files`` that it names.
-        tell: called with ``say`` and a line, and ``progress`` and how far what is.
+        request: the ``suffix``, the ``name`` of the element, its facts (``about``), the ``options``, and
+            bytes of the ``files`` that the original names.
+        tell: called with ``say`` and a line, or with ``progress`` and its arguments.
 
     Raises:
-        FitError: nothing does.
+        FitError: no element can be made of it.
     """
-    wish, suffix, name = Wish(**request["wish"]), request["suffix"], request["name"]
-    job = _Job(wish, request["about"], time.monotonic() + wish.budget_s, tell)
-    if wish.paints(suffix):
+    options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
+    job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
+    if options.paints(suffix):
         return zoo_bytes([_texture(data, name, job)])
-    brought = parts.brought(data, suffix, name, request["files"], wish.sign, wish.parts)
+    brought = parts.brought(data, suffix, name, request["files"], options.sign, options.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
-    group, made = list(brought.group), []
+    group, elements = list(brought.group), []
     for called, shape in brought.shapes.items():
         part = next((part for part in group if part.geometry == called), None)
         number = {"part": brought.numbers[called]} if called in brought.numbers else {}
         own = job._replace(about=job.about | number)
         try:
-            made.append(_shape(shape, called, 1.0 if part is None else part.size, own))
+            elements.append(_shape(shape, called, 1.0 if part is None else part.size, own))
             if part is not None and part.material and isinstance(shape, Mesh):
-                made.append(_colours(shape, called, own))
+                elements.append(_colours(shape, called, own))
         except FitError as error:
             if called == name:
                 raise
             job.say(f"{called}: left out: {error}")
             group = [part for part in group if part.geometry != called]
-    return zoo_bytes(made, {name: tuple(group)} if group else {})
+    return zoo_bytes(elements, {name: tuple(group)} if group else {})
 
 
 def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
-    """The element of a mesh or an outline; one that is small in the whole may be off by more of its size."""
+    """The element of a mesh or an outline; a small part of a whole may have a larger relative error."""
 
     def report(rung: Rung) -> None:
         job.say(
@@ -160,7 +168,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
             f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
         )
 
-    asked = (job.wish.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     element, tried = fit(
         shape,
         name,
@@ -189,9 +197,9 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
     element = fit_colours(
         shape,
         name,
-        max_error=job.wish.color_error,
-        report=lambda tried: job.say(
-            f"  {tried.side:>4} a side {tried.bytes:>8,} bytes  colours off by {tried.error:.4f}"
+        max_error=job.options.color_error,
+        report=lambda side, size, error: job.say(
+            f"  {side:>4} a side {size:>8,} bytes  colours off by {error:.4f}"
         ),
         **job.terms,
     )
@@ -202,12 +210,12 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
 
 def _texture(data: bytes, name: str, job: _Job) -> Element:
     """The element of a picture."""
-    found = outline.read_picture(data, job.wish.texels)
-    job.say(f"{name}: {', '.join(found.notes)}")
+    result = outline.read_picture(data, job.options.texels)
+    job.say(f"{name}: {', '.join(result.notes)}")
     element, tried = outline.fit_picture(
-        found,
+        result,
         name,
-        max_error=job.wish.max_error,
+        max_error=job.options.max_error,
         report=lambda coded: job.say(f"  {coded.form:>12} {coded.bytes:>8,} bytes  error {coded.error:.4f}"),
         **job.terms,
     )
@@ -219,13 +227,13 @@ def _texture(data: bytes, name: str, job: _Job) -> Element:
 
 Progress = Callable[[str, float, float], None]
 Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
-"""Files by their places, in whatever order, and what gives what was made of one or raises why nothing was."""
+"""Indices of files, in any order, each with a function that returns the made bytes or raises."""
 
 
 def learn_files(
     files: Sequence[str | os.PathLike[str]],
     out: str | os.PathLike[str],
-    wish: Wish = Wish(),
+    options: LearnOptions = LearnOptions(),
     *,
     name: str | None = None,
     cluster: str | None = None,
@@ -234,16 +242,16 @@ def learn_files(
 ) -> list[Element]:
     """Make files elements of the file ``out``, beside those that it holds.
 
-    It is written after each element, whole or not at all; what it holds already of an original and a wish is
-    not made again. So work that was interrupted is taken up by asking for it again.
+    The file is written after each element, whole or not at all. An element that it already holds of the same
+    original and options is not made again. So the same call continues work that was interrupted.
 
     Args:
         files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
-        progress: is told what is done, how far it is and how far that goes.
+        progress: called with what is done, how much of it, and all.
     """
-    names = names_of(files, wish, name)
+    names = names_of(files, options, name)
     first = held = _writable(out)
-    made: dict[int, Zoo] = {}
+    results: dict[int, Zoo] = {}
     troubles: dict[int, str] = {}
 
     @contextmanager
@@ -261,53 +269,55 @@ def learn_files(
     def asked() -> Iterator[tuple[int, Asked]]:
         for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
             with noted(index):
-                known = _named(held).get((called, wish.paints(file.suffix)))
-                found = _request(file, called, wish, known)
-                if isinstance(found, Element):
+                known = _named(held).get((called, options.paints(file.suffix)))
+                result = _request(file, called, options, known)
+                if isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
-                    made[index] = replace(Zoo.of([found]), groups=groups)
+                    results[index] = replace(Zoo.of([result]), groups=groups)
                 else:
-                    yield index, found
+                    yield index, result
 
     hear: dict[str, Hear] = {"say": say, "progress": progress}
     with closing(_by_workers(cluster, asked(), hear) if cluster else _here(asked(), hear)) as answers:
         for index, answer in answers:
             with noted(index):
-                made[index] = read_zoo(answer())
-                held = _written(out, first, [(names[at], made[at]) for at in sorted(made)])
+                results[index] = read_zoo(answer())
+                held = _written(out, first, [(names[at], results[at]) for at in sorted(results)])
             if cluster:
-                progress("files", len(made) + len(troubles), len(files))
+                progress("files", len(results) + len(troubles), len(files))
     if troubles:
         raise FitError("\n".join(troubles[index] for index in sorted(troubles)))
-    return [element for index in sorted(made) for element in made[index].elements]
+    return [element for index in sorted(results) for element in results[index].elements]
 
 
 def _here(asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
-    """What becomes of requests, one after another."""
-    with Apart() as apart:
+    """Answer requests one after another, in a sandbox of this machine."""
+    with SandboxProcess() as apart:
         for index, (request, data) in asked:
             hear["progress"](request["name"], 0.0, 1.0)
             yield index, partial(apart, request, data, hear)
 
 
 def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[str, Hear]) -> Answers:
-    """What becomes of requests, several at a time and in any order."""
+    """Answer requests by the workers of a cluster, several at a time and in any order."""
 
     def taken(answer: Callable[[], tuple[list[str], bytes | FitError]]) -> bytes:
-        lines, found = answer()
+        lines, result = answer()
         for line in lines:
             hear["say"](line)
-        if isinstance(found, FitError):
-            raise found
-        return found
+        if isinstance(result, FitError):
+            raise result
+        return result
 
-    for index, answer in by_workers(cluster, made_apart, asked, LIBRARIES):
+    for index, answer in by_workers(cluster, run_in_sandbox, asked, LIBRARIES):
         yield index, partial(taken, answer)
 
 
-def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | None = None) -> list[str]:
-    """What elements of files are called, those of one file ``name``.
+def names_of(
+    files: Sequence[str | os.PathLike[str]], options: LearnOptions, name: str | None = None
+) -> list[str]:
+    """Names of the elements of files; that of a single file is ``name``.
 
     Raises:
         ValueError: scenes cannot say a name, or it is that of two.
@@ -316,12 +326,12 @@ def names_of(files: Sequence[str | os.PathLike[str]], wish: Wish, name: str | No
         raise ValueError("a name is for one file")
     names = [_word(Path(file).stem) if name is None else name for file in files]
     owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
-    for file, found in zip(files, names, strict=True):
-        if not (found.isascii() and found.isidentifier()):
-            raise ValueError(f"`{found}` is not a name; letters, digits and _ are, as --name says them")
-        first = owners.setdefault((found, wish.paints(Path(file).suffix)), file)
+    for file, word in zip(files, names, strict=True):
+        if not (word.isascii() and word.isidentifier()):
+            raise ValueError(f"`{word}` is not a name; letters, digits and _ are, as --name says them")
+        first = owners.setdefault((word, options.paints(Path(file).suffix)), file)
         if first is not file:
-            raise ValueError(f"`{first}` and `{file}` would both be `{found}`")
+            raise ValueError(f"`{first}` and `{file}` would both be `{word}`")
     return names
 
 
@@ -332,7 +342,7 @@ def _word(stem: str) -> str:
 
 
 def _writable(out: str | os.PathLike[str]) -> Zoo:
-    """What a file of elements holds; found out before the work, as is whether its result has a place."""
+    """Contents of the output file; raises before the work where it could not be written afterwards."""
     place = output_place(out)
     for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
         if path != place or place.exists():
@@ -350,12 +360,12 @@ def _writable(out: str | os.PathLike[str]) -> Zoo:
 
 
 def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
-    """Elements by name and whether they are materials."""
+    """Elements by their name and whether they are materials."""
     return {(element.name, element.material): element for element in zoo.elements}
 
 
 def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
-    """Write what was held and what was made, in place of what has the same names and of their groups.
+    """Write a file's elements and the new ones, which replace those of the same names and their groups.
 
     Raises:
         OSError: it cannot be written, or would be more than can be read.
@@ -366,27 +376,27 @@ def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Z
         elements, groups = elements | _named(zoo), groups | zoo.groups
     data = zoo_bytes(elements.values(), groups)
     try:
-        found = read_zoo(data)
+        result = read_zoo(data)
     except TensorError as error:
         raise NotWritten(errno.EFBIG, str(error), os.fspath(out)) from None
     write_output(out, data)
-    return found
+    return result
 
 
-def _request(path: Path, name: str, wish: Wish, known: Element | None) -> Asked | Element:
-    """What `Apart` is asked of a file, with its bytes, or what was made of it before."""
+def _request(path: Path, name: str, options: LearnOptions, known: Element | None) -> Asked | Element:
+    """The request of a file to the sandbox and its bytes, or the element made of it before."""
     suffix = path.suffix.lower()
     if suffix not in MOST_OF:
         raise FitError(f"not one of {', '.join(MOST_OF)}")
     data = read_regular(path, MOST_OF[suffix])
     if len(data) > MOST_OF[suffix]:
         raise FitError(f"more than {MOST_OF[suffix] >> 20:,} MiB")
-    about = wish.about(path, data)
-    if known is not None and wish.made(known, about):
+    about = options.about(path, data)
+    if known is not None and options.made(known, about):
         return known
-    usual_s = CPU_S * (4 if wish.parts else 1)
-    limit_s = max(usual_s, 2 * wish.budget_s) if wish.budget_s < 1e6 else usual_s
-    request = {"name": name, "suffix": suffix, "wish": asdict(wish), "about": about, "cpu_s": limit_s}
+    usual_s = CPU_S * (4 if options.parts else 1)
+    limit_s = max(usual_s, 2 * options.budget_s) if options.budget_s < 1e6 else usual_s
+    request = {"name": name, "suffix": suffix, "options": asdict(options), "about": about, "cpu_s": limit_s}
     return {**request, "files": files_beside(data, suffix, path.parent)}, data
 
 
@@ -408,7 +418,8 @@ def learn(
 ) -> Elements:
     """Make files elements, as ``scenelang learn`` does: ``learn("cow.obj", "zoo.safetensors")``.
 
-    What ``out`` holds stays beside them; what was made before of the same file and in the same way is kept.
+    Elements that ``out`` holds stay. One that was made before of the same file with the same options is
+    reused.
 
     Args:
         files: meshes, drawings and pictures, or one.
@@ -418,12 +429,12 @@ def learn(
         budget_s: for each file; nothing new is begun after so many seconds.
         steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
         license, source: of the originals, kept in the file.
-        sign: what tells inside of a mesh.
-        pictures: whether they become textures or geometries.
-        parts: whether those of a file are elements of their own; if left out, those of drawings are.
+        sign: rule for the inside of a mesh.
+        pictures: kind of element that a picture becomes: a texture or, by its outline, a geometry.
+        parts: true makes each part of a file an element; if left out, only those of drawings.
         cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
             the extra ``dask``, and what makes elements on each.
-        say: is told in lines what is found and tried; by workers, of a file when it is done.
+        say: called with lines of the report; with a cluster, for each file when it is done.
 
     Returns:
         All elements of ``out``, for a Scene.
@@ -434,10 +445,10 @@ def learn(
         OSError: ``out`` cannot be read or written.
         ValueError: names that scenes cannot say, or twice the same.
     """
-    wish = Wish(
+    options = LearnOptions(
         sign=sign, max_error=max_error, budget_s=budget_s, steps=steps,
         license=license, source=source, pictures=pictures, parts=parts,
     )  # fmt: skip
     listed = [files] if isinstance(files, str | os.PathLike) else files
-    learn_files(listed, out, wish, name=name, cluster=cluster, say=say)
+    learn_files(listed, out, options, name=name, cluster=cluster, say=say)
     return load_elements(os.fspath(out))

@@ -1,4 +1,4 @@
-"""A scene and its targets: how far the pictures of values are from them, at a size."""
+"""Residuals between the pictures of a scene's values and its targets, at a size."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from scenelang.compiler.program import Program
 from scenelang.drawing.how import Samples
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.small import draw_small
-from scenelang.inverse.gradient import Rates, numbers_of, softened
-from scenelang.inverse.search import Blur, Picture, Point, Space, Target, blurred, over
+from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
+from scenelang.inverse.search import Blur, Matrix, Picture, Point, SearchBox, Target, blurred, over
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 
-Matrix = npt.NDArray[np.float64]
 LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
 
 
@@ -35,7 +34,7 @@ class Moment(Record, frozen=False):
     Args:
         source: the scene, parsed, with values of params that are not searched.
         frame: which one, from 0.
-        trouble: what was found the last time that values gave no scene.
+        trouble: diagnostics of the last values that gave no scene.
     """
 
     source: Source
@@ -43,7 +42,7 @@ class Moment(Record, frozen=False):
     trouble: tuple[Diagnostic, ...] = ()
 
     def reads(self, text: str) -> Moment:
-        """The same of another text, in which all params have their values."""
+        """The same frame of another text, in which all params have their values."""
         file = SourceFile(self.tree.span.source.name, text)
         return Moment(replace(self.source, text=file, tree=None, params=None), self.frame)
 
@@ -59,16 +58,16 @@ class Moment(Record, frozen=False):
         Raises:
             SceneError: it has errors.
         """
-        found = Diagnostics()
+        diagnostics = Diagnostics()
         params = {**self.source.values, **values}
-        evaluation = replace(self.source, params=params).evaluation(found, frame=self.frame)
+        evaluation = replace(self.source, params=params).evaluation(diagnostics, frame=self.frame)
         scene, _ = evaluation.run(self.frame)
         if scene is None:
-            raise SceneError(found)
+            raise SceneError(diagnostics)
         return evaluation, scene
 
     def program(self, values: Mapping[str, Any], canvas: tuple[int, int]) -> Program | None:
-        """What draws the scene of values on a canvas; None where there is none, for which see `trouble`."""
+        """Compile the scene of values for a canvas; None where it has errors, which `trouble` then holds."""
         try:
             scene = self.evaluated(values)[1]
             return compile_scene(scene.sized(canvas))
@@ -78,23 +77,23 @@ class Moment(Record, frozen=False):
 
 
 class Problem:
-    """How far pictures of one size are from the target.
+    """Residuals of pictures of one size against the target.
 
     Args:
-        moment: what makes scenes.
+        moment: makes the scenes.
         space: the params.
         target: what they are to look like.
         canvas: width and height of the pictures.
-        light: whether pixels are means of linear light, as those of solids are.
-        soft: whether outlines are as wide as a pixel, of scenes of the plane, or sharp.
-        samples: of a pixel, as in `scenelang.render`; of soft pictures one.
-        levels: of the pyramid; 1 compares pixels alone. More feel outlines that do not meet yet.
+        light: true where pixels are means of linear light, as those of solids are.
+        soft: true gives outlines of the plane the width of a pixel; else they are sharp.
+        samples: samples of a pixel, as in `scenelang.render`; soft pictures take one.
+        levels: levels of the pyramid; 1 compares pixels alone, more also sense outlines that do not overlap.
     """
 
     def __init__(
         self,
         moment: Moment,
-        space: Space,
+        space: SearchBox,
         target: Target,
         canvas: tuple[int, int],
         *,
@@ -134,7 +133,7 @@ class Problem:
         return larger
 
     def program(self, u: Point) -> Program | None:
-        """What draws the scene of a point; the last one is kept."""
+        """Compile the scene of a point; the last Program is cached."""
         if self._last[0] != u.tobytes():
             self._last = u.tobytes(), self.moment.program(self.space.values(u), self.canvas)
         return self._last[1]
@@ -144,14 +143,9 @@ class Problem:
         return self.drawn(self.program(u))
 
     def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,), whose squares add up to a mean square error of each level of the pyramid."""
+        """Residuals (R,), whose squares sum to the mean square errors of all levels of the pyramid."""
         picture = self.picture(u)
         return None if picture is None else self.residuals(picture, self.levels)
-
-    def pixels(self, u: Point) -> Point | None:
-        """Residuals of pixels alone."""
-        picture = self.picture(u)
-        return None if picture is None else self.residuals(picture)
 
     def residuals(self, picture: Picture, levels: int = 1) -> Point:
         """Residuals of a picture, at so many levels of the pyramid."""
@@ -166,8 +160,6 @@ class Problem:
         program = self.program(u) if self.soft else None
         if program is None or not len(program) or program.elements or program.palette or program.extended:
             return None
-        from scenelang.inverse.gradient import SoftPlane
-
         rates, known = self._rates.at(u, program)
         change = SoftPlane(program, self.under)(numbers_of(program), rates)[1].astype(np.float64)
         self.frames += 1
@@ -193,14 +185,14 @@ def _halved(x: Picture) -> Picture:
     return np.asarray((x[::2, ::2] + x[1::2, ::2] + x[::2, 1::2] + x[1::2, 1::2]) / 4)
 
 
-EDGE: Final = 2 ** (LEVELS - 1)  # of what the last level has means of, pixels
-GRAIN: Final = 2.0  # times the variance of means that noise has
-BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # pixels
-SOFTER: Final = 0.98  # share of the error that is left where a target is out of focus
+EDGE: Final = 2 ** (LEVELS - 1)  # side in pixels of the squares whose means the last level has
+GRAIN: Final = 2.0  # most times the expected variance of means at which a difference counts as noise
+BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # standard deviations that are tried, pixels
+SOFTER: Final = 0.98  # most of the error that a blur may leave to count as one
 
 
 class Together:
-    """How far the pictures of some frames are from their targets.
+    """Residuals of the pictures of several frames against their targets.
 
     Args:
         parts: a frame each, of one size.
@@ -210,17 +202,17 @@ class Together:
         self.parts, self.canvas = tuple(parts), parts[0].canvas
 
     def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,), whose squares add up to the mean of what those of the frames add up to."""
-        found = self.pictures(u)
-        return None if found is None else self.residuals(found, self.parts[0].levels)
+        """Residuals (R,), whose squares sum to the mean of the sums of the frames."""
+        result = self.pictures(u)
+        return None if result is None else self.residuals(result, self.parts[0].levels)
 
     def pixels(self, u: Point) -> Point | None:
         """Residuals of pixels alone."""
-        found = self.pictures(u)
-        return None if found is None else self.residuals(found)
+        result = self.pictures(u)
+        return None if result is None else self.residuals(result)
 
     def pictures(self, u: Point) -> list[Picture] | None:
-        """Of each frame, None where values give no scene."""
+        """The picture of each frame; None where values give no scene."""
         return _known([part.picture(u) for part in self.parts])
 
     def drawn(self, programs: Sequence[Program | None]) -> list[Picture] | None:
@@ -233,16 +225,16 @@ class Together:
         return np.asarray(np.concatenate(gaps) / np.sqrt(len(gaps)))
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
-        """As `Problem.slopes`, of the axes that all frames have them of."""
-        found = [part.slopes(u) for part in self.parts]
-        known = [one for one in found if one is not None]
-        if len(known) < len(found):
+        """Derivatives as of `Problem.slopes`, of the axes for which all frames have them."""
+        result = [part.slopes(u) for part in self.parts]
+        known = [one for one in result if one is not None]
+        if len(known) < len(result):
             return None
         rows = np.concatenate([slopes for slopes, _ in known]) / np.sqrt(len(known))
         return rows, np.all([axes for _, axes in known], 0)
 
     def worst(self, pictures: Sequence[Picture]) -> tuple[str, Picture]:
-        """Errors (H, W) of the picture that is farthest off, and which frame it is of several."""
+        """Label of the frame whose picture is farthest off, empty of a single one, and its errors (H, W)."""
         gaps = [
             np.square((one - part.colours) * part.root).sum(2)
             for part, one in zip(self.parts, pictures, strict=True)
@@ -251,9 +243,9 @@ class Together:
         return f" of frame {self.parts[at].moment.frame}" * (len(gaps) > 1), gaps[at]
 
     def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
-        """Whether what is left of pictures after a blur is like noise.
+        """Return whether the remaining difference after a blur is like noise.
 
-        Means over 8 x 8 pixels of that have a 64th of its variance.
+        Means of noise over 8 x 8 pixels have a 64th of its variance.
         """
         pixels = means = 0.0
         for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
@@ -263,18 +255,18 @@ class Together:
         return bool(means * EDGE**2 <= GRAIN * pixels)
 
     def finer(self) -> Together:
-        """The same with pictures of which light can be averaged: of the plane twice as large."""
+        """The same with pictures whose light can be averaged: twice as large in the plane."""
         return Together([part.finer() for part in self.parts])
 
     def blur(self, pictures: Sequence[Picture]) -> float:
-        """By how many pixels (standard deviation) pictures have to be blurred to be nearer; 0 if not."""
-        best, found = SOFTER, 0.0
+        """Standard deviation in pixels of the blur that brings pictures nearest; 0 where none helps."""
+        best, result = SOFTER, 0.0
         for sigma in BLURS:
             left = self.residuals([blurred(one, Blur(sigma)) for one in pictures])
             share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
             if share < best:
-                best, found = share, sigma
-        return found
+                best, result = share, sigma
+        return result
 
     @property
     def frames(self) -> int:

@@ -1,7 +1,7 @@
 """A process of its own for libraries that read strangers' files, and the files that a mesh names.
 
-A request is a line of JSON and bytes; answers are lines of JSON, the last of which says what went wrong or
-how many bytes follow. Whatever a file does to the process, it is an error of that file alone.
+A request is a line of JSON and bytes; answers are lines of JSON, the last of which states an error or the
+number of bytes that follow. A crash of the process is an error of that file alone.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from scenelang.drawing.exact.mesh import FitError
 
 MEMORY: Final = 6 << 30  # bytes that the process may hold, where the system can bound them
 CPU_S: Final = 300.0  # of processor time for one file
-READ_S: Final = 10.0  # of that until it is read and something said of it, and for each MB
-MEGABYTE_S: Final = 1.0  # so much more, but
-MOST_READ_S: Final = 60.0  # at most so much; and
-READ: Final = 1 << 30  # bytes of memory till then, and
+# until a file is read and the first line about it is reported, tighter bounds hold:
+READ_S: Final = 10.0  # processor time, and
+MEGABYTE_S: Final = 1.0  # more for each MB of the file,
+MOST_READ_S: Final = 60.0  # at most this;
+READ: Final = 1 << 30  # bytes of memory, and
 TIMES: Final = 48  # more for each byte of the file
 _CODE: Final = """
 import json, sys
@@ -43,18 +44,18 @@ _REFUSED: Final = (
     "os.exec",
 )
 LIBRARIES: Final = ("contourpy", "libigl", "pillow", "scipy", "svgelements", "trimesh")
-"""What makes elements besides ours; other versions may give other bytes."""
+"""Packages that make elements besides ours; other versions may give other bytes."""
 Hear = Callable[..., None]
 Asked = tuple[dict[str, Any], bytes]  # a request, and the bytes that it is about
 
 
-class Apart:
-    """The process; it begins when it is first asked, and anew after it has ended."""
+class SandboxProcess:
+    """The process; it starts with the first request, and again after it has ended."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> Apart:
+    def __enter__(self) -> SandboxProcess:
         return self
 
     def __exit__(
@@ -65,15 +66,14 @@ class Apart:
             self._end()
 
     def __call__(self, request: Mapping[str, Any], data: bytes, hear: Mapping[str, Hear]) -> bytes:
-        """What `serve` makes of a request and bytes.
+        """Send a request and bytes to the process; returns the bytes that it makes of them.
 
         Args:
-            request: JSON data; its ``cpu_s`` is the processor time that this may take, and its ``files`` are
-                bytes by name.
-            hear: called with what is told meanwhile, by the first word of the telling.
+            request: JSON data; its ``cpu_s`` is the most processor time, and its ``files`` are bytes by name.
+            hear: functions that are called with the reports meanwhile, by the first word of a report.
 
         Raises:
-            FitError: it cannot be made, takes more memory or time, or a library has failed.
+            FitError: it cannot be made or takes more memory or time, or a library has failed.
         """
         process = self._begun()
         assert process.stdin is not None
@@ -85,12 +85,12 @@ class Apart:
             process.stdin.writelines([data, *files.values()])
             process.stdin.flush()
         while line := process.stdout.readline():
-            kind, *told = json.loads(line)
+            kind, *values = json.loads(line)
             if kind == "made":
-                return process.stdout.read(*told)
+                return process.stdout.read(*values)
             if kind == "error":
-                raise FitError(*told)
-            hear[kind](*told)
+                raise FitError(*values)
+            hear[kind](*values)
         raise FitError(_ended(self._end()))
 
     def _begun(self) -> subprocess.Popen[bytes]:
@@ -113,21 +113,21 @@ class Apart:
 
 
 def _environment() -> dict[str, str]:
-    """Variables of the process: libigl takes as many threads as others may, and memory is kept.
+    """Environment of the process: libigl uses the threads of the others, and freed memory is not returned.
 
-    Workers of dask have glibc give back every 64 KB, which costs meshes a fault for each page of each array.
+    Workers of dask have glibc return every 64 KB, which costs meshes a page fault for each page of an array.
     """
-    found = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    found.pop("MALLOC_TRIM_THRESHOLD_", None)
-    if "OMP_NUM_THREADS" in found:
-        found.setdefault("IGL_NUM_THREADS", found["OMP_NUM_THREADS"])
-    return found
+    result = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    result.pop("MALLOC_TRIM_THRESHOLD_", None)
+    if "OMP_NUM_THREADS" in result:
+        result.setdefault("IGL_NUM_THREADS", result["OMP_NUM_THREADS"])
+    return result
 
 
-def made_apart(asked: Asked) -> tuple[list[str], bytes | FitError]:
-    """What `Apart` says and makes of a request, or why it makes nothing: what a worker is asked."""
+def run_in_sandbox(asked: Asked) -> tuple[list[str], bytes | FitError]:
+    """Run one request in a sandbox, as workers do; returns its lines, and the bytes or the error."""
     lines: list[str] = []
-    with Apart() as apart:
+    with SandboxProcess() as apart:
         try:
             return lines, apart(*asked, {"say": lines.append, "progress": lambda *_: None})
         except FitError as error:
@@ -157,14 +157,14 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
         )
         limits = iter([request["cpu_s"]])
 
-        def tell(kind: str, *told: Any, limits: Iterator[float] = limits) -> None:
+        def tell(kind: str, *values: Any, limits: Iterator[float] = limits) -> None:
             nonlocal memory
             if kind == "say" and (limit_s := next(limits, None)):
                 memory = _bound(limit_s, MEMORY)
-            _tell(out, kind, *told)
+            _tell(out, kind, *values)
 
         try:
-            made = make(request, data, tell)
+            result = make(request, data, tell)
         except FitError as error:
             _tell(out, "error", str(error))
         except MemoryError:
@@ -173,11 +173,11 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
             said = " ".join(f"{type(error).__name__}: {error}".split())
             _tell(out, "error", f"what reads it has failed ({said[:200]})")
         else:
-            _tell(out, "made", len(made), then=made)
+            _tell(out, "made", len(result), then=result)
 
 
-def _tell(out: IO[bytes], *told: Any, then: bytes = b"") -> None:
-    out.write(json.dumps(told).encode() + b"\n" + then)
+def _tell(out: IO[bytes], *values: Any, then: bytes = b"") -> None:
+    out.write(json.dumps(values).encode() + b"\n" + then)
     out.flush()
 
 
@@ -214,27 +214,27 @@ _NAMES: Final = {
     ".ply": re.compile(rb"texturefile([^\r\n]*)", re.IGNORECASE),
     ".glb": re.compile(rb'"uri"\s*:\s*"((?:[^"\\]|\\.){1,1000})"'),
 }
-"""What stands in front of names, by suffix; what finds more of them than trimesh does no harm."""
+"""Patterns of the names in a file, by suffix; more matches than trimesh reads do no harm."""
 
 
 def files_beside(data: bytes, suffix: str, folder: Path) -> dict[str, bytes]:
     """The bytes of the files that a mesh names, and of those that its materials name, by these names.
 
-    What is not a regular file in the folder or below, or is larger than `MOST_BYTES`, is left out, as is what
-    would be more than `MOST_TOGETHER`.
+    Only regular files in the folder or below it are read, of at most `MOST_BYTES` each and `MOST_TOGETHER` in
+    all.
     """
-    found: dict[str, bytes] = {}
+    result: dict[str, bytes] = {}
     left = MOST_TOGETHER
     waiting = [(data, suffix)]
     for text, kind in waiting:
         for name in islice(_names(text, kind), _MOST_NAMES):
-            held = None if name in found else _read(folder, name, min(left, MOST_BYTES))
+            held = None if name in result else _read(folder, name, min(left, MOST_BYTES))
             if held is not None:
-                found[name] = held
+                result[name] = held
                 left -= len(held)
                 if kind == ".obj":
                     waiting.append((held, ".mtl"))
-    return found
+    return result
 
 
 def _names(data: bytes, suffix: str) -> Iterator[str]:
@@ -253,7 +253,7 @@ def _read(folder: Path, name: str, most: int) -> bytes | None:
         path = (folder / name.replace("\\", "/").lstrip("/")).resolve()
         if not path.is_relative_to(folder.resolve()):
             return None
-        found = read_regular(path, most)
+        result = read_regular(path, most)
     except (OSError, ValueError, RuntimeError):  # of a link to itself before Python 3.13
         return None
-    return found if len(found) <= most else None
+    return result if len(result) <= most else None

@@ -3,9 +3,9 @@
 A point holds a number for each axis: of a continuous one in [0, 1], of others the index of a choice. A vector
 has an axis for each of its numbers.
 
-Everything is measured on pictures, so that whatever a scene may have, shadows and textures too, needs
-nothing of its own here. A descent is Levenberg's and Marquardt's (1944, 1963) on differences, a picture for
-each param and one: J'J tells what the picture says of each param.
+Everything is measured on pictures, so that no feature of a scene, such as shadows or textures, needs code of
+its own here. A descent is Levenberg's and Marquardt's (1944, 1963) on differences, which take a picture for
+each param and one more; J'J measures how sensitive the picture is to each param.
 """
 
 from __future__ import annotations
@@ -45,15 +45,17 @@ Point = npt.NDArray[np.float64]
 MOST_AXES: Final = 64
 
 
-class Space:
-    """The box of some params.
+class SearchBox:
+    """Box of the values of some params.
 
     Args:
         knobs: the params.
 
     Attributes:
-        axes: of all of them, in their order.
-        smooth: (n,) which of these are continuous.
+        axes: axes of all params, in order.
+        smooth: (n,) true where an axis is continuous.
+        most: (n,) largest number of an axis: 1, or the last index of a choice.
+        wraps: (n,) true where an axis is an angle over a full turn.
     """
 
     def __init__(self, knobs: Sequence[Knob]) -> None:
@@ -63,7 +65,7 @@ class Space:
         self.most = np.array([max(1, len(axis.choices) - 1) for axis in self.axes], np.float64)
         self.wraps = np.array([axis.wraps for axis in self.axes], bool)
 
-    def beside(self, axis: Axis) -> Space:
+    def beside(self, axis: Axis) -> SearchBox:
         """The same box with a continuous axis that belongs to no param, behind the others."""
         wide = copy.copy(self)
         wide.axes = (*self.axes, axis)
@@ -76,21 +78,21 @@ class Space:
         return np.where(self.wraps, u % 1.0, np.clip(u, 0.0, self.most))
 
     def gap(self, u: Point, v: Point) -> Point:
-        """How far apart two points are along each axis, in shares of its range."""
+        """Distance between two points along each axis, in shares of its range."""
         gap = abs(u - v) / self.most
         return np.where(self.wraps, np.minimum(gap, 1.0 - gap), gap)
 
     def values(self, u: Point) -> dict[str, Any]:
-        """Values of the params at a point, as the language has them."""
-        found, rest = {}, iter(zip(self.axes, u.tolist(), strict=True))
+        """Values of the params at a point, in the types of the language."""
+        result, rest = {}, iter(zip(self.axes, u.tolist(), strict=True))
         for knob in self.knobs:
             items = [value_at(*next(rest), knob.value) for _ in knob.axes]
-            found[knob.name] = Vec(tuple(items)) if knob.inner else items[0]
-        return found
+            result[knob.name] = Vec(tuple(items)) if knob.inner else items[0]
+        return result
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the params."""
+        """Names of the params."""
         return tuple(knob.name for knob in self.knobs)
 
     def literals(self, u: Point) -> dict[str, str]:
@@ -100,12 +102,12 @@ class Space:
 
     def point(self, values: Mapping[str, Any]) -> Point:
         """The point of values."""
-        found: list[float] = []
+        result: list[float] = []
         for knob in self.knobs:
             value = values.get(knob.name, knob.value)
             items = value.items if knob.inner else (value,)
-            found += [_where(axis, item) for axis, item in zip(knob.axes, items, strict=True)]
-        return self.inside(np.array(found, np.float64))
+            result += [_where(axis, item) for axis, item in zip(knob.axes, items, strict=True)]
+        return self.inside(np.array(result, np.float64))
 
 
 def _where(axis: Axis, value: Any) -> float:
@@ -122,7 +124,7 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, bool | str) else round(unpack(value)[0], 9)
 
 
-def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> Space:
+def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> SearchBox:
     """The box of a scene's params.
 
     Args:
@@ -136,8 +138,10 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
     try:
         named = [param_named(evaluation, name) for name in dict.fromkeys(names)]
         chosen = named or [stmt for stmt in params_of(evaluation).values() if stmt.range is not None]
-        kept = set(fixed)
-        space = Space([knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in kept])
+        excluded = set(fixed)
+        space = SearchBox(
+            [knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in excluded]
+        )
     except ParamError as error:
         raise FitError(str(error)) from None
     if not space.axes:
@@ -149,14 +153,14 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
 
 Picture = npt.NDArray[np.float64]
 Given = npt.NDArray[np.floating] | str | os.PathLike[str]
-"""A picture as callers have it."""
+"""A picture as an argument."""
 MOST_BYTES: Final = 64 << 20
-_ASPECT: Final = 0.02  # by which shares of sides may differ before a picture is another part of the world
+_ASPECT: Final = 0.02  # most relative difference of aspects, beyond which a picture shows another part
 WHITE: Final = (1.0, 1.0, 1.0)
 
 
 class Target(Record):
-    """What pictures are compared with.
+    """Picture to compare with, and the weights of its pixels.
 
     Args:
         colours: (H, W, 3), sRGB-encoded in [0, 1], laid over ``under`` where it was transparent.
@@ -172,8 +176,8 @@ class Target(Record):
         """Colours and weights on a canvas; ``light`` has the means of linear light, as solids' pixels are."""
         colours = decoded(self.colours) if light else self.colours
         channels = [_resized(channel, canvas) for channel in np.moveaxis(colours, 2, 0)]
-        found = np.stack(channels, 2)
-        return encoded(found) if light else found, _resized(self.weights, canvas)
+        result = np.stack(channels, 2)
+        return encoded(result) if light else result, _resized(self.weights, canvas)
 
 
 def _resized(channel: Picture, canvas: tuple[int, int]) -> Picture:
@@ -193,11 +197,11 @@ def over(picture: npt.NDArray[np.floating], under: tuple[float, float, float]) -
 
 
 class Blur(NamedTuple):
-    """How a picture is blurred.
+    """Blur of a picture.
 
     Args:
         sigma: standard deviation of a Gaussian, pixels; 0 where it is not.
-        light: whether its light is, as by a lens out of focus, or its sRGB-encoded numbers, as by a program.
+        light: true blurs linear light, as a lens out of focus does, false the sRGB-encoded numbers.
     """
 
     sigma: float = 0.0
@@ -205,23 +209,23 @@ class Blur(NamedTuple):
 
 
 def blurred(picture: Picture, blur: Blur, finer: int = 1) -> Picture:
-    """A picture (H, W, 3) after a blur; beyond its edges it is as there.
+    """A picture (H, W, 3) after a blur, with its edges repeated outwards.
 
     Args:
-        picture: of ``finer`` times as many pixels along each side, of which means are taken.
+        picture: of ``finer`` times as many pixels along each side as the result, which has their means.
     """
     sigma = blur.sigma * finer
     if sigma <= 0.0 and finer == 1:
         return picture
-    found, reach = decoded(picture) if blur.light else picture, math.ceil(3 * sigma)
+    result, reach = decoded(picture) if blur.light else picture, math.ceil(3 * sigma)
     weights = np.exp(-np.square(np.arange(-reach, reach + 1) / max(sigma, 1e-9)) / 2)
     for axis in (0, 1):
-        wide = np.pad(found, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
+        wide = np.pad(result, [(reach * (at == axis),) * 2 for at in range(3)], mode="edge")
         views = np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis)
-        found = np.asarray(views @ (weights / weights.sum()))
-    height, width = found.shape[0] // finer, found.shape[1] // finer
-    found = found.reshape(height, finer, width, finer, 3).mean((1, 3))
-    return encoded(found) if blur.light else found
+        result = np.asarray(views @ (weights / weights.sum()))
+    height, width = result.shape[0] // finer, result.shape[1] // finer
+    result = result.reshape(height, finer, width, finer, 3).mean((1, 3))
+    return encoded(result) if blur.light else result
 
 
 def target_of(
@@ -245,23 +249,23 @@ def target_of(
         FitError: a file is damaged, or the sizes do not fit.
         OSError: a file cannot be read.
     """
-    found = over(_read(picture), under)
-    weights = np.ones(found.shape[:2]) if mask is None else over(_read(mask), (0.0, 0.0, 0.0)).mean(2)
-    if weights.shape != found.shape[:2]:
-        sizes = [f"{part.shape[1]} × {part.shape[0]}" for part in (weights, found)]
+    result = over(_read(picture), under)
+    weights = np.ones(result.shape[:2]) if mask is None else over(_read(mask), (0.0, 0.0, 0.0)).mean(2)
+    if weights.shape != result.shape[:2]:
+        sizes = [f"{part.shape[1]} × {part.shape[0]}" for part in (weights, result)]
         raise FitError(f"a mask of {sizes[0]} pixels for a target of {sizes[1]}")
     if crop is not None:
         x, y, wide, high = crop
-        if x + wide > found.shape[1] or y + high > found.shape[0]:
-            raise FitError(f"a part that leaves the target of {found.shape[1]} × {found.shape[0]} pixels")
-        found, weights = found[y : y + high, x : x + wide], weights[y : y + high, x : x + wide]
+        if x + wide > result.shape[1] or y + high > result.shape[0]:
+            raise FitError(f"a part that leaves the target of {result.shape[1]} × {result.shape[0]} pixels")
+        result, weights = result[y : y + high, x : x + wide], weights[y : y + high, x : x + wide]
     height, width = weights.shape
     if abs(width * canvas[1] / (height * canvas[0]) - 1) > _ASPECT:
         fact = f"a target of {width} × {height} pixels for a canvas of {canvas[0]} × {canvas[1]}"
         raise FitError(f"{fact}: say which part of it shows the scene, or give the scene another canvas")
     if not weights.any():
         raise FitError("a mask in which no pixel counts")
-    return Target(found, weights, under)
+    return Target(result, weights, under)
 
 
 def _read(picture: Given) -> npt.NDArray[np.floating]:
@@ -283,52 +287,45 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
 
 Residuals = Callable[[Point], Point | None]
 Report = Callable[[str, int, int], None]
-Look = Callable[[Residuals, Space, Sequence["Found"], int, float, Report], "list[Found]"]
 Matrix = npt.NDArray[np.float64]
 
 
 @runtime_checkable
 class Steep(Protocol):
-    """Residuals that know derivatives."""
+    """Residuals with derivatives."""
 
     def __call__(self, u: Point) -> Point | None:
         """Residuals (R,)."""
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
-        """Derivatives (R, n), in shares of ranges, and of which axes (n,) there are; None where of none."""
+        """Derivatives (R, n), in shares of ranges, and a mask (n,) of their axes; None without any."""
 
 
 MANY: Final = 6  # numbers from which on derivatives by reverse passes cost less than differences
-APART: Final = 0.02  # shares of a range by which two solutions differ
-LOOKS: Final = 48  # places that a round looks at, times numbers to find and one
+APART: Final = 0.02  # least distance of two solutions, in shares of a range
+LOOKS: Final = 48  # places that a round looks at, times n + 1 of n numbers
 SCANS: Final = 16  # places along an axis
-DESCENTS: Final = 4  # of them that are followed, and one for each number
-KEPT: Final = 3  # and looked at more closely
+DESCENTS: Final = 4  # n more of the best places are followed down
+KEPT: Final = 3  # best places that go on to larger pictures
 ROUNDS: Final = 4
-FINE: Final = 1 / 3  # of these, where nothing else helps
-STEPS: Final = (
-    0.01,
-    0.006,
-    0.003,
-    0.002,
-    0.002,
-)  # of differences, shares of a range, in pictures of each size
+STEPS: Final = 0.01, 0.006, 0.003, 0.002, 0.002  # of differences, shares of a range, in pictures of each size
+FINE: Final = 1 / 3  # of these steps, for central differences where nothing else helps
 ALIKE: Final = 1.26  # errors that differ by 1 dB
 FAIR: Final = 1e-3  # 30 dB: farther off, a round without success is tried again
 NEAR: Final = 10**-4.6  # mean square error that is near enough: 46 dB
-AGREED: Final = 0.02  # share by which a round has to lower the error, or it agrees with those before
+AGREED: Final = 0.02  # least relative gain of a round, or it confirms those before
 _TRIES: Final = 6  # steps that may fail in a row
-_ENOUGH: Final = 1e-3  # share of the error by which a step has to lower it
-_GRAIN: Final = 1e-7  # mean square error under which nothing is seen
+_ENOUGH: Final = 1e-3  # least relative gain of a step
+_GRAIN: Final = 1e-7  # mean square error below which a difference is invisible
 
 
 class Found(Record):
-    """A place that a search came to.
+    """A place that a search reached.
 
     Args:
-        point: where it is.
+        point: its coordinates.
         cost: sum of squares of the residuals there.
-        way: places that the search came through, each nearer than the one before in pictures of its size.
+        way: earlier points of the search, each nearer than the one before in pictures of its size.
     """
 
     point: Point
@@ -336,17 +333,17 @@ class Found(Record):
     way: tuple[Point, ...] = ()
 
     def after(self, before: Found) -> Found:
-        """The same, where the search went on from another."""
+        """The same place with the way of an earlier one in front of its own."""
         return Found(self.point, self.cost, before.way + self.way)
 
 
-def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
+def spread(space: SearchBox, count: int, seed: int) -> Iterator[Point]:
     """Points all over the box: the generalised golden ratio's sequence, moved by a seed.
 
     Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
     """
     n = len(space.axes)
-    phi = 2.0
+    phi = 2.0  # becomes the root of x^(n + 1) = x + 1, the golden ratio for n = 1
     for _ in range(50):
         phi = (1 + phi) ** (1 / (n + 1))
     step, first = phi ** -np.arange(1.0, n + 1), np.random.default_rng(seed).random(n)
@@ -358,40 +355,38 @@ def spread(space: Space, count: int, seed: int) -> Iterator[Point]:
 
 def slopes(
     residuals: Residuals,
-    space: Space,
+    space: SearchBox,
     u: Point,
     at: Point,
     step: float,
     free: npt.NDArray[np.bool_],
     fine: bool = False,
-    many: int = MANY,
 ) -> Matrix:
     """Derivatives (R, n) of residuals, by differences or reverse passes; columns of axes that are not free 0.
 
     Args:
         at: the residuals at u.
         step: in shares of a range; away from an end.
-        fine: whether differences are central and of `FINE` of the step.
-        many: axes from which on reverse passes are taken, where there are any.
+        fine: true takes central differences of `FINE` of the step.
     """
-    found = np.zeros((len(at), len(u)))
-    if np.count_nonzero(free) >= many and isinstance(residuals, Steep):
+    result = np.zeros((len(at), len(u)))
+    if np.count_nonzero(free) >= MANY and isinstance(residuals, Steep):
         exact = residuals.slopes(u)
         if exact is not None:
-            found, free = exact[0], free & ~exact[1]
+            result, free = exact[0], free & ~exact[1]
     if fine and free.any() and (better := central(residuals, space, u, step * FINE, free)) is not None:
-        return np.where(free, better, found)
+        return np.where(free, better, result)
     for axis in np.flatnonzero(free):
         sign = -1.0 if u[axis] + step > 1.0 and not space.wraps[axis] else 1.0
         moved = u.copy()
         moved[axis] += sign * step
         if (there := residuals(space.inside(moved))) is not None:
-            found[:, axis] = (there - at) / (sign * step)
-    return found
+            result[:, axis] = (there - at) / (sign * step)
+    return result
 
 
 def central(
-    residuals: Residuals, space: Space, u: Point, step: float, free: npt.NDArray[np.bool_]
+    residuals: Residuals, space: SearchBox, u: Point, step: float, free: npt.NDArray[np.bool_]
 ) -> Matrix | None:
     """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
     columns = np.zeros((0, 0))
@@ -411,24 +406,22 @@ def central(
 
 def descend(
     residuals: Residuals,
-    space: Space,
+    space: SearchBox,
     u: Point,
     *,
     step: float,
     most: int = 12,
     fine: bool = False,
-    many: int = MANY,
     enough: float = _ENOUGH,
 ) -> Found | None:
     """Follow the continuous axes down from a point; None where that has no picture.
 
     Args:
         step: of differences, in shares of a range.
-        most: steps.
-        fine: whether differences are central and of a third of the step: twice the pictures, which follow a
+        most: number of steps at most.
+        fine: true takes central differences of a third of the step: twice the pictures, but they follow a
             narrow valley that others lose.
-        many: as of `slopes`.
-        enough: share of the error by which a step has to lower it, or it is the last.
+        enough: least relative gain of a step; the first with less is the last.
     """
     at = residuals(u)
     if at is None:
@@ -438,8 +431,9 @@ def descend(
     for _ in range(most):
         if cost < _GRAIN or not space.smooth.any():
             break
-        j = slopes(residuals, space, u, at, step, space.smooth, fine, many)
-        pull = j.T @ at
+        j = slopes(residuals, space, u, at, step, space.smooth, fine)
+        pull = j.T @ at  # half the gradient of the cost
+        # axes at an end of the box whose descent leads outwards
         ends = ~space.wraps & (((u <= 0.0) & (pull > 0)) | ((u >= 1.0) & (pull < 0)))
         free = np.flatnonzero(space.smooth & ~ends & (np.square(j).sum(0) > 1e-12))
         if not len(free):
@@ -447,10 +441,11 @@ def descend(
         square = j[:, free].T @ j[:, free]
         before = cost
         for _ in range(_TRIES):
+            # Marquardt's scaling; the second term holds axes with almost no slope
             scale = np.diag(damping * np.diag(square) + 1e-9 * np.trace(square))
             move = np.zeros_like(u)
             move[free] = -np.linalg.solve(square + scale, pull[free])
-            move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))
+            move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))  # at most 0.3 of a range
             moved = space.inside(u + move)
             there = residuals(moved)
             if there is not None and (lower := float(there @ there)) < cost:
@@ -463,7 +458,7 @@ def descend(
     return Found(u, cost, tuple(way))
 
 
-def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) -> Found:
+def stepped(residuals: Residuals, space: SearchBox, start: Found, *, step: float) -> Found:
     """Try the neighbours of choices, and follow the continuous axes from each that is nearly as good."""
     best, better = start, True
     while better:
@@ -474,27 +469,27 @@ def stepped(residuals: Residuals, space: Space, start: Found, *, step: float) ->
                 u[axis] += move
                 if not 0.0 <= u[axis] <= space.most[axis]:
                     continue
-                found = descend(residuals, space, u, step=step, most=4)
-                if found is not None and found.cost < best.cost * (1 - _ENOUGH):
-                    best, better = found.after(best), True
+                result = descend(residuals, space, u, step=step, most=4)
+                if result is not None and result.cost < best.cost * (1 - _ENOUGH):
+                    best, better = result.after(best), True
     return best
 
 
-def apart(space: Space, found: list[Found], most: int) -> list[Found]:
-    """The best of places that lie apart from each other, best first."""
-    kept: list[Found] = []
-    for one in sorted(found, key=lambda one: one.cost):
-        if all(float(space.gap(one.point, other.point).max()) > APART for other in kept):
-            kept.append(one)
-    return kept[:most]
+def apart(space: SearchBox, places: list[Found], most: int) -> list[Found]:
+    """The best distinct places, best first."""
+    chosen: list[Found] = []
+    for one in sorted(places, key=lambda one: one.cost):
+        if all(float(space.gap(one.point, other.point).max()) > APART for other in chosen):
+            chosen.append(one)
+    return chosen[:most]
 
 
-def scanned(coarse: Residuals, space: Space, known: Found) -> list[Found]:
-    """Places that differ from a known one along one axis: of each the nearest that is a valley of its own.
+def scanned(coarse: Residuals, space: SearchBox, known: Found) -> list[Found]:
+    """The best other valley along each axis through a known place.
 
-    Where a picture shows several things, one of them may be wrong while the others are found already.
+    In a picture of several things one may still be wrong while the others are right already.
     """
-    found: list[Found] = []
+    result: list[Found] = []
     for axis in range(len(space.axes)):
         count = SCANS if space.smooth[axis] else min(SCANS, int(space.most[axis]) + 1)
         row: list[Found] = []
@@ -510,17 +505,17 @@ def scanned(coarse: Residuals, space: Space, known: Found) -> list[Found]:
             for one, before, after in zip(row, ends, ends[2:], strict=False)
             if one.cost <= min(before, after) and space.gap(one.point, known.point)[axis] > 1 / count
         ]
-        found += sorted(valleys, key=lambda one: one.cost)[:1]
-    return found
+        result += sorted(valleys, key=lambda one: one.cost)[:1]
+    return result
 
 
 def look(
-    coarse: Residuals, space: Space, known: Sequence[Found], seed: int, until: float, report: Report
+    coarse: Residuals, space: SearchBox, known: Sequence[Found], seed: int, until: float, report: Report
 ) -> list[Found]:
-    """Places that come near in small pictures: the best of a look around, followed down.
+    """Look around in small pictures and descend from the best places.
 
     Args:
-        known: where the search begins, of infinite cost, or what rounds before came to.
+        known: the start, of infinite cost, or the results of earlier rounds.
         seed, until, report: as of `solve`.
     """
     places = [*(one.point for one in known), *spread(space, LOOKS * (len(space.axes) + 1), seed)]
@@ -546,7 +541,7 @@ def look(
 
 def solve(
     problems: Sequence[Residuals],
-    space: Space,
+    space: SearchBox,
     start: Point,
     *,
     seed: int = 0,
@@ -554,7 +549,6 @@ def solve(
     near: float = NEAR,
     noise: Callable[[Found], bool] = lambda place: False,
     report: Report = lambda what, done, count: None,
-    look: Look = look,
 ) -> tuple[list[Found], bool]:
     """Places with the nearest pictures, the best first.
 
@@ -567,13 +561,11 @@ def solve(
         start: a place that is looked at first.
         until: no new descent is begun after this time, as of `time.monotonic`.
         near: sum of squares that is near enough.
-        noise: whether what is left at a place of the last size is noise, so that none is nearer.
+        noise: returns whether only noise is left at a place of the last size, so that none is nearer.
         report: called with what is done, how much of it, and all.
-        look: how places are found that come near in the smallest pictures, once a round.
 
     Returns:
-        Places that lie apart, and whether the search came to an end by itself; none where no place that was
-        looked at has a picture.
+        Distinct places, none where no place has a picture, and whether the search converged by itself.
     """
     coarse, best, idle = problems[0], math.inf, 0
     low: list[Found] = []  # that came near in the smallest pictures

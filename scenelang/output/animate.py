@@ -1,7 +1,7 @@
 """Animations to files: draw what is missing, encode, put in place.
 
-In order: `targets` says what a file name asks for, `clip` compiles frames, `store` keeps those that are
-drawn, `painting` and `workers` draw them, `gif`, `apng`, `webp` and `video` encode them, `run` ties it up.
+In order: `frames` finds the target of a file name, compiles frames and caches them on disk; `painting` and
+`workers` draw them; `encoders` write films; `make` runs it all. `render_frames` and `animate` are the API.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol, Unpack
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 from scenelang.assets.files import output_place, write_whole
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
@@ -33,32 +33,31 @@ from scenelang.output.frames import (
     find_target,
     put_frame,
 )
-from scenelang.output.painting import Drawable, Errand, Painter
+from scenelang.output.painting import Cluster, Drawable, Errand, Painter, Workers
 
 if TYPE_CHECKING:
-    from scenelang.compiler.program import Program
     from scenelang.drawing.image import Image
     from scenelang.output.encoders import Palette
 
 
 Beside = Callable[[Drawable, Store], Mapping[str, bytes]]
-"""What is to lie beside a frame's picture, by suffixes; it may raise what ends the run."""
+"""Gives the files to write next to a frame's picture, by suffix; an exception ends the run."""
 Failed = Callable[[int, SceneError], None]
-"""Is told the number of a frame and what is wrong with it."""
+"""Called with the number of a frame and its errors."""
 
-WORTH_S: Final = 12.0  # drawing left that repays starting other processes, each of which loads torch
-_FPS: Final = 1e-4, 1e6  # of films: beyond, formats cannot say how long a frame is shown
-_TRIED: Final = 3  # frames drawn here before it is decided
+WORTH_S: Final = 12.0  # least drawing left that repays starting other processes, each of which loads torch
+_FPS: Final = 1e-4, 1e6  # rates of films: beyond, formats cannot store the time of a frame
+_TRIED: Final = 3  # frames drawn here before that is decided
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far an animation is.
+    """Progress of an animation.
 
     Args:
         stage: ``"drawing"`` or ``"encoding"``.
         done: of this stage, in frames for drawing and as a share for encoding.
-        total: what it counts up to.
+        total: final value of ``done``.
     """
 
     stage: str
@@ -76,16 +75,16 @@ class RenderResult:
     """An animation that was written.
 
     Args:
-        files: what was written, in order.
+        files: the written files, in order.
         frames: number of frames.
         drawn: pictures that were drawn now; equal frames are drawn once.
-        resumed: pictures found from a run before, which was interrupted.
+        resumed: pictures of a previous run, which was interrupted.
         compile_s: time to evaluate and compile all frames.
         draw_s: time to draw, encode pictures and wait for other processes.
         encode_s: time to encode the film.
         jobs: processes that drew.
-        asked: processes that were asked for, where that is more than there are frames or cores.
-        keys: digest of all that decides a frame, of each; empty for one that was left out.
+        asked: requested processes, where that is more than there are frames or cores.
+        keys: digest of each frame's inputs; empty for a frame that was left out.
     """
 
     files: list[Path]
@@ -100,7 +99,7 @@ class RenderResult:
     keys: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
-        """What there is to say about it."""
+        """Report of the run, line by line."""
         each = 1000 / max(1, self.frames)
         asked = f" ({self.asked} asked for; more than frames or cores do not help)" if self.asked else ""
         return [
@@ -109,27 +108,6 @@ class RenderResult:
             f"a frame (ms): compile {self.compile_s * each:.1f}, draw {self.draw_s * each:.1f}, "
             f"encode {self.encode_s * each:.1f}",
         ]
-
-
-class Helpers(Protocol):
-    """Other processes that draw frames, here or on other machines."""
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-
-    @property
-    def waiting(self) -> int:
-        """Frames that are asked for and not known to be done."""
-
-    def submit(self, program: Program, errand: Errand) -> None:
-        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
-
-    def take(self) -> None:
-        """Wait until more is done; raises the `RenderError` or `OSError` by which something failed."""
-
-    def close(self) -> None:
-        """End them, whatever they are doing."""
 
 
 def make(
@@ -148,16 +126,16 @@ def make(
 ) -> RenderResult:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
 
-    Frames are kept in `Target.work` on the way. If the run ends before its time, they stay there, and the
-    same call goes on with those that are missing.
+    Drawn frames are cached in `Target.work`. If the run is interrupted, they stay there, and the same call
+    continues with those that are missing.
 
     Args:
         jobs: processes that draw; by default this one, and others as soon as they would pay.
         cluster: address of a dask scheduler whose workers draw instead, or ``"local"``.
-        palette, dither: of a GIF, see `write_gif`.
+        palette, dither: as for `write_gif`.
         strict: count warnings as errors.
-        beside: is shown each frame before it is drawn, and says what further files of a sequence hold.
-        failed: is told of a frame with errors, which is left out; by default it ends the run.
+        beside: called with each frame before it is drawn; gives the further files of a sequence.
+        failed: called with a frame that has errors and is left out; by default such a frame ends the run.
         progress: called from any thread.
 
     Raises:
@@ -172,16 +150,16 @@ def make(
     if cluster is not None and painter.how.backend == "reference":
         raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
-    made = RenderResult([], len(numbers))
+    result = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
-        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, made)
+        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, result)
         run.draw(numbers)
         started = time.perf_counter()
         if target.kind == "sequence":
-            made.files = _numbered(store, target, numbers, run)
+            result.files = _numbered(store, target, numbers, run)
         else:
             animation = painter.clip.animation
-            files = [store.file(key) for key in made.keys]
+            files = [store.file(key) for key in result.keys]
             film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, run.alpha)
             part = store.folder / f"film{target.path.suffix}"
             encoders: dict[str, Encoder] = {
@@ -192,10 +170,10 @@ def make(
             }
             encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
             deliver(part, target.path)
-            made.files = [target.path]
-        made.encode_s = time.perf_counter() - started
+            result.files = [target.path]
+        result.encode_s = time.perf_counter() - started
         store.remove()
-    return made
+    return result
 
 
 @dataclass(slots=True)
@@ -210,42 +188,42 @@ class _Run:
     beside: Beside | None
     failed: Failed | None
     progress: Callable[[Progress], None]
-    made: RenderResult
+    result: RenderResult
     alpha: bool = False  # whether any frame has
-    suffixes: tuple[str, ...] = ()  # of files beside each picture, by its number
-    others: Helpers | None = None  # who draws besides this process
-    spent_s: float = 0.0  # drawing here
+    suffixes: tuple[str, ...] = ()  # of the files next to each picture
+    others: Workers | Cluster | None = None  # the processes that draw besides this one
+    spent_s: float = 0.0  # time spent drawing here
 
     def draw(self, numbers: range) -> None:
-        """Have every frame in the store, and the key of each in the result."""
-        made, total = self.made, len(numbers)
+        """Draw all missing frames into the store, and note the key of each in the result."""
+        result, total = self.result, len(numbers)
         asked: set[str] = set()
         try:
             for index, number in enumerate(numbers):
                 frame = self._prepared(number)
-                made.keys.append(frame.key if frame else "")
+                result.keys.append(frame.key if frame else "")
                 if frame is not None and frame.key not in asked:
                     asked.add(frame.key)
                     started = time.perf_counter()
                     if self.store.has(frame.key, frame.shot.scene.canvas):
-                        made.resumed += 1
+                        result.resumed += 1
                     else:
                         self._one(frame, index, total)
-                    made.draw_s += time.perf_counter() - started
+                    result.draw_s += time.perf_counter() - started
                 self._say(index + 1, total)
             started = time.perf_counter()
             if self.others is not None:
-                made.jobs = self.others.count
+                result.jobs = self.others.count
                 while self.others.waiting:
                     self.others.take()
                     self._say(total, total)
-            made.draw_s += time.perf_counter() - started
+            result.draw_s += time.perf_counter() - started
         finally:
             if self.others is not None:
                 self.others.close()
 
     def _prepared(self, number: int) -> Drawable | None:
-        """A frame, compiled; None of one with errors that is left out."""
+        """Compile a frame; None for one with errors that is left out."""
         painter = self.painter
         started = time.perf_counter() - painter.load_s  # loading torch is not part of a frame
         try:
@@ -257,7 +235,7 @@ class _Run:
                 raise
             self.failed(number, error)
             return None
-        self.made.compile_s += time.perf_counter() - painter.load_s - started
+        self.result.compile_s += time.perf_counter() - painter.load_s - started
         self.alpha |= frame.shot.scene.background is None
         if self.beside is not None:
             files = self.beside(frame, self.store)
@@ -267,7 +245,7 @@ class _Run:
         return frame
 
     def _one(self, frame: Drawable, index: int, total: int) -> None:
-        """Draw a frame here, or have it drawn."""
+        """Draw a frame here, or submit it to other processes."""
         painter, file, started = self.painter, self.store.file(frame.key), time.perf_counter()
         if self.others is None:
             self.others = self._helpers(frame, total - index)
@@ -276,57 +254,48 @@ class _Run:
             errand = Errand(str(file), frame.place, split, painter.outputs, painter.how)
             self.others.submit(frame.program, errand)
         else:
-            share = partial(_part, self.progress, index, total)
-            put_frame(painter.files(frame, file, share))
+            put_frame(painter.files(frame, file, lambda share: self._say(index + share, total)))
             self.spent_s += time.perf_counter() - started
-        self.made.drawn += 1
+        self.result.drawn += 1
 
-    def _helpers(self, frame: Drawable, left: int) -> Helpers | None:
-        """Who draws from here on: a cluster that is named, or other processes, if they pay."""
+    def _helpers(self, frame: Drawable, left: int) -> Workers | Cluster | None:
+        """The processes that draw from here on: a given cluster, or other processes where they pay."""
         if self.cluster is not None:
-            from scenelang.output.painting import Cluster
-
             return Cluster(self.cluster)
         painter, jobs = self.painter, self.jobs
         if frame.program is None or jobs == 1 or frame.place == "cuda":
             return None
         if jobs is None:
-            drawn = self.made.drawn
+            drawn = self.result.drawn
             if painter.how.threads is not None or usable_cores() < 2 or drawn < _TRIED:
                 return None
             if self.spent_s / drawn * left <= WORTH_S:
                 return None
         count = min(jobs or left, max(2, usable_cores()), left)
         if jobs is not None and jobs > count:
-            self.made.asked = jobs
+            self.result.asked = jobs
         if count < 2:
             self.jobs = 1
             return None
-        from scenelang.output.painting import Workers
-
         return Workers(count)
 
-    def _say(self, done: int, total: int) -> None:
+    def _say(self, done: float, total: int) -> None:
         waiting = self.others.waiting if self.others is not None else 0
         self.progress(Progress("drawing", done - waiting, total))
 
 
-def _part(progress: Callable[[Progress], None], index: int, total: int, share: float) -> None:
-    progress(Progress("drawing", index + share, total))
-
-
 def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[Path]:
-    """Move the files of frames to where they belong; of equal ones all but the last are copies."""
+    """Move the files of frames to their places; of equal frames all but the last are copies."""
     target.path.mkdir(parents=True, exist_ok=True)
-    keys = run.made.keys
+    keys = run.result.keys
     last = {key: index for index, key in enumerate(keys)}
     files: list[Path] = []
     for index, (number, key) in enumerate(zip(numbers, keys, strict=True)):
         if not key:
             continue
-        file, kept = target.file(number), store.file(key)
-        pairs = {output_file(file, name): output_file(kept, name) for name in run.painter.outputs}
-        pairs[file] = kept
+        file, stored = target.file(number), store.file(key)
+        pairs = {output_file(file, name): output_file(stored, name) for name in run.painter.outputs}
+        pairs[file] = stored
         for name, frame in pairs.items():
             if last[key] == index:
                 os.replace(frame, name)
@@ -377,8 +346,8 @@ def render_frames(
     Args:
         path: the scene file, or a Scene or several, each with its own canvas.
         frames: which, as a range or as text (``"0..23"``, ``"12.."``); all by default.
-        fps: frames a second instead of those that ``animate`` names; its seconds stay. Scenes are shown at
-            those of the first one's animation.
+        fps: frames a second instead of those of ``animate``; its length stays. The default of Scenes is that
+            of the first one's animation.
         size: canvas in pixels instead of the scene's.
         params: values for a file's params, as for `scenelang.load`.
         model: draw with this model instead of the one that the file names.
@@ -422,7 +391,7 @@ def animate(
     progress: Callable[[Progress], None] = lambda _: None,
     **how: Unpack[Options],
 ) -> RenderResult:
-    """Draw a scene file or Scenes to an animation; a call that was interrupted goes on where it stopped.
+    """Draw a scene file or Scenes to an animation; repeat an interrupted call to continue it.
 
     Args:
         path: the scene file, or Scenes, one a frame.
@@ -431,13 +400,13 @@ def animate(
         frames, fps, size, params, model, root: as for `render_frames`.
         jobs: processes that draw; by default this one, and others where they pay.
         cluster: address of a dask scheduler whose workers draw, or ``"local"``; needs the extra ``dask``.
-        palette: of a GIF: ``"global"``, ``"frame"``, or the one that is exact if one is (``"auto"``).
-        dither: dither what a GIF's palette lacks.
-        progress: called with how far it is, from any thread.
+        palette: of a GIF: ``"global"``, ``"frame"``, or ``"auto"``, the exact one where there is one.
+        dither: dither colours that a GIF's palette lacks.
+        progress: called with the progress, from any thread.
         **how: as for `scenelang.render`.
 
     Returns:
-        What was written.
+        The files and figures of the run.
 
     Raises:
         ValueError: ``out`` names no format, or nothing says how fast Scenes follow each other.
@@ -447,7 +416,7 @@ def animate(
     target = find_target(os.fspath(out), stem)
     clip = _opened(path, fps, size, params, model, root)
     if target.kind != "sequence":
-        _ = clip.animation  # what is wrong with it is said before anything is drawn
+        _ = clip.animation  # raises before anything is drawn
     painter = Painter(clip, How(**how).checked())
     return make(
         painter,

@@ -1,13 +1,11 @@
 """Encoders of animations, frame by frame: GIF, APNG, WebP and video by ffmpeg.
 
-Pillow's own writer of films, also in 13.0, holds every frame until the last has come, and gives each a
-palette of its own; one that is exact for all frames is found here.
+Pillow's own writers of GIF and APNG, also in 13.0, hold every frame until the last has come, and give each
+frame of a GIF its own palette. The writers here hold one frame, and find a palette that is exact for all
+frames where there is one.
 
-Source: CompuServe, Graphics Interchange Format, version 89a.
-
-Pillow's own writer, also in 13.0, holds every frame until the last has come.
-
-Source: W3C, Portable Network Graphics (PNG) Specification, third edition, 2025, chapter 4.9 and 11.3.6.
+Sources: CompuServe, Graphics Interchange Format, version 89a; W3C, Portable Network Graphics (PNG)
+Specification, third edition, 2025, chapters 4.9 and 11.3.6.
 """
 
 from __future__ import annotations
@@ -38,9 +36,9 @@ Colours = npt.NDArray[np.uint8]
 
 PER_SECOND = 100
 SHORTEST = 2  # hundredths of a second; browsers take shorter ones for a tenth
-_LONGEST = 65535
-_KEEP, _CLEAR = 1, 2  # what becomes of a frame when the next one comes
-_SAMPLE = 1 << 18  # pixels that a palette is chosen from
+_LONGEST = 65535  # largest number of a delay, 16 bits: hundredths of a second, or a part of a fraction
+_KEEP, _CLEAR = 1, 2  # disposal methods: keep a frame under the next one, or clear it
+_SAMPLE = 1 << 18  # pixels from which a palette is chosen
 _MOST_KNOWN = 1 << 20  # colours that are counted; more are thinned to the most frequent half
 
 
@@ -52,15 +50,15 @@ def write_gif(
     palette: Palette = "auto",
     dither: bool = False,
 ) -> None:
-    """Encode a film; of transparent frames, pixels of less than half coverage are left out.
+    """Encode a film; in transparent frames, pixels of less than half coverage are left out.
 
     Args:
-        palette: ``"global"`` has one for all frames, ``"frame"`` one for each, ``"auto"`` the one that holds
-            all colours exactly, if one does, and otherwise a global one, which keeps still parts still.
-        dither: spread what a palette lacks over neighbouring pixels.
+        palette: ``"global"`` has one for all frames, ``"frame"`` one for each. ``"auto"`` takes the one
+            that is exact, and a global one where neither is, as it keeps still parts still.
+        dither: diffuse the errors of a palette over neighbouring pixels.
     """
     lengths = delays(len(film.files), film.fps, PER_SECOND, SHORTEST)
-    most = 256 - 1  # one is for what is transparent, or stays as it was
+    most = 256 - 1  # one index is for pixels that are transparent or unchanged
     census = Census(most)
     count = len(lengths)
     if palette != "frame":
@@ -85,7 +83,7 @@ def write_gif(
 
 
 def _head(out: BinaryIO, film: Film, common: Colours | None) -> None:
-    # of an index; the colour after the last is the transparent one
+    # bits of an index; the colour after the last is the transparent one
     bits = 0 if common is None else max(1, len(common).bit_length())
     flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
     out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
@@ -104,7 +102,7 @@ def _frame(
     length: int,
     own: bool,
 ) -> npt.NDArray[np.uint8]:
-    """Write one picture; returns what a viewer then shows, the colours that its palette gave."""
+    """Write one picture; returns the colours that a viewer then shows."""
     colours = mapper.colours
     clear = len(colours)  # the index after the palette's own
     index = mapper(pixels)
@@ -150,32 +148,32 @@ def unpacked(numbers: npt.NDArray[np.uint32]) -> Colours:
 
 @dataclass(slots=True)
 class Census:
-    """How often each colour comes up in all pictures, counted one picture at a time."""
+    """Counts of colours over all pictures, added one picture at a time."""
 
-    most: int  # whether any single picture has more colours than this is noted in `crowded`
+    most: int  # colours of a palette; `crowded` is true once a single picture has more
     colours: npt.NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
     counts: npt.NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     crowded: bool = False
     thinned: bool = False
 
     def add(self, pixels: Pixels, weight: int = 1) -> None:
-        """Count what is shown of a picture where one colour is transparent."""
+        """Count the colours of a picture's visible pixels."""
         numbers = packed(pixels)
         shown = numbers[pixels[..., 3] >= 128] if pixels.shape[2] == 4 else numbers
-        found, counts = np.unique(shown, return_counts=True)
-        self.crowded |= len(found) > self.most
-        both = np.concatenate([self.colours, found])
+        result, counts = np.unique(shown, return_counts=True)
+        self.crowded |= len(result) > self.most
+        both = np.concatenate([self.colours, result])
         self.colours, index = np.unique(both, return_inverse=True)
         total = np.zeros(len(self.colours), np.int64)
         np.add.at(total, index, np.concatenate([self.counts, counts * weight]))
         self.counts = total
         if len(self.colours) > _MOST_KNOWN:
-            kept = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
-            self.colours, self.counts, self.thinned = self.colours[kept], total[kept], True
+            frequent = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
+            self.colours, self.counts, self.thinned = self.colours[frequent], total[frequent], True
 
     @property
     def fits(self) -> bool:
-        """Whether all colours together are few enough."""
+        """True where one palette holds all colours."""
         return not self.thinned and len(self.colours) <= self.most
 
     def choose(self) -> Colours:
@@ -212,9 +210,9 @@ class Mapper:
     def __call__(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
         """Indices (H, W)."""
         flat = packed(pixels)
-        found, inverse = np.unique(flat, return_inverse=True)
-        index = np.array([self._nearest(number) for number in found.tolist()], np.uint8)
-        exact = (self.colours[index] == unpacked(found)).all(axis=1).all()
+        result, inverse = np.unique(flat, return_inverse=True)
+        index = np.array([self._nearest(number) for number in result.tolist()], np.uint8)
+        exact = (self.colours[index] == unpacked(result)).all(axis=1).all()
         if self.dither and not exact:
             return self._dithered(pixels)
         return index[inverse].reshape(flat.shape)
@@ -236,9 +234,6 @@ class Mapper:
         return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
 
 
-_LONGEST_APNG = 65535
-
-
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
     """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
     shown = [
@@ -258,7 +253,7 @@ def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> Non
             if index == 0:
                 out.write(chunk(b"IHDR", next(body for kind, body in chunks if kind == b"IHDR")))
                 out.write(chunk(b"acTL", struct.pack(">II", len(shown), 0 if film.loop else 1)))
-            # what is shown stays (0), and the new pixels replace it (0) instead of being laid over it
+            # dispose_op 0 keeps the shown picture, blend_op 0 replaces its pixels instead of compositing
             control = (sequence, right - left, bottom - top, left, top, numerator, denominator, 0, 0)
             out.write(chunk(b"fcTL", struct.pack(">IIIIIHHBB", *control)))
             sequence += 1
@@ -274,34 +269,32 @@ def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> Non
 
 
 def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
-    """How long ``count`` frames are shown, as fractions of 16 bits a part; more than one if it is long."""
-    whole = (count / Fraction(fps).limit_denominator(1_000_000)).limit_denominator(_LONGEST_APNG)
-    if whole.numerator <= _LONGEST_APNG:
+    """Time of ``count`` frames as fractions of 16-bit numbers; several where one cannot hold it."""
+    whole = (count / Fraction(fps).limit_denominator(1_000_000)).limit_denominator(_LONGEST)
+    if whole.numerator <= _LONGEST:
         yield whole.numerator, whole.denominator
         return
     for share in (count // 2, count - count // 2):
-        yield from _pieces(share, fps) if count > 1 else [(min(_LONGEST_APNG, round(float(whole))), 1)]
+        yield from _pieces(share, fps) if count > 1 else [(min(_LONGEST, round(float(whole))), 1)]
 
 
 def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
     """The chunks of a picture."""
-    from PIL import Image
-
     data = io.BytesIO()
     Image.fromarray(pixels).save(data, "PNG")
-    raw, at, found = data.getvalue(), len(SIGNATURE), []
+    raw, at, result = data.getvalue(), len(SIGNATURE), []
     while at < len(raw):
         (size,) = struct.unpack_from(">I", raw, at)
-        found.append((raw[at + 4 : at + 8], raw[at + 8 : at + 8 + size]))
+        result.append((raw[at + 4 : at + 8], raw[at + 8 : at + 8 + size]))
         at += 12 + size
-    return found
+    return result
 
 
 WEBP_PER_SECOND = 1000
 
 
 class _Reel(Image.Image):
-    """A film as Pillow's writer takes it: it seeks each frame when its turn comes, and holds one."""
+    """A film as Pillow's writer takes it: reads each frame when the writer seeks it, and holds one."""
 
     def __init__(self, film: Film, files: list[Path], progress: Callable[[float], None]) -> None:
         super().__init__()
@@ -351,9 +344,9 @@ class NoFfmpeg(RenderError):
 @lru_cache(maxsize=1)
 def find_ffmpeg() -> str:
     """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
-    found = shutil.which("ffmpeg")
-    if found is not None:
-        return found
+    result = shutil.which("ffmpeg")
+    if result is not None:
+        return result
     try:
         import imageio_ffmpeg
 
@@ -413,7 +406,7 @@ def write_video(film: Film, part: Path, progress: Callable[[float], None], *, su
                 progress((index + 1) / len(film.files))
             process.stdin.close()
         except BrokenPipeError:
-            pass  # it says why
+            pass  # its standard error says why
         except BaseException:
             process.kill()
             raise

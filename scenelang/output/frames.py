@@ -1,8 +1,8 @@
-"""Frames of animations: which, how long, compiled one after another, and kept on disk.
+"""Frames of animations: their numbers and times, their Programs, and their files on disk.
 
-A frame's file is named by a digest of all that decides its pixels: the compiled Program, the weights, the
-renderer and how it splits the picture. A frame of another text, import, param, size or model therefore
-never is taken for one of this run, and equal frames share a file.
+A frame's file is named by a digest of all that determines its pixels: the compiled Program, the weights, the
+renderer and its split of the picture. So a frame of another text, import, param, size or model is never taken
+for one of this run, and equal frames share a file.
 
 A file is read, parsed and prepared once. A frame runs only the statements that ``t``, ``u`` or ``frame``
 reach, and where its nodes are those of the frame before, so is its Program.
@@ -51,7 +51,7 @@ class FramesError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FrameRange:
-    """Frames as they are asked for."""
+    """A requested range of frames."""
 
     first: int = 0  # from 0
     last: int | None = None  # the last one; None for that of the animation
@@ -59,15 +59,15 @@ class FrameRange:
     @classmethod
     def parse(cls, text: str) -> FrameRange:
         """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a``; else `FramesError`."""
-        found = _RANGE.fullmatch(text)
-        if found is None or (found[2] and found[3] is None):
+        match = _RANGE.fullmatch(text)
+        if match is None or (match[2] and match[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
-        first = int(found[1])
+        first = int(match[1])
         if ".." not in text:
             return cls(first, first)
-        if found[3] is None:
+        if match[3] is None:
             return cls(first)
-        last = int(found[3]) - bool(found[2])
+        last = int(match[3]) - bool(match[2])
         if last < first:
             raise FramesError(f"the range of frames `{text}` is empty")
         return cls(first, last)
@@ -93,28 +93,28 @@ def delays(count: int, fps: float, per_second: int, shortest: int = 1) -> list[i
     for index in range(1, count):
         if at[index] - at[shown[-1]] >= shortest:
             shown.append(index)
-    found = [0] * count
+    result = [0] * count
     for index, following in zip(shown, [*shown[1:], count], strict=True):
-        found[index] = at[following] - at[index]
-    while len(shown) > 1 and found[shown[-1]] < shortest:
+        result[index] = at[following] - at[index]
+    while len(shown) > 1 and result[shown[-1]] < shortest:
         late = shown.pop()
-        found[shown[-1]] += found[late]
-        found[late] = 0
-    found[shown[0]] = max(found[shown[0]], shortest)
-    return found
+        result[shown[-1]] += result[late]
+        result[late] = 0
+    result[shown[0]] = max(result[shown[0]], shortest)
+    return result
 
 
 def runs(keys: Sequence[K], lengths: Iterable[int]) -> list[tuple[K, int]]:
     """Neighbours with the same key as one, as long as all of them; those of length 0 are left out."""
-    found: list[tuple[K, int]] = []
+    result: list[tuple[K, int]] = []
     for key, length in zip(keys, lengths, strict=True):
         if length == 0:
             continue
-        if found and found[-1][0] == key:
-            found[-1] = key, found[-1][1] + length
+        if result and result[-1][0] == key:
+            result[-1] = key, result[-1][1] + length
         else:
-            found.append((key, length))
-    return found
+            result.append((key, length))
+    return result
 
 
 Kind = Literal["sequence", "gif", "webp", "apng", "video"]
@@ -132,20 +132,20 @@ class TargetError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where an animation goes."""
+    """Files of an animation."""
 
-    kind: Kind  # how
+    kind: Kind  # format
     path: Path  # the file; for a sequence the folder of its files
     pattern: str = ""  # name of each file of a sequence, with `%04d` for its number
 
     def file(self, frame: int) -> Path:
         """The file of a frame of a sequence."""
         parts = self.pattern.split("%%")
-        filled = [_NUMBER.sub(lambda found: f"{frame:{found[1] or 'd'}}", part) for part in parts]
+        filled = [_NUMBER.sub(lambda match: f"{frame:{match[1] or 'd'}}", part) for part in parts]
         return self.path / "%".join(filled)
 
     def there(self) -> list[Path]:
-        """Files of a sequence, of any number, that are there."""
+        """Existing files of a sequence, of any number."""
         number = 1_234_567_890
         head, tail = self.file(number).name.split(str(number))
         named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
@@ -153,32 +153,30 @@ class Target:
 
     @property
     def work(self) -> Path:
-        """The folder beside it where frames are kept while it is made."""
+        """The folder next to it where frames are cached while it is drawn."""
         if self.kind == "sequence":
             return self.path / f".{self.pattern}.frames"
         return self.path.parent / f".{self.path.name}.frames"
 
 
 def is_pattern(out: str) -> bool:
-    """Whether a name has a place for a number: ``frame-%04d.png``."""
+    """Return whether a name has a place for a number: ``frame-%04d.png``."""
     return "%" in Path(out).name and _NUMBER.search(Path(out).name.replace("%%", "")) is not None
 
 
 def is_animation(out: str) -> bool:
-    """Whether a name asks for an animation if the scene is one."""
+    """Return whether a name asks for an animation if the scene is one."""
     return is_pattern(out) or Path(out).suffix.lower() in ENCODED
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """What ``out`` asks for: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
+    """Parse ``out``: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
 
     The files in a folder start with ``stem``. Raises `TargetError` where the name fits none of these, or its
     folder is not there.
     """
     path = Path(out)
     if is_pattern(out):
-        from scenelang.drawing.image import image_format
-
         bare = path.name.replace("%%", "")
         if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
             raise TargetError(
@@ -213,23 +211,23 @@ def _check_folder(folder: Path, out: str) -> None:
 _LOCK: Final = "lock"
 _FRAME: Final = re.compile(r"[0-9a-f]{40}(\.\w+){1,3}")
 _PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}(\.\w+){1,3}\.[0-9a-z]+\.part")
-"""What was half-written when a run was killed."""
+"""Names of files that a killed run left half-written."""
 Pixels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]
 """left, top, right, bottom; the last two exclusive."""
 
 
 class Busy(RenderError):
-    """Another process makes the same animation."""
+    """Another process draws the same animation."""
 
 
 def frame_key(*parts: object) -> str:
-    """A digest, hex, of what decides a frame's pixels."""
+    """Digest, hex, of everything that determines a frame's pixels."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:40]
 
 
 class Store:
-    """A folder of frames, made if it is not there; while it is open no other process may use it.
+    """A folder of cached frames, locked while it is open; created where it does not exist.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
 
@@ -262,15 +260,15 @@ class Store:
         self._lock.close()
 
     def file(self, key: str) -> Path:
-        """Where the frame of a key lies, or will lie."""
+        """Path of the frame of a key."""
         return self.folder / f"{key}{self.suffix}"
 
     def beside(self, key: str, number: int, suffix: str) -> Path:
-        """Where a file beside the frame of a key lies, of one number."""
+        """Path of a further file of the frame of a key and a number."""
         return self.folder / f"{key}.{number}{suffix}"
 
     def adopt(self, frame: Path, file: Path) -> None:
-        """Take a file that lies elsewhere, and stays there, for one of a frame."""
+        """Link or copy a file from elsewhere as one of a frame."""
         if not frame.exists() and not file.is_symlink():
             try:
                 os.link(file, frame)
@@ -278,7 +276,7 @@ class Store:
                 write_whole(frame, file.read_bytes())
 
     def has(self, key: str, size: tuple[int, int]) -> bool:
-        """Whether a frame is there, whole and of a size (width, height)."""
+        """Return whether a whole frame of a size (width, height) is stored."""
         file = self.file(key)
         if file.is_symlink() or not file.is_file():
             return False
@@ -290,7 +288,7 @@ class Store:
         return False
 
     def remove(self) -> None:
-        """Take our files away, and where nothing else is there the folder and those that were made for it."""
+        """Delete our files, and folders that we created and that are empty then."""
         for file in (*self._named(_FRAME), *self._named(_PASSING), self.folder / _LOCK):
             with contextlib.suppress(OSError):
                 file.unlink()
@@ -306,7 +304,7 @@ class Store:
 
 
 def put_frame(files: Mapping[Path, bytes]) -> None:
-    """Write the files of a frame, the first last: where that one is, the others are; links are replaced.
+    """Write the files of a frame, the first one last, so that it implies the others; links are replaced.
 
     They are not flushed: a frame that a power cut damaged is drawn again.
     """
@@ -315,7 +313,7 @@ def put_frame(files: Mapping[Path, bytes]) -> None:
 
 
 def deliver(part: Path, target: Path) -> None:
-    """Flush a finished file to the disk and rename it over ``target``, which stays as it was if it cannot."""
+    """Flush a finished file to the disk and rename it over ``target``, which stays unchanged on an error."""
     place = output_place(target)
     with part.open("rb") as file:
         os.fsync(file.fileno())
@@ -359,11 +357,11 @@ def changed(before: Pixels | None, now: Pixels) -> Box:
 
 
 Encoder = Callable[[Film, Path, Callable[[float], None]], None]
-"""Writes a film to a file in one format, and says which share of it is done."""
+"""Writes a film to a file in one format, and reports the share that is done."""
 
 
 STILL = Animation(seconds=1.0, fps=1.0)
-"""What a scene without ``animate`` is: one frame."""
+"""Animation of a scene without ``animate``: one frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -376,7 +374,7 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class FixedFrames:
     """Frames that are Scenes already."""
 
     scenes: tuple[Scene, ...]  # at least one
@@ -389,7 +387,7 @@ class Given:
 
     @property
     def animation(self) -> Animation:
-        """How long they last; raises `ValueError` where nothing says how fast, or their canvases differ."""
+        """Length and rate of the frames; raises `ValueError` without a rate, or where canvases differ."""
         if len({scene.canvas for scene in self.scenes}) > 1:
             raise ValueError("scenes with several canvases, where size says one for all")
         first, count = self.scenes[0].animation, len(self.scenes)
@@ -407,9 +405,9 @@ class Clip:
 
     Args:
         source: the scene, one that is prepared, or its frames.
-        diagnostics: collects what is found, in each frame; a mistake in any frame ends the clip.
+        diagnostics: collects diagnostics of each frame; a mistake in any frame ends the clip.
         fps: frames a second, instead of those of the first Scene's animation.
-        reuse: keep what frames share; without it each frame is worked out by itself.
+        reuse: cache parts that frames share; else each frame is computed by itself.
 
     Raises:
         SceneError: the scene's file is not text.
@@ -426,17 +424,17 @@ class Clip:
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         self.reuse = reuse
-        self._evaluation: Evaluation | Given = (
+        self._evaluation: Evaluation | FixedFrames = (
             source.evaluation(self.diagnostics, replays=reuse)
             if isinstance(source, Source)
-            else Given(source, fps)
+            else FixedFrames(source, fps)
             if isinstance(source, tuple)
             else source
         )
         self._last: tuple[Shot, Program] | None = None
         self._memory = Memory() if reuse else None
         self.wanted = self._evaluation.wanted
-        """All files that it imports, also those that are not there."""
+        """All files that it imports, also those that do not exist."""
 
     @cached_property
     def first(self) -> Shot:
@@ -445,19 +443,19 @@ class Clip:
 
     @property
     def animates(self) -> bool:
-        """Whether the scene has ``animate(…)``."""
+        """True where the scene has ``animate(…)``."""
         return self._evaluation.animates
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """What its files hold."""
+        """Texts of its files."""
         given = self._evaluation
-        return () if isinstance(given, Given) else tuple(source.text for source in given.sources)
+        return () if isinstance(given, FixedFrames) else tuple(source.text for source in given.sources)
 
     @property
     def animation(self) -> Animation:
         """Length, frames a second and whether it is a loop."""
-        if isinstance(self._evaluation, Given):
+        if isinstance(self._evaluation, FixedFrames):
             return self._evaluation.animation
         return self.first.scene.animation or STILL
 
@@ -465,10 +463,10 @@ class Clip:
     def frames(self) -> int:
         """Number of frames, at least 1."""
         given = self._evaluation
-        return len(given.scenes) if isinstance(given, Given) else self.animation.frames
+        return len(given.scenes) if isinstance(given, FixedFrames) else self.animation.frames
 
     def numbers(self, frames: FrameRange) -> range:
-        """The numbers of the frames that are asked for; raises `SceneError` where some are not there."""
+        """Numbers of the requested frames; raises `SceneError` where some do not exist."""
         animation = self.animation
         try:
             return frames.among(animation.frames)

@@ -1,7 +1,7 @@
 """Speed against error: the measured frontier, and the choice of a point of it for a scene.
 
-A *point* is a way to draw: a model with its sampling, or the exact reference. The *front* are
-the points that no other one beats: nothing faster has less error.
+A *point* is a way to draw: a model with its sampling, or the exact reference. The *front* is
+the set of points that no other one beats: nothing faster has less error.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _STRICT: Final = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a picture may take; None for no limit."""
+    """Limits of a picture's time and error; None for no limit."""
 
     ms: float | None  # most milliseconds of a frame on this machine
     flip: float | None  # most mean FLIP
@@ -67,7 +67,7 @@ class Errors:
     __pydantic_config__ = _STRICT
     mean: Amount
     p95: Amount
-    bound: Amount  # what is promised
+    bound: Amount  # promised
     worst: Amount
     interval: Amount = 0.0  # half the width of the 95 % interval of the mean
 
@@ -85,7 +85,7 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """How many times as long one way took as another, on the same scenes drawn in turn."""
+    """Ratio of the times of two ways, on the same scenes drawn in turn."""
 
     __pydantic_config__ = _STRICT
     # names of points
@@ -108,7 +108,7 @@ class Cost:
     # object meets every pixel
     megameeting: Amount
     outline: Amount  # for each 1,000 pixels around those bounds, where pixels are sampled four times
-    spread: Amount  # 95 of 100 measured frames took at most so many times what the sum says
+    spread: Amount  # 95 of 100 measured frames took at most this many times the sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +116,9 @@ class Point:
     """A way to draw and its figures."""
 
     __pydantic_config__ = _STRICT
-    name: str  # what charts call it
+    name: str  # label in charts
     backend: Literal["neural", "reference"]
-    model: str | None  # name of the model; None for the reference and for what has no trained weights
+    model: str | None  # name of the model; None for the reference and for a way without trained weights
     renderer: str  # of the network, or `"reference"`
     # how it draws
     samples: Samples
@@ -126,9 +126,9 @@ class Point:
     spp: Count  # samples a pixel of the reference
     # pixels along a side that it draws, enlarged for the comparison; 0 where it draws any canvas
     side: Count
-    offered: bool  # whether `scenelang render` chooses it
-    why_not: str | None  # why it does not
-    scenes: Count  # on how many it was measured
+    offered: bool  # true where `scenelang render` may choose it
+    why_not: str | None  # reason if not
+    scenes: Count  # number on which it was measured
     # figures; no errors where only the time was measured
     ms: Times
     # how many times as fast as the paper's streaming renderer at its full size, on the same scenes; 0 where
@@ -140,8 +140,8 @@ class Point:
     # numbers of the network and size of its file
     parameters: Count
     bytes: Count
-    on_front: bool  # whether nothing offered is both faster and nearer, in FLIP
-    command: str | None  # what draws a scene this way; None where nothing does
+    on_front: bool  # true where nothing offered is both faster and nearer, in FLIP
+    command: str | None  # the command that draws a scene this way, if there is one
 
     @property
     def title(self) -> str:
@@ -165,20 +165,20 @@ class Frontier:
     machine: str
     revision: str
     torch: str
-    yardstick_ms: Amount  # what `scenelang.output.frontier.yardstick` took there
+    yardstick_ms: Amount  # time of `yardstick` there
     streaming_ms: Amount  # a frame of the paper's streaming renderer at its full size, in the same run
     # mean FLIP of some points against 64 samples a pixel, by name: how near the definition is
     converged: dict[str, Amount]
     points: tuple[Point, ...]  # in the order of their time
     ratios: tuple[Ratio, ...] = ()
-    command: str = ""  # that measured it
+    command: str = ""  # the command that measured it
 
     def point(self, name: str) -> Point | None:
         """The point of a name, if it was measured."""
         return next((p for p in self.points if p.name == name), None)
 
     def ratio(self, slow: str, fast: str) -> Ratio | None:
-        """What one way's time is of another's, if that was measured."""
+        """Ratio of two ways' times, if it was measured."""
         return next((r for r in self.ratios if (r.slow, r.fast) == (slow, fast)), None)
 
     def to_json(self) -> str:
@@ -188,18 +188,18 @@ class Frontier:
     @staticmethod
     def from_json(data: bytes) -> Frontier:
         """Read a file as if a stranger had written it; raises `ValueError` where it is none."""
-        found = read_json(data)
-        if not isinstance(found, dict) or found.pop("format", None) != FORMAT:
+        result = read_json(data)
+        if not isinstance(result, dict) or result.pop("format", None) != FORMAT:
             raise ValueError(f"not a frontier of format {FORMAT}")
         try:
-            return TypeAdapter(Frontier).validate_json(json.dumps(found))
+            return TypeAdapter(Frontier).validate_json(json.dumps(result))
         except ValidationError as error:
             place = ".".join(map(str, error.errors()[0]["loc"]))
             raise ValueError(f"`{place}` of the frontier does not hold what it should") from None
 
 
 def _rounded(value: Any) -> Any:
-    """Floats of four digits that count."""
+    """Round floats to four significant digits."""
     if isinstance(value, dict):
         return {k: _rounded(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
@@ -208,28 +208,28 @@ def _rounded(value: Any) -> Any:
 
 
 def front(figures: Sequence[tuple[float, float]]) -> list[bool]:
-    """Which of (time, error) no other one beats: none is as good in both and better in one.
+    """Mask of the Pareto front of (time, error): no other point is as good in both and better in one.
 
-    Of equal points the first is kept.
+    Of equal points the first one counts.
     """
     order = sorted(range(len(figures)), key=lambda i: (*figures[i], i))
-    kept = [False] * len(figures)
+    mask = [False] * len(figures)
     best = math.inf
     for i in order:
         if figures[i][1] < best:
-            best, kept[i] = figures[i][1], True
-    return kept
+            best, mask[i] = figures[i][1], True
+    return mask
 
 
 def between(points: Iterable[Point]) -> int:
-    """How many points lie between the fastest and the nearest: measured in error, and neither of the two."""
+    """Number of points between the fastest and the nearest one, without these, among those with an error."""
     drawn = [(p.ms.median, p.flip.mean) for p in points if p.flip is not None]
     nearest = min(drawn, key=lambda p: p[::-1], default=(0.0, 0.0))
     return sum(min(drawn)[0] < ms < nearest[0] for ms, _ in drawn)
 
 
 def frontier_path(model: str) -> Path:
-    """Where the frontier of a model's set is shipped: beside the weights of the model named like the set."""
+    """Shipped file of the frontier of a model's set: next to the weights of the model of the set's name."""
     return ROOT / load_manifest(model).set / NAME
 
 
@@ -256,7 +256,7 @@ OBJECTS: Final = 4
 
 
 class NothingFits(Exception):
-    """No point draws the scene as fast or as exactly as asked; says which comes nearest."""
+    """No point keeps the limits; the message names the nearest one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,8 +264,8 @@ class Offer:
     """A point and what it promises for a scene on this machine."""
 
     point: Point  # from the frontier
-    ms: float  # what 95 of 100 frames stay under
-    flip: float  # what 97.5 of 100 scenes stay under
+    ms: float  # at least the time of 95 of 100 frames
+    flip: float  # at least the error of 97.5 of 100 scenes
 
     def told(self) -> str:
         digits = 0 if self.ms >= 10 else 1
@@ -283,7 +283,7 @@ class Choice:
 
 
 def error_scale(canvas: tuple[int, int], objects: int) -> float:
-    """By how much a promised error grows for a scene unlike those that were measured, at 256 x 256.
+    """Factor of a promised error for a scene unlike those that were measured, at 256 x 256.
 
     Errors lie along outlines. On a smaller canvas more of the pixels do, in proportion to its shorter side,
     and with more than `OBJECTS` objects there is more outline, in proportion to their number. A larger canvas
@@ -317,33 +317,33 @@ def refusal(point: Point, scene: Scene | None, program: Program, only: str | Non
         except RenderError as error:  # an element has no original
             return str(error)
         return None
-    lower(scene, load_manifest(point.model), None, found := Diagnostics())
-    return found.errors[0].message if found.errors else None
+    lower(scene, load_manifest(point.model), None, diagnostics := Diagnostics())
+    return diagnostics.errors[0].message if diagnostics.errors else None
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:
-    """What points that can draw a scene promise for it, the fastest first; ``scale`` from `machine_scale`."""
-    found = []
+    """Promises of points for a scene, the fastest first; ``scale`` is that of `machine_scale`."""
+    result = []
     for point in points:
         if point.cost is None or point.flip is None:
             continue
         ms = predicted_ms(point.cost, load, point.skip) * point.cost.spread * scale
-        found.append(Offer(point, ms, min(1.0, point.flip.bound * error_scale(canvas, load.objects))))
-    return sorted(found, key=lambda o: (o.ms, o.flip))
+        result.append(Offer(point, ms, min(1.0, point.flip.bound * error_scale(canvas, load.objects))))
+    return sorted(result, key=lambda o: (o.ms, o.flip))
 
 
-def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
+def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
     """The fastest offer that keeps the error, or the one of least error that keeps the time.
 
     Of offers that promise nearly the same error, within 2 %, the faster one is better. With both limits the
     fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
     """
-    if not found:
-        told = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
-        raise NothingFits("nothing on the frontier draws this scene" + (f" ({told})" if told else ""))
-    good = [offer for offer in found if not _lacks(offer, limits)]
+    if not offers:
+        reasons = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
+        raise NothingFits("nothing on the frontier draws this scene" + (f" ({reasons})" if reasons else ""))
+    good = [offer for offer in offers if not _lacks(offer, limits)]
     if not good:
-        raise NothingFits(_nearest(found, limits))
+        raise NothingFits(_nearest(offers, limits))
     if limits.flip is not None:
         first = min(good, key=lambda o: (o.ms, o.flip))
         limit = f"FLIP {limits.flip:g}" + (f" and {limits.ms:g} ms" if limits.ms is not None else "")
@@ -353,7 +353,7 @@ def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> C
         first = min((o for o in good if o.flip <= 1.02 * least), key=lambda o: o.ms)
         why = f"the most exact of {len(good)} that keep {limits.ms:g} ms"
     notes = [f"chosen by the frontier: {first.told()}, {why}"]
-    others = [offer for offer in found if offer is not first]
+    others = [offer for offer in offers if offer is not first]
     by, worse = ("ms", "slower") if limits.flip is not None else ("flip", "no more exact")
     runner_up = min(others, key=lambda o: (o not in good, getattr(o, by)), default=None)
     if runner_up is not None:
@@ -362,31 +362,31 @@ def choose(found: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> C
 
 
 def _lacks(offer: Offer, limits: Limits) -> str:
-    """Which limits an offer exceeds, in words."""
+    """Limits that an offer exceeds, in words."""
     slow = limits.ms is not None and offer.ms > limits.ms
     wrong = limits.flip is not None and offer.flip > limits.flip
     return " and ".join(["too slow"] * slow + ["not exact enough"] * wrong)
 
 
-def _nearest(found: Sequence[Offer], limits: Limits) -> str:
-    """What comes nearest to limits that nothing keeps."""
+def _nearest(offers: Sequence[Offer], limits: Limits) -> str:
+    """Message about the offer that is nearest to limits that none keeps."""
     asked = [f"{limits.ms:g} ms"] if limits.ms is not None else []
     asked += [f"FLIP {limits.flip:g}"] if limits.flip is not None else []
-    exact = [o for o in found if limits.flip is not None and o.flip <= limits.flip]
+    exact = [o for o in offers if limits.flip is not None and o.flip <= limits.flip]
     if exact:
-        told = f"exact enough is {min(exact, key=lambda o: o.ms).told()}"
+        nearest = f"exact enough is {min(exact, key=lambda o: o.ms).told()}"
     elif limits.flip is not None:
-        told = f"the most exact is {min(found, key=lambda o: (o.flip, o.ms)).told()}"
+        nearest = f"the most exact is {min(offers, key=lambda o: (o.flip, o.ms)).told()}"
     else:
-        told = f"the fastest is {min(found, key=lambda o: o.ms).told()}"
-    return f"nothing draws this scene within {' and '.join(asked)}; {told}"
+        nearest = f"the fastest is {min(offers, key=lambda o: o.ms).told()}"
+    return f"nothing draws this scene within {' and '.join(asked)}; {nearest}"
 
 
-# ---------------------------------------------------------------- what a frame will take
+# ---------------------------------------------------------------- predicted times
 
 
 def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:
-    """Milliseconds of a frame on the machine that was measured, most likely; times `Cost.spread` at most."""
+    """Likely milliseconds of a frame on the measured machine; at most `Cost.spread` times as many."""
     terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
     return sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
 
@@ -420,5 +420,5 @@ def yardstick() -> float:
 
 
 def machine_scale(frontier: Frontier, here_ms: float) -> float:
-    """How many times as long as there this machine takes, by the yardstick."""
+    """Time on this machine relative to the measured one, by the yardstick."""
     return here_ms / frontier.yardstick_ms if frontier.yardstick_ms > 0 else 1.0

@@ -1,11 +1,11 @@
 """Frames to pictures: in this process, in others, and on the workers of a cluster.
 
-Each is a plain ``python -m scenelang.output.painting`` that gets compiled Programs through a pipe, and
-ends when its pipe does, so that none outlives this process. Processes of `concurrent.futures` would run an
-embedder's main module again, and stay behind where this one is killed.
+Each other process is a plain ``python -m scenelang.output.painting`` that reads compiled Programs from a pipe
+and ends with it, so that none outlives this process. Processes of `concurrent.futures` would run an
+embedder's main module again, and stay where this one is killed.
 
-Programs go out as bytes, with the elements and textures that they draw, and files come back as bytes: no file
-system is shared.
+Workers of a cluster get Programs as bytes, with the elements and textures that they draw, and return files as
+bytes, so that no file system need be shared.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from scenelang.compiler.program import Program, program_bytes
-from scenelang.drawing.how import DEFAULT, How, RenderError
+from scenelang.compiler.program import Program, parse_program, program_bytes
+from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
+from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import Kept
 from scenelang.output.frames import Clip, Shot, frame_key, put_frame
 from scenelang.output.workers import AHEAD, Link
@@ -48,10 +49,10 @@ class Drawable:
     """A frame ready to be drawn."""
 
     number: int  # from 0
-    key: str  # digest of all that decides its pixels
+    key: str  # digest of all that determines its pixels
     shot: Shot  # the frame
     program: Program | None  # what the network draws; None for the reference
-    place: str = "cpu"  # who draws it: numpy, or a torch device
+    place: str = "cpu"  # the renderer: numpy, or a torch device
 
 
 @dataclass(slots=True)
@@ -60,26 +61,26 @@ class Painter:
 
     clip: Clip  # the animation
     how: How = DEFAULT  # how they are drawn
-    # the picture before, of which what is the same is taken over
+    # the previous picture, whose unchanged parts are reused
     kept: Kept | None = field(default=None, repr=False)
-    outputs: tuple[Output, ...] = ()  # beside each picture
-    single: bool = False  # draw each as it is drawn by itself: small ones by numpy
-    load_s: float = 0.0  # what loading torch took
+    outputs: tuple[Output, ...] = ()  # next to each picture
+    single: bool = False  # draw each frame as a single picture: small ones by numpy
+    load_s: float = 0.0  # time of loading torch
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and say what its files depend on; raises as `Clip.program`, or `RenderError`.
+        """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`.
 
         Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
         """
-        found = self._picture(shot, single or self.single)
+        result = self._picture(shot, single or self.single)
         if not self.outputs:
-            return found
-        # they tell of each object which it is and where it was written
-        program = found.program
+            return result
+        # outputs name objects and their places in the text
+        program = result.program
         places: tuple[object, ...] = (self.clip.texts,)
         if program is not None:
             places = program.numbers, program.objects, program.places
-        return replace(found, key=frame_key(found.key, self.outputs, *places))
+        return replace(result, key=frame_key(result.key, self.outputs, *places))
 
     def _picture(self, shot: Shot, single: bool) -> Drawable:
         if self.how.backend == "reference":
@@ -110,11 +111,9 @@ class Painter:
         return choose_device(how.device)
 
     def split(self, program: Program) -> int:
-        """How many threads a picture is split for, which shows in the last bits of its pixels."""
+        """Number of threads for which a picture is split; it affects the last bits of its pixels."""
         if self.how.threads is not None:
             return self.how.threads
-        from scenelang.drawing.how import threads_for
-
         return threads_for(program.canvas)
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
@@ -123,7 +122,6 @@ class Painter:
             from scenelang.drawing.render import draw_exact
 
             return draw_exact(frame.shot.scene, spans=frame.shot.spans)
-        from scenelang.drawing.neural.draw import Kept
         from scenelang.drawing.render import draw
 
         if self.kept is None and self.clip.reuse:
@@ -139,7 +137,6 @@ class Painter:
         program = frame.program
         if program is None or program.stage is None or min(program.canvas) < DRAFT * DRAFT:
             return None
-        from scenelang.drawing.image import enlarged
         from scenelang.drawing.small import draw_small
 
         width, height = program.canvas
@@ -147,13 +144,12 @@ class Painter:
         return enlarged(draw_small(coarse, samples="one", threads=self.how.threads).image, program.canvas)
 
     def files(self, frame: Drawable, file: Path, progress: Progress | None = None) -> dict[Path, bytes]:
-        """What the picture's file holds and those of its outputs; raises as `scenelang.render_outputs`."""
-        from scenelang.drawing.image import packed
+        """Bytes of the files of the picture and its outputs; raises as `scenelang.render_outputs`."""
         from scenelang.drawing.render import outputs_of
 
         shot, drawn = frame.shot, frame.program or frame.shot.scene
-        found = outputs_of(drawn, self.outputs, self.how, spans=shot.spans)
-        return packed(self.draw(frame, progress), found, file)
+        result = outputs_of(drawn, self.outputs, self.how, spans=shot.spans)
+        return packed(self.draw(frame, progress), result, file)
 
 
 class Errand(NamedTuple):
@@ -162,13 +158,11 @@ class Errand(NamedTuple):
     file: str  # where its picture goes, which names the format
     place: str  # numpy, or a torch device
     split: int  # threads that the picture is split for
-    outputs: tuple[Output, ...] = ()  # beside it
+    outputs: tuple[Output, ...] = ()  # next to it
     how: How = DEFAULT  # how it is drawn
 
     def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
-        """What the files of a Program's bytes hold; raises as `scenelang.render_outputs`."""
-        from scenelang.compiler.program import parse_program
-        from scenelang.drawing.image import packed
+        """Draw a Program's bytes; returns those of its files and raises as `scenelang.render_outputs`."""
         from scenelang.drawing.render import draw, outputs_of
 
         read, how = parse_program(program), How(*self.how)._replace(threads=1)
@@ -176,7 +170,7 @@ class Errand(NamedTuple):
         return packed(image, outputs_of(read, self.outputs, how), Path(self.file))
 
 
-FRAMES_AHEAD = 2  # frames that wait for each process, so that none is idle and few are held
+FRAMES_AHEAD = 2  # frames that wait for each process, so that none is idle and few use memory
 
 
 class Workers:
@@ -197,7 +191,7 @@ class Workers:
 
     @property
     def waiting(self) -> int:
-        """Frames that are asked for and not known to be done."""
+        """Frames that were submitted and are not known to be done."""
         while self._waiting and self._waiting[0].done():
             self.take()
         return len(self._waiting)
@@ -209,7 +203,7 @@ class Workers:
         self._waiting.append(self._pool.submit(self._draw, program_bytes(program), errand))
 
     def take(self) -> None:
-        """Wait for the first of those asked for; raises the `RenderError` or `OSError` by which it failed."""
+        """Wait for the first submitted frame; raises the `RenderError` or `OSError` by which it failed."""
         self._waiting.popleft().result()
 
     def _draw(self, program: bytes, errand: Errand) -> None:
@@ -236,7 +230,7 @@ class Workers:
             self._free.put(process)
 
     def close(self) -> None:
-        """End the processes, whatever they are doing."""
+        """Stop the processes."""
         for future in self._waiting:
             future.cancel()
         for process in self._all:
@@ -248,26 +242,26 @@ class Workers:
 
 def main() -> None:
     """Read a line of JSON and a Program, draw, answer in a line, until the input ends."""
-    # Answers go where standard output went; whatever prints goes to standard error.
+    # Answers go to standard output; prints of libraries go to standard error.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    kept, source = Kept(), sys.stdin.buffer
+    cache, source = Kept(), sys.stdin.buffer
     while line := source.readline():
         head = json.loads(line)
         program = source.read(head["bytes"])
         if len(program) < head["bytes"]:
             return
         try:
-            answers.write(json.dumps(_answer(head, program, kept)).encode() + b"\n")
+            answers.write(json.dumps(_answer(head, program, cache)).encode() + b"\n")
             answers.flush()
-        except BrokenPipeError:  # whoever asked is gone
+        except BrokenPipeError:  # the parent process is gone
             os._exit(0)
 
 
-def _answer(head: dict[str, Any], program: bytes, kept: Kept) -> dict[str, Any]:
+def _answer(head: dict[str, Any], program: bytes, cache: Kept) -> dict[str, Any]:
     errand = Errand(*head["errand"])
     try:
-        put_frame(errand.run(program, kept))
+        put_frame(errand.run(program, cache))
     except RenderError as error:
         return {"error": str(error)}
     except OSError as error:
@@ -279,30 +273,30 @@ if __name__ == "__main__":
     main()
 
 
-BATCH_S: Final = 0.25  # of drawing in a batch, beside which a task's own milliseconds are little
+BATCH_S: Final = 0.25  # drawing time of a batch, against which a task's own milliseconds are small
 MOST_BATCH: Final = 64
-MOST_BYTES: Final = 4 << 20  # of Programs in a batch, where elements make them large
+MOST_BYTES: Final = 4 << 20  # of the Programs in a batch; elements make them large
 _local = threading.local()
 
 
 class Cluster:
-    """The workers of a scheduler that draw frames, as `Helpers`; arguments and errors are those of `Link`."""
+    """Workers of a scheduler that draw frames, with the methods of `Workers`; raises as `Link`."""
 
     def __init__(self, address: str) -> None:
         self._link = Link(address)
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
-        self._each_s = BATCH_S  # a frame, as far as is known
+        self._each_s = BATCH_S  # estimated time of a frame
         self._under_way: dict[Task[Any], list[Errand]] = {}
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of workers."""
         return self._link.count
 
     @property
     def waiting(self) -> int:
-        """Frames that are asked for and not known to be done."""
+        """Frames that were submitted and are not known to be done."""
         while self._under_way and self._link.ready:
             self._receive()
         return len(self._batch) + sum(map(len, self._under_way.values()))
@@ -317,7 +311,7 @@ class Cluster:
             self._send()
 
     def take(self) -> None:
-        """Send what waits for others to travel with, and write what comes back next.
+        """Send an incomplete batch, and write the next files that come back.
 
         Raises:
             RenderError: it cannot be drawn, several workers ended over it, or the scheduler is gone.
@@ -327,15 +321,15 @@ class Cluster:
         self._receive()
 
     def close(self) -> None:
-        """Call off what is under way."""
+        """Cancel pending frames."""
         self._link.close()
 
     def _receive(self) -> None:
         future = self._link.next()
         errands = self._under_way.pop(future)
-        seconds, found = self._link.result(future)
+        seconds, result = self._link.result(future)
         self._each_s = 0.5 * (self._each_s + seconds / len(errands))
-        for errand, files in zip(errands, found, strict=True):
+        for errand, files in zip(errands, result, strict=True):
             folder = Path(errand.file).parent
             put_frame({folder / name: data for name, data in files.items()})
 
@@ -349,16 +343,14 @@ def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[
     """Draw Programs on this machine: the processor's seconds, and the files of each by their names.
 
     Args:
-        batch: bytes of Programs, and what is asked of them.
+        batch: bytes of Programs, and their errands.
 
     Raises:
         RenderError: one cannot be drawn.
     """
-    from scenelang.drawing.neural.draw import Kept
-
-    kept = _local.__dict__.setdefault("kept", Kept())
+    cache = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
-    found = [
-        {file.name: data for file, data in errand.run(program, kept).items()} for program, errand in batch
+    result = [
+        {file.name: data for file, data in errand.run(program, cache).items()} for program, errand in batch
     ]
-    return time.process_time() - started, found
+    return time.process_time() - started, result

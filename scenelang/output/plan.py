@@ -1,4 +1,4 @@
-"""What drawing a scene takes, before and after each rewrite, and what was left out: no more than it needs."""
+"""Cost of drawing a scene: sizes after each pass, the chosen model, and the work and error of the picture."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ REPEATS = 3
 
 
 def token_counts(tokens: Iterable[int]) -> dict[str, int]:
-    """How many rows join by each word, of the words in use."""
+    """Number of rows that join by each word, of the words in use."""
     values = list(tokens)
     return {word: values.count(value) for word, value in TOKENS.items() if value in values}
 
@@ -40,7 +40,7 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     """Sizes after ``lower`` and each pass, and whether the pass changed anything.
 
     Returns:
-        Of each stage ``objects`` (leaves), ``matrices`` (affine maps and deformations on leaves and folds:
+        For each stage ``objects`` (leaves), ``matrices`` (affine maps and deformations on leaves and folds:
         each is one matrix of the lifting), of these ``affines`` and ``deformations``, ``folds`` (groups,
         chains and boolean nodes) and ``tokens`` (children of folds by the word that joins them, of the words
         in use).
@@ -48,14 +48,14 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     before: Graph | None = None
     for name, graph in graphs.items():
-        found = list(nodes(graph.root))
-        folds = [node for node in found if isinstance(node, Fold)]
-        steps = [move.step for node in found for move in node.moves]
+        result = list(nodes(graph.root))
+        folds = [node for node in result if isinstance(node, Fold)]
+        steps = [move.step for node in result for move in node.moves]
         affines = sum(isinstance(step, Affine) for step in steps)
         out.append(
             {
                 "stage": name,
-                "objects": len(found) - len(folds),
+                "objects": len(result) - len(folds),
                 "matrices": len(steps),
                 "affines": affines,
                 "deformations": len(steps) - affines,
@@ -78,7 +78,7 @@ def plan_of(
     spans: Spans | None = None,
     threads: int = 1,
 ) -> dict[str, Any]:
-    """What `choice` and `drawing_cost` say, the `stages`, and the rows and tokens of the stream."""
+    """Results of `choice`, `stages` and `drawing_cost`, and the rows and tokens of the stream."""
     return {
         **choice(scene, program.model, asked),
         "stages": stages(graphs),
@@ -89,7 +89,7 @@ def plan_of(
 
 
 def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
-    """Which model draws a scene, why (the command line ``asked`` for it), and what would have been next."""
+    """The model that draws a scene, the reason (or that it was ``asked`` for), and the runner-up."""
     others = [load_manifest(name) for name in available() if name != chosen]
     refused = {model.name: refusals(scene, model) for model in others}
     able = [model for model in others if not refused[model.name]]
@@ -103,15 +103,15 @@ def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
 
 
 def refusals(scene: Scene, manifest: Manifest) -> list[str]:
-    """What a model cannot draw of a scene, as messages, each once."""
-    lower(scene, manifest, None, found := Diagnostics())
-    return list(dict.fromkeys(error.message for error in found.errors))
+    """Messages about parts of a scene that a model cannot draw, each once."""
+    lower(scene, manifest, None, diagnostics := Diagnostics())
+    return list(dict.fromkeys(error.message for error in diagnostics.errors))
 
 
 def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
-    """The exact picture of a scene over its background, names as a model knows them.
+    """The exact picture of a scene over its background, with a model's geometries and materials.
 
-    ``per_side`` is samples along each side of a pixel; 2 is the definition.
+    ``per_side`` is the number of samples along each side of a pixel; 2 is the definition.
     """
     graph = lower(scene, manifest, spans, Diagnostics())
     if not graph.elements:
@@ -124,10 +124,10 @@ def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: 
 def drawing_cost(
     scene: Scene, program: Program, model: Model, spans: Spans | None = None, threads: int = 1
 ) -> dict[str, Any]:
-    """Draw a Program of a scene and say what it took and how far it is off.
+    """Draw a Program of a scene and measure its work, time and error.
 
     Returns:
-        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), what `_meetings` or `_rays` say,
+        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), counts of `_meetings` or `_rays`,
         ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
         (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
     """
@@ -168,7 +168,7 @@ def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int
     ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
     every object)."""
     samples = program.canvas[0] * program.canvas[1] + 4 * drawing.refined
-    if model.manifest.renderer != "framed":  # which take every sample, and meet every object there
+    if model.manifest.renderer != "framed":  # others take every sample, with every object
         samples = drawing.pairs // max(1, len(program))
     return {
         "evaluated": drawing.met,

@@ -1,7 +1,7 @@
 """Sweeps: pictures of one scene with other values of its params.
 
-In order: `values` says which values, `variants` makes scenes of them, `table` and `sheet` show what came of
-them, `api` ties it up with what draws animations.
+`sweep_rows` gives the values, the scenes and the table; here the table is kept up to date while rows are
+drawn, `write_sheet` shows the pictures, and `render_many` runs it all.
 """
 
 from __future__ import annotations
@@ -42,22 +42,22 @@ from scenelang.output.sweep_rows import (
 )
 
 TEXTS: Final = {"scene": ".nsg", "program": ".safetensors"}
-"""What is written beside a picture that is no picture itself."""
-_TOLD: Final = 3  # rows whose errors are told in full
+"""Suffixes of files next to a picture that are not pictures themselves."""
+_REPORTED: Final = 3  # rows whose errors are reported in full
 
 
-class Book:
-    """The table of a sweep, kept as rows are compiled.
+class SweepTable:
+    """Table of a sweep, updated as rows are compiled.
 
-    It is written before anything is drawn, and again when all is compiled, before pictures are put in place:
-    so values of another sweep are noticed whenever that was stopped.
+    It is written before anything is drawn, and again when all rows are compiled, before pictures are moved to
+    their places. So pictures of another sweep are noticed, wherever that sweep was stopped.
 
     Args:
-        target: where pictures go.
+        target: files of the pictures.
         rows: the values.
         clip: makes scenes of them.
-        outputs: pictures beside each picture.
-        texts: of `TEXTS`, beside each picture.
+        outputs: further pictures next to each picture.
+        texts: kinds of `TEXTS` next to each picture.
         stem: name of the table.
 
     Attributes:
@@ -92,7 +92,7 @@ class Book:
             write_table(self.file, self.names, self.lines, write_whole)
 
     def _before(self) -> list[Line]:
-        """The rows of a sweep that this one goes on with."""
+        """Rows of the previous sweep that this one continues."""
         if not self.file.exists():
             if self.target.path.is_dir() and (others := self.target.there()):
                 fact = f"pictures of these names without a table, `{others[0].name}` among them"
@@ -108,7 +108,7 @@ class Book:
         return old
 
     def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
-        """Note a row that gives a scene; what is to lie beside its picture."""
+        """Note a row that gives a scene; returns the files next to its picture."""
         line = self.lines[frame.number]
         old = self._old[frame.number] if frame.number < len(self._old) else line
         if old.digest == frame.key:
@@ -118,28 +118,28 @@ class Book:
                 f"`{self.file}` is of another scene, model, size or version: row {frame.number} differs"
             )
         self._note(frame.number, Line(line.picture, line.values, frame.key))
-        found = {}
+        result = {}
         if "scene" in self.texts:
-            found[TEXTS["scene"]] = to_nsg(frame.shot.scene).encode()
+            result[TEXTS["scene"]] = to_nsg(frame.shot.scene).encode()
         if "program" in self.texts:
             if frame.program is None:
                 raise RenderError("the reference has no programs to write")
-            found[TEXTS["program"]] = program_bytes(frame.program)
-        return found
+            result[TEXTS["program"]] = program_bytes(frame.program)
+        return result
 
     def failed(self, number: int, error: SceneError) -> None:
         """Note a row whose values give no scene."""
         errors = [d for d in error.diagnostics if d.severity == "error"]
-        if len(self.told) < _TOLD:
+        if len(self.told) < _REPORTED:
             self.told[number] = errors
         line = self.lines[number]
         self._note(number, Line("", line.values, "", f"{errors[0].code}: {errors[0].message}"))
         self.clip.mend()
 
     def _adopt(self, frame: Drawable, store: Store) -> None:
-        """Take the files of a picture that is there."""
-        file, kept = self.target.file(frame.number), store.file(frame.key)
-        files = {output_file(kept, name): output_file(file, name) for name in self.outputs} | {kept: file}
+        """Reuse the files of an existing picture."""
+        file, stored = self.target.file(frame.number), store.file(frame.key)
+        files = {output_file(stored, name): output_file(file, name) for name in self.outputs} | {stored: file}
         if all(path.is_file() for path in files.values()):
             for into, path in files.items():
                 store.adopt(into, path)
@@ -198,9 +198,9 @@ def write_sheet(
                 f"{name} {value}" for name, value in zip(names, line.values, strict=True) if value
             )
             draw.text((x, y + size[1]), _cut(label, size[0], font), "#444444", font)
-    made = io.BytesIO()
-    sheet.save(made, image_format(path))
-    write_output(path, made.getvalue())
+    buffer = io.BytesIO()
+    sheet.save(buffer, image_format(path))
+    write_output(path, buffer.getvalue())
     return len(lines)
 
 
@@ -234,9 +234,9 @@ class Sweep:
         table: file of values, digests and errors.
         names: of the params.
         lines: the table's rows.
-        failed: what is wrong with the first few of the rows without a picture, by their numbers.
-        warnings: each that was met, once.
-        made: how they were drawn.
+        failed: errors of the first few rows without a picture, by number.
+        warnings: all warnings, each once.
+        made: figures of the run.
     """
 
     table: Path
@@ -248,7 +248,7 @@ class Sweep:
 
     @property
     def errors(self) -> int:
-        """How many rows have no picture."""
+        """Number of rows without a picture."""
         return sum(not line.digest for line in self.lines)
 
 
@@ -276,9 +276,9 @@ def render_many(
 ) -> Sweep:
     """Draw a scene file with many values: ``render_many("a.nsg", "out/", grid={"k": "0..1/10"})``.
 
-    Each picture is the one that `scenelang.render` gives for its values. A call that was interrupted goes on
-    where it stopped, and one with a larger ``count`` adds to what is there. Rows whose values give no scene
-    are left out and told of.
+    Each picture is the one that `scenelang.render` gives for its values. Repeat an interrupted
+    call to continue it; one with a larger ``count`` adds to the pictures. Rows whose values give no scene are
+    left out and reported.
 
     Args:
         path: the scene file. Scenes have no params left; `scenelang.animate` draws several.
@@ -288,17 +288,17 @@ def render_many(
             ten from 0 to 1, ``"0.1,0.5"``, ``"0..1 step 0.25"``, or ``""`` for every choice there is.
         random: params that are drawn uniformly from their ranges, or from those of a mapping.
         count: how many pictures; the grid is gone through again and again.
-        seed: of what is drawn. A row's values hang on its number, the seed and the param's name alone.
+        seed: of random values. A row's values depend on its number, the seed and the param's name alone.
         params: values that all pictures share.
-        outputs: what to write beside each picture: ``"depth"`` and so on as `scenelang.render_outputs` has
-            it, ``"scene"`` as text without params, and ``"program"``.
+        outputs: files to write next to each picture: ``"depth"`` and so on as `scenelang.render_outputs` has
+            them, ``"scene"`` as text without params, and ``"program"``.
         table: a copy of the table, .csv or .parquet.
         sheet: a picture that shows all of them, small.
         frame, size, model, root: as for `scenelang.load`.
         jobs, cluster, progress, **how: as for `scenelang.animate`.
 
     Returns:
-        What was written, also where some or all rows have errors.
+        The files and figures of the sweep, also where some or all rows have errors.
 
     Raises:
         ParamError: there is no such param, or no such values of it.
@@ -316,35 +316,37 @@ def render_many(
         check_table(Path(table))
     if sheet is not None:
         image_format(sheet)
-    found = Diagnostics()
+    diagnostics = Diagnostics()
     fixed = dict(params or {})
-    source = Source(path, params=fixed, model=model, root=root, size=size).parsed(found)
-    first = source.evaluation(found, frame=frame)
-    if first.run(frame)[0] is None or found.errors:  # those of its syntax are of no row
-        raise SceneError(found)
+    source = Source(path, params=fixed, model=model, root=root, size=size).parsed(diagnostics)
+    first = source.evaluation(diagnostics, frame=frame)
+    if first.run(frame)[0] is None or diagnostics.errors:  # those of its syntax are of no row
+        raise SceneError(diagnostics)
     rows = _rows(first, values, grid or {}, random, count, seed)
     for name in rows.names:
         if name in fixed:
             raise ParamError(f"param `{name}` with one value for all pictures, and with others")
-    clip = Variants(source, rows, frame, found)
+    clip = Variants(source, rows, frame, diagnostics)
     beside: list[Output] = [name for name in BESIDE if name in outputs]
     painter = Painter(clip, How(**how).checked(), outputs=tuple(beside), single=True)
-    book = Book(target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem)
-    made = make(
+    sweep_table = SweepTable(
+        target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem
+    )
+    run = make(
         painter, target, range(len(rows)), jobs=jobs, cluster=cluster,
-        beside=book.beside, failed=book.failed, progress=progress,
+        beside=sweep_table.beside, failed=sweep_table.failed, progress=progress,
     )  # fmt: skip
-    names, lines = rows.names, book.lines
+    names, lines = rows.names, sweep_table.lines
     if table is not None:
         write_table(Path(table), names, lines)
     if sheet is not None:
         last = len(tuple(rows.grid.values())[-1]) if len(rows.grid) > 1 else 0  # a row of the sheet
         write_sheet(Path(sheet), target.path, names, lines, last)
-    return Sweep(book.file, names, lines, book.told, clip.diagnostics.items, made)
+    return Sweep(sweep_table.file, names, lines, sweep_table.told, clip.diagnostics.items, run)
 
 
 def _target(out: str, stem: str) -> Target:
-    """Where pictures go; raises `TargetError`."""
+    """Files of the pictures; raises `TargetError`."""
     if is_pattern(out):
         return find_target(out)
     path = Path(out)
@@ -369,8 +371,8 @@ def _rows(
         raise ParamError("values are given as they are, and as a grid or at random")
     if len(given) > MOST_ROWS:
         raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
-    found = Rows({}, given=given)
-    for name in found.names:
+    rows = Rows({}, given=given)
+    for name in rows.names:
         if name not in first.inputs.known:
             param_named(first, name)
-    return found
+    return rows

@@ -1,10 +1,10 @@
 """Rows of a sweep: values of params, the table beside the pictures, and their frames.
 
-A row is made when it is asked for, from its number alone, so that a longer sweep begins with the rows of a
-shorter one, and a further random param leaves the others as they are.
+A row depends on its number alone, so that a longer sweep begins with the rows of a shorter one, and a further
+random param leaves the others unchanged.
 
-The one that lies beside the pictures is CSV, with values as ``-D`` takes them, and is read back. A copy may
-be Parquet, by pyarrow: numbers are float64 in the unit that the column's metadata name, vectors are lists.
+The table next to the pictures is CSV, with values as ``-D`` takes them, and is read back. A copy may be
+Parquet, by pyarrow: numbers are float64 in the unit of the column's metadata, vectors are lists.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.frames import Clip, Shot
 
 MOST_ROWS: Final = 1_000_000
-MOST_LISTED: Final = 10_000  # values of a param that are written out; each is a picture
-_DIGITS: Final = 6  # of a range's width, decimal places of random values and of those of a grid
+MOST_LISTED: Final = 10_000  # values or ranges of a param between commas
+_DIGITS: Final = 6  # digits of a value, relative to the width of its range
 _RANGE: Final = re.compile(r"(.*?)\.\.(<?)(.*?)(?:/\s*(\d{1,7})|\s+step\s+(.+))?", re.DOTALL)
 
 
@@ -53,11 +53,11 @@ class Rows(Record):
     """Values of params, a row for each picture.
 
     Args:
-        grid: texts of each param of the grid; the last one changes fastest.
-        random: params that are drawn.
-        count: how many rows; the grid is gone through again and again.
-        seed: of what is drawn.
-        given: rows as they are, instead of all this.
+        grid: texts of the values of each param of the grid; the last param changes fastest.
+        random: params with random values.
+        count: number of rows; the grid repeats.
+        seed: of the random values.
+        given: explicit rows, instead of all this.
     """
 
     grid: Mapping[str, tuple[str, ...]]
@@ -68,7 +68,7 @@ class Rows(Record):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the params, in the order of columns."""
+        """Names of the params, in the order of columns."""
         if self.given:
             return tuple(dict.fromkeys(name for row in self.given for name in row))
         return (*self.grid, *(knob.name for knob in self.random))
@@ -79,15 +79,15 @@ class Rows(Record):
     def __getitem__(self, index: int) -> Mapping[str, str]:
         if self.given:
             return self.given[index]
-        found, rest = {}, index
+        result, rest = {}, index
         for name, texts in reversed(list(self.grid.items())):
             rest, at = divmod(rest, len(texts))
-            found[name] = texts[at]
-        found = {name: found[name] for name in self.grid}
+            result[name] = texts[at]
+        result = {name: result[name] for name in self.grid}
         for knob in self.random:
             items = tuple(self._drawn(knob, axis, index) for axis in knob.axes)
-            found[knob.name] = _text(knob, Vec(items) if knob.inner else items[0])
-        return found
+            result[knob.name] = _text(knob, Vec(items) if knob.inner else items[0])
+        return result
 
     def __iter__(self) -> Iterator[Mapping[str, str]]:
         return map(self.__getitem__, range(len(self)))
@@ -105,52 +105,52 @@ def rows_of(
     count: int | None = None,
     seed: int = 0,
 ) -> Rows:
-    """The rows that are asked for.
+    """Rows of a grid and of random values.
 
     Args:
         evaluation: of the scene, after a run.
-        grid: for each param values, or text: values between commas, ranges among them, as `values_of` says.
-        drawn: params that are drawn, each with a range, or empty text for its own.
-        count: how many; by default each of the grid once.
+        grid: values of each param, or text as `values_of` takes it.
+        drawn: params with random values, each with a range, or empty text for its own.
+        count: number of rows; by default that of the grid.
 
     Raises:
         ParamError: there is no such param, or no such values of it; or there are none or too many.
     """
-    found: dict[str, tuple[str, ...]] = {}
+    result: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
         stmt = param_named(evaluation, name)
         texts = values_of(evaluation, stmt, asked) if isinstance(asked, str) else map(text_of, asked)
-        found[name] = tuple(islice(texts, MOST_ROWS + 1))
-        if len(found[name]) > MOST_ROWS:
+        result[name] = tuple(islice(texts, MOST_ROWS + 1))
+        if len(result[name]) > MOST_ROWS:
             raise ParamError(f"more than {MOST_ROWS:,} values of `{name}`")
-        if not found[name]:
+        if not result[name]:
             raise ParamError(f"no values for `{name}`")
     for name in drawn:
-        if name in found:
+        if name in result:
             raise ParamError(f"param `{name}` both in the grid and drawn at random")
     knobs = tuple(_narrowed(evaluation, param_named(evaluation, name), text) for name, text in drawn.items())
-    cells = math.prod(map(len, found.values()))
-    if not found and not knobs:
+    cells = math.prod(map(len, result.values()))
+    if not result and not knobs:
         raise ParamError("no param to change")
-    if count is None and not found:
+    if count is None and not result:
         raise ParamError("a count is needed where all values are drawn at random")
     total = cells if count is None else count
-    if found and total < cells:
+    if result and total < cells:
         raise ParamError(f"{plural(total, 'picture')}, where the grid has {cells:,}")
     if total > cells and not knobs:
         fact = f"{plural(total, 'picture')}, where the grid has {cells:,}"
         raise ParamError(f"{fact} and nothing is drawn at random")
     if not 0 < total <= MOST_ROWS:
         raise ParamError(f"{total:,} pictures, where 1 to {MOST_ROWS:,} can be made")
-    return Rows(found, knobs, total, seed)
+    return Rows(result, knobs, total, seed)
 
 
 def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[str]:
-    """Texts of the values that ``text`` asks for.
+    """Texts of the values that ``text`` describes.
 
-    It has values between commas. ``a..b/n`` are n from a to b, ``a..<b/n`` n without b, ``a..b step c`` and
-    ``a..b`` what the language means by them; ends that are left out are those of the param's range. No text
-    asks for every choice, or step, of the param.
+    It has values between commas. ``a..b/n`` is n values from a to b, ``a..<b/n`` n without b; ``a..b step c``
+    and ``a..b`` are ranges of the language. Missing ends are those of the param's range. Empty text means
+    every choice, or step, of the param.
     """
     words = _default(evaluation, stmt).__class__ is str
     for place, item in enumerate(_items(text)):
@@ -158,22 +158,22 @@ def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[s
             raise ParamError(
                 f"more than {MOST_LISTED:,} values or ranges of `{stmt.name.text}` between commas"
             )
-        found = None if words else _RANGE.fullmatch(item)
-        if found is None and item:
+        match = None if words else _RANGE.fullmatch(item)
+        if match is None and item:
             yield item
-        elif found is None or not any(found[at] for at in (1, 3, 4, 5)):
+        elif match is None or not any(match[at] for at in (1, 3, 4, 5)):
             knob = knob_of(stmt, evaluation.context)
             if knob.inner or not knob.axes[0].choices:
                 name = stmt.name.text
                 raise ParamError(f"param `{name}` has no list of choices: say how many, as in {name}=../10")
             yield from (_text(knob, choice) for choice in knob.axes[0].choices)
         else:
-            yield from _spread(evaluation, stmt, found)
+            yield from _spread(evaluation, stmt, match)
 
 
-def _spread(evaluation: Evaluation, stmt: tree.Param, found: re.Match[str]) -> Iterator[str]:
+def _spread(evaluation: Evaluation, stmt: tree.Param, match: re.Match[str]) -> Iterator[str]:
     """The values of a range."""
-    first, without, last, parts, step = found.groups()
+    first, without, last, parts, step = match.groups()
     low, high, unit = _ends(evaluation, stmt, first, last)
     knob = Knob(
         stmt, _default(evaluation, stmt), (Axis(stmt.name.text, min(low, high), max(low, high)),), False
@@ -182,25 +182,25 @@ def _spread(evaluation: Evaluation, stmt: tree.Param, found: re.Match[str]) -> I
         by = 1.0 if step is None else unpack(_number(evaluation, stmt, step))[0]
         stepped = RangeValue(low, high, bool(without), by, unit)
         if not by or not abs((high - low) / by) <= MOST_ROWS or stepped.count() > MOST_ROWS:
-            raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
+            raise ParamError(f"more than {MOST_ROWS:,} values in `{match[0]}`")
         values = (stepped.at(at) for at in range(stepped.count()))
     else:
         count = int(parts)
         if count > MOST_ROWS:
-            raise ParamError(f"more than {MOST_ROWS:,} values in `{found[0]}`")
+            raise ParamError(f"more than {MOST_ROWS:,} values in `{match[0]}`")
         gaps = max(1, count if without else count - 1)
         values = (low + (high - low) * at / gaps for at in range(count))
     return (written(knob, pack(value, unit), _DIGITS) for value in values)
 
 
 def _narrowed(evaluation: Evaluation, stmt: tree.Param, text: str) -> Knob:
-    """A param that is drawn, from its own range or from one in ``text``."""
+    """A param with random values from its own range or from one in ``text``."""
     if not text:
         return knob_of(stmt, evaluation.context)
-    found = _RANGE.fullmatch(text)
-    if found is None or found[2] or found[4] or found[5]:
+    match = _RANGE.fullmatch(text)
+    if match is None or match[2] or match[4] or match[5]:
         raise ParamError(f"`{text}` is not a range such as 0..1")
-    low, high = sorted(_ends(evaluation, stmt, found[1], found[3])[:2])
+    low, high = sorted(_ends(evaluation, stmt, match[1], match[3])[:2])
     return Knob(stmt, _default(evaluation, stmt), (Axis(stmt.name.text, low, high),), False)
 
 
@@ -284,8 +284,8 @@ class Line(Record):
     Args:
         picture: name of its file; empty where there is none.
         values: text of each param's value, in order; empty for its default.
-        digest: of all that decides the picture; empty before it is drawn, or where it is not.
-        error: what is wrong with the values; empty where nothing is.
+        digest: digest of all that determines the picture; empty before it is drawn, or where it is not.
+        error: error of the values; empty without one.
     """
 
     picture: str
@@ -295,7 +295,7 @@ class Line(Record):
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Of all columns."""
+        """Texts of all columns."""
         return (self.picture, *self.values, self.digest, self.error)
 
 
@@ -355,23 +355,23 @@ def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
         values, unit = (texts, "") if name in (*_FRONT, *_BACK) else _typed(texts)
         arrays.append(arrow.array(values))
         fields.append(arrow.field(name, arrays[-1].type, metadata={"unit": unit} if unit else None))
-    made = io.BytesIO()
-    pyarrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), made)
-    return made.getvalue()
+    buffer = io.BytesIO()
+    pyarrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), buffer)
+    return buffer.getvalue()
 
 
 def _typed(texts: Sequence[str]) -> tuple[Sequence[Any], str]:
     """Values of a column, None for defaults, and the unit of its numbers; the texts where kinds differ."""
-    found = [_value(text) for text in texts]
-    kinds = {type(value) for value, _ in found if value is not None}
-    units = {unit for value, unit in found if value is not None}
+    result = [_value(text) for text in texts]
+    kinds = {type(value) for value, _ in result if value is not None}
+    units = {unit for value, unit in result if value is not None}
     if len(kinds) > 1 or len(units) > 1:
         return texts, ""
-    return [value for value, _ in found], next(iter(units), "")
+    return [value for value, _ in result], next(iter(units), "")
 
 
 def _value(text: str) -> tuple[Any, str]:
-    """What a text stands for, and its unit."""
+    """Value of a text, and its unit."""
     if text in ("", "true", "false"):
         return (None if not text else text == "true"), ""
     if (one := _NUMBER.fullmatch(text)) is not None:
@@ -386,19 +386,19 @@ def _value(text: str) -> tuple[Any, str]:
 
 
 class Variants(Clip):
-    """Scenes whose number is that of a row; the text is prepared once, and run for each.
+    """Scenes of rows, by the number of the row; the text is parsed once and run for each.
 
     Args:
         source: the scene, parsed, with the values that all rows share.
         rows: values of params.
-        frame: which one of an animation.
+        frame: number of the frame of an animation.
         diagnostics: as for `Clip`.
     """
 
     def __init__(self, source: Source, rows: Rows, frame: int, diagnostics: Diagnostics) -> None:
         self._source, self._rows, self._frame = source, rows, frame
         super().__init__(source.evaluation(diagnostics), diagnostics)
-        self._memory = None  # no object is that of another row
+        self._memory = None  # rows share no objects
 
     def shot(self, number: int) -> Shot:
         assert isinstance(self._evaluation, Evaluation)

@@ -1,8 +1,8 @@
-"""A watched scene, drawn again on each save, and what the terminal shows of it.
+"""A watched scene, drawn again on each save, and its picture in the terminal.
 
-They are looked at often, by size, time and identity, which takes microseconds a file. So nothing is lost
-when an editor renames a new file over the old one, when a folder comes into being, between two waits, or on
-network folders, of whose changes the system gives no notice.
+Files are polled by size, time and identity, which takes microseconds a file. So no change is missed where an
+editor renames a new file over the old one, a folder is created, a save falls between two waits, or a network
+folder sends no notifications.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 Stamps = dict[Path, tuple[int, int, int] | None]
 
-LOOK_S: Final = 0.03  # between two looks
-CHECK_S: Final = 0.1  # between two looks while it draws
+LOOK_S: Final = 0.03  # between two polls
+CHECK_S: Final = 0.1  # between two polls while it draws
 DRAFT_S: Final = 0.15  # a picture that takes longer is shown as a draft first
-SETTLE_S: Final = 0.02  # files must have been still for so long
-PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle of being written
+SETTLE_S: Final = 0.02  # time without a change after which files count as saved
+PATIENCE_S: Final = 0.3  # the same for a missing or empty file, which may be being written
 
 
 class Outdated(Exception):
@@ -52,24 +52,24 @@ class Outdated(Exception):
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of a drawing."""
+    """Result of a drawing."""
 
     image: Image | None = None  # a picture that was drawn
-    good: bool = False  # whether the file that was asked for is as the scene says
+    good: bool = False  # the output file shows the scene
     draft: bool = False  # the picture is coarse, and a better one follows
-    same: bool = False  # nothing had to be drawn: the scene means the same picture as before
+    same: bool = False  # nothing was drawn: the picture is the previous one
     diagnostics: list[Diagnostic] = field(default_factory=list)  # of the scene
-    # where the time went; `load_s` is torch's import
+    # times of the steps; `load_s` is torch's import
     compile_s: float = 0.0
     load_s: float = 0.0
     draw_s: float = 0.0
     save_s: float = 0.0
-    files: list[Path] = field(default_factory=list)  # what was written
+    files: list[Path] = field(default_factory=list)  # written files
 
 
 @dataclass(slots=True)
 class Easel:
-    """Draws a scene as often as it changes; the model, the last picture and its key are kept."""
+    """Draws a scene again when it changes; caches the model, the last picture and its key."""
 
     source: Source  # the scene, with values of its params
     out: Path  # the picture, or the animation
@@ -77,49 +77,49 @@ class Easel:
     frames: FrameRange  # of an animation
     frame: int  # of a picture
     how: How  # how they are drawn
-    drafted: Callable[[Outcome], None] = lambda _: None  # told of a draft, which the picture follows
+    drafted: Callable[[Outcome], None] = lambda _: None  # called with a draft, before the picture
     paths: tuple[Path, ...] = ()  # the files that the picture depends on, the scene first
-    seen: Stamps = field(default_factory=dict)  # how they were when their names were found out
+    seen: Stamps = field(default_factory=dict)  # their stamps when their names were read
     _key: str | None = None
     _image: Image | None = None
     _kept: Kept | None = None
-    _took_s: float = float("inf")  # to draw the last picture
+    _took_s: float = float("inf")  # drawing time of the last picture
 
     def __post_init__(self) -> None:
         self.paths = (Path(os.path.abspath(self.file)),)
 
     @property
     def file(self) -> Path:
-        """The scene's."""
+        """The scene's file."""
         return Path(self.source.path or "")
 
     def draw(self, before: Stamps) -> Outcome:
         """Read, compile, draw and save.
 
         Raises:
-            Outdated: files are not as they were ``before``, which ends the drawing of an animation.
+            Outdated: files differ from ``before``, which ends the drawing of an animation.
             RenderError: there is no such device, or no weights.
             OSError: the picture cannot be written, or the scene not be read.
         """
         outcome = Outcome()
-        found = Diagnostics()
-        with contextlib.suppress(SceneError):  # its diagnostics are `found`
-            self._draw(found, outcome, before)
-        outcome.diagnostics = found.items
+        diagnostics = Diagnostics()
+        with contextlib.suppress(SceneError):  # its diagnostics are collected
+            self._draw(diagnostics, outcome, before)
+        outcome.diagnostics = diagnostics.items
         torch = "scenelang.drawing.torch_backend"
         if not outcome.good and self.how.backend == "neural" and torch not in sys.modules:
-            # loaded in the background, so that a scene that is mended need not wait for it
+            # load it in the background, so that a corrected scene need not wait for it
             threading.Thread(target=importlib.import_module, args=(torch,), daemon=True).start()
         return outcome
 
-    def _draw(self, found: Diagnostics, outcome: Outcome, before: Stamps) -> None:
+    def _draw(self, diagnostics: Diagnostics, outcome: Outcome, before: Stamps) -> None:
         started = time.perf_counter()
-        clip = self._open(found)
+        clip = self._open(diagnostics)
         numbers = clip.numbers(self.frames)
         painter = Painter(clip, self.how, self._kept)
         if self.target is not None and self.target.kind == "video" and not clip.animates:
-            found.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
-            raise SceneError(found)
+            diagnostics.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
+            raise SceneError(diagnostics)
         if self.target is not None and (clip.animates or self.target.kind == "sequence"):
             self._film(painter, self.target, numbers, outcome, before)
             return
@@ -145,37 +145,37 @@ class Easel:
         outcome.image = painter.draft(frame)
         outcome.draw_s = time.perf_counter() - started
         if outcome.image is not None:
-            self._key = None  # what OUT shows is the picture of no scene
+            self._key = None  # the file is not the picture of a scene now
             started = time.perf_counter()
             outcome.image.save(self.out)
             outcome.save_s = time.perf_counter() - started
             outcome.good, outcome.files = True, [self.out]
             self.drafted(outcome)
 
-    def _open(self, found: Diagnostics) -> Clip:
+    def _open(self, diagnostics: Diagnostics) -> Clip:
         defines = Defines(self.source.values)
-        clip = Clip(replace(self.source, params=defines), found)
-        # what a broken scene imports is half known: go on watching what it did
-        known = self.paths[1:] if found.errors else ()
+        clip = Clip(replace(self.source, params=defines), diagnostics)
+        # a broken scene's imports are only partly known: go on watching the previous ones
+        known = self.paths[1:] if diagnostics.errors else ()
         self.paths = tuple(dict.fromkeys((self.paths[0], *clip.wanted, *known)))
         self.seen = stamps(self.paths)
-        defines.report_unused(found)
+        defines.report_unused(diagnostics)
         _ = clip.first
         return clip
 
     def _film(
         self, painter: Painter, target: Target, numbers: range, outcome: Outcome, before: Stamps
     ) -> None:
-        made = make(painter, target, numbers, progress=checking(before))
-        outcome.good, outcome.files = True, made.files
-        outcome.compile_s, outcome.draw_s, outcome.save_s = made.compile_s, made.draw_s, made.encode_s
+        run = make(painter, target, numbers, progress=checking(before))
+        outcome.good, outcome.files = True, run.files
+        outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
 
 
 # ---------------------------------------------------------------- waiting for changes
 
 
 def checking(before: Stamps) -> Callable[[object], None]:
-    """What raises `Outdated`, called now and then, as soon as files are not as they were ``before``."""
+    """Return a function to call now and then; it raises `Outdated` once files differ from ``before``."""
     looked = time.monotonic()
 
     def check(_: object) -> None:
@@ -189,24 +189,24 @@ def checking(before: Stamps) -> Callable[[object], None]:
 
 
 def stamps(paths: Collection[Path]) -> Stamps:
-    """What tells each file's contents apart without reading them; None where there is no file."""
-    found: Stamps = dict.fromkeys(paths)
+    """Time, size and identity of each file, which change with its contents; None without a file."""
+    result: Stamps = dict.fromkeys(paths)
     for path in paths:
         with contextlib.suppress(OSError):
             stat = path.stat()
-            found[path] = stat.st_mtime_ns, stat.st_size, stat.st_ino
-    return found
+            result[path] = stat.st_mtime_ns, stat.st_size, stat.st_ino
+    return result
 
 
 def wait(before: Stamps) -> None:
-    """Return as soon as any file is not as it was before it was read, and has come to rest."""
+    """Wait until a file differs from ``before`` and has stopped changing."""
     while stamps(before) == before:
         time.sleep(LOOK_S)
     settle(before)
 
 
 def settle(paths: Collection[Path]) -> None:
-    """Wait until files have stopped changing; longer for one that is gone or empty, but not for ever."""
+    """Wait until files have stopped changing; longer where one is missing or empty, but not forever."""
     started = time.monotonic()
     last = stamps(paths)
     while True:
@@ -224,8 +224,8 @@ def settle(paths: Collection[Path]) -> None:
 
 Show = Literal["auto", "never", "always"]
 
-_CLEAR = "\x1b[2J\x1b[H"  # the screen, not what was scrolled off it
-_LINES = 5  # of text, beside the picture
+_CLEAR = "\x1b[2J\x1b[H"  # of the screen, not of lines that were scrolled off
+_LINES = 5  # lines of text next to the picture
 
 
 class Screen:
@@ -238,11 +238,11 @@ class Screen:
 
     @property
     def shows(self) -> bool:
-        """Whether pictures are shown."""
+        """True where pictures are shown."""
         return self._shown is not None
 
     def clear(self) -> None:
-        """Begin anew on a terminal, so that what stands there is what is so."""
+        """Clear a terminal's screen."""
         if self.terminal:
             self._write(_CLEAR)
 
@@ -250,14 +250,14 @@ class Screen:
         """Print a line."""
         self._write(line + "\n")
 
-    def say_diagnostics(self, found: list[Diagnostic]) -> None:
+    def say_diagnostics(self, diagnostics: list[Diagnostic]) -> None:
         """Print diagnostics with carets."""
         from scenelang.language.reports import render_text
 
-        self._write(render_text(found, self.colour))
+        self._write(render_text(diagnostics, self.colour))
 
     def show(self, picture: PIL.Image.Image) -> None:
-        """Show a picture, no larger than the screen; where a terminal misbehaves, say so once and go on."""
+        """Show a picture, no larger than the screen; after an error report it once and show no more."""
         if self._shown is None:
             return
         try:
@@ -289,7 +289,7 @@ class Screen:
 
 
 def _find(show: Show) -> Any:
-    """How this terminal shows pictures; None where it cannot, or the library is missing."""
+    """The class that shows pictures in this terminal; None where none can, or the library is missing."""
     try:
         # asks the terminal, which answers through standard input
         if not sys.stdin.isatty() or not sys.stdout.isatty():

@@ -1,7 +1,7 @@
-"""The workers of a dask cluster: a connection to them, and that they give what this machine does.
+"""Workers of a dask cluster: a connection to them, and a check that they give the results of this machine.
 
-Dask sends functions of ours by their names, and what they take and give by pickle, so that whoever reaches a
-scheduler runs code on its workers; what is sent are bytes of files and plain data.
+Dask sends functions by name, and their arguments and results by pickle, so that anyone who reaches a
+scheduler can run code on its workers. We send only bytes of files and plain data.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 
 LOCAL: Final = "local"
-AHEAD: Final = 3  # tasks under way for each worker
-LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, and what is in them
-_LARGE: Final = "distributed.admin.large-graph-warning-threshold"  # bytes that it warns of
-WAIT_S: Final = 30.0  # for a scheduler to answer, and for workers
-_END_S: Final = 2.0  # for workers of this machine to end by themselves
+AHEAD: Final = 3  # pending tasks of each worker
+LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, with their contents
+_LARGE: Final = "distributed.admin.large-graph-warning-threshold"  # bytes from which it warns
+WAIT_S: Final = 30.0  # longest wait for a scheduler to answer, and for workers
+_END_S: Final = 2.0  # longest wait for workers of this machine to end by themselves
 _HARMLESS: Final = ("python", "processor")
-"""What differs without a difference in pixels, or with one of 1/255 at most."""
+"""Facts whose differences change pixels by 1/255 at most."""
 _NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
 K = TypeVar("K")
 T = TypeVar("T")
@@ -41,19 +41,19 @@ R = TypeVar("R")
 
 
 class GivenUp(RenderError):
-    """Several workers ended over something that was sent, one after another."""
+    """Several workers ended over one task, one after another."""
 
 
 class Link:
-    """A connection to workers that give what this machine does.
+    """Connection to workers that give the results of this machine.
 
     Args:
         address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
             machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
-        libraries: packages whose versions count, besides those that draw.
+        libraries: packages whose versions must agree, besides those that draw.
 
     Raises:
-        RenderError: there is no dask, no scheduler or no worker, or a worker would give something else.
+        RenderError: there is no dask, scheduler or worker, or a worker would give other results.
     """
 
     def __init__(self, address: str, libraries: tuple[str, ...] = ()) -> None:
@@ -62,9 +62,9 @@ class Link:
             import distributed
         except ModuleNotFoundError:
             raise RenderError("a cluster needs dask: pip install 'scenelang[dask]'") from None
-        for name in ("distributed", "distributed.client"):  # what matters of what they say is raised
+        for name in ("distributed", "distributed.client"):  # important messages are raised as errors
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        dask.config.set({LOGGED: 1, _LARGE: 1 << 40})  # else what was sent stays in memory, and is warned of
+        dask.config.set({LOGGED: 1, _LARGE: 1 << 40})  # else arguments stay in memory and cause warnings
         self.address = address
         self._libraries = libraries
         self._own: _Local | None = None
@@ -72,7 +72,7 @@ class Link:
             if address.partition(":")[0] == LOCAL:
                 self._own = _Local(address)
             where = self._own.address if self._own else address
-            # in two steps, as one that does not come about has to be closed too: it would hold up the end
+            # in two steps, as a client that fails to connect must be closed too: it would delay our exit
             self._client: Client = distributed.Client.__new__(distributed.Client)
             self._client.__init__(where, timeout=WAIT_S, set_as_default=False)  # type: ignore[misc]
             self._client.wait_for_workers(self._own.count if self._own else 1, timeout=WAIT_S)
@@ -88,28 +88,28 @@ class Link:
 
     @property
     def count(self) -> int:
-        """Workers that there were a few seconds ago."""
+        """Number of workers a few seconds ago."""
         known: int = self._client._scheduler_identity.get("n_workers", 0)  # asking would wait for an answer
         return known or self._first
 
     @property
     def ready(self) -> bool:
-        """Whether `next` need not wait."""
+        """True where `next` returns at once."""
         return bool(self._done.has_ready())
 
     def send(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Have a function of ours called by a worker, after it has compared fingerprints."""
+        """Submit a call of one of our functions; the worker compares fingerprints first."""
         ours = self._libraries, fingerprint(self._libraries)
         future = self._client.submit(_checked, *ours, function, *arguments, pure=False)
         self._done.add(future)
         return future
 
     def next(self) -> Future[Any]:
-        """What was sent and is done next."""
+        """Wait for the next task that is done."""
         return next(self._done)
 
     def result(self, future: Future[Any]) -> Any:
-        """What something gave that is done; raises what it raised.
+        """Result of a task that is done; raises the exception of the task.
 
         Raises:
             GivenUp: several workers ended over it.
@@ -128,16 +128,16 @@ class Link:
             ) from None
 
     def close(self) -> None:
-        """Call off what is under way; workers of this machine end."""
+        """Cancel pending tasks and end workers of this machine."""
         with contextlib.suppress(Exception):  # there may be none yet, or none any more
             self._client.close(timeout=2)
         if self._own is not None:
             self._own.close()
 
     def _compare(self) -> int:
-        """How many workers there are; raises `RenderError` where one would give something else."""
-        found = self._client.run(look, self._libraries, on_error="return")
-        for address, theirs in found.items():
+        """Number of workers; raises `RenderError` where one would give other results."""
+        result = self._client.run(look, self._libraries, on_error="return")
+        for address, theirs in result.items():
             if not isinstance(theirs, dict):
                 raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
             fatal, harmless = differences(fingerprint(self._libraries), theirs)
@@ -145,7 +145,7 @@ class Link:
                 raise RenderError(f"worker {address} has {fatal[0]}")
             for fact in harmless:
                 logging.getLogger("scenelang").warning("worker %s has %s", address, fact)
-        return len(found)
+        return len(result)
 
 
 def by_workers(
@@ -154,15 +154,15 @@ def by_workers(
     items: Iterable[tuple[K, T]],
     libraries: tuple[str, ...] = (),
 ) -> Iterator[tuple[K, Callable[[], R]]]:
-    """A function of ours on many items, by workers.
+    """Map one of our functions over items, by workers.
 
     Args:
         address, libraries: as for `Link`.
-        items: what the function takes, each with a name; the next is asked for when it can be sent.
+        items: arguments with their names; the next one is taken when it can be sent.
 
     Yields:
-        The names, in whatever order items are done, and what gives a result, or raises as `Link.result`; it
-        is to be called before the next is asked for.
+        Names in the order in which items are done, each with a function that returns the result or raises as
+        `Link.result`, to be called before the next name is taken.
 
     Raises:
         RenderError: as `Link`.
@@ -186,7 +186,7 @@ def by_workers(
 
 
 class _Local:
-    """A scheduler in this process and a worker for each core, which listen to this machine alone.
+    """A scheduler in this process and a worker for each core, reachable from this machine alone.
 
     Workers are plain processes: those that dask starts by itself run an embedder's main module again.
     """
@@ -212,14 +212,14 @@ class _Local:
         ]
 
     def close(self) -> None:
-        """End all of it; dask would let tasks of seconds come to their end."""
+        """Stop all of it at once; dask would wait for running tasks."""
         for worker in self._workers:
             worker.terminate()
         latest = time.monotonic() + _END_S
         for worker in self._workers:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 worker.wait(max(0.0, latest - time.monotonic()))
-            worker.kill()  # what it began ends with it
+            worker.kill()  # also ends its own processes
             worker.wait()
         self._cluster.close()
 
@@ -228,13 +228,13 @@ def _told(error: object) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-# ---------------------------------------------------------------- what runs on workers
+# ---------------------------------------------------------------- on workers
 
 
 def _checked(
     libraries: tuple[str, ...], ours: dict[str, str], function: Callable[..., Any], *arguments: Any
 ) -> Any:
-    """Call a function where the fingerprint of who asks is that of this machine."""
+    """Call a function if the fingerprint of the caller is that of this machine."""
     fatal, _ = differences(ours, fingerprint(libraries))
     if fatal:
         raise RenderError(f"a worker has {fatal[0]}")
@@ -243,37 +243,37 @@ def _checked(
 
 @cache
 def fingerprint(libraries: tuple[str, ...] = ()) -> dict[str, str]:
-    """What decides results on this machine: versions, digests of the code and of each model's weights.
+    """Facts that determine results on this machine: versions, digests of the code and of models' weights.
 
     Args:
-        libraries: packages whose versions are wanted too.
+        libraries: further packages whose versions count.
     """
-    found = {"python": platform.python_version(), "processor": platform.machine()}
+    result = {"python": platform.python_version(), "processor": platform.machine()}
     for name in (*_NEEDED, *libraries):
         try:
-            found[name] = version(name)
+            result[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "none"
+            result[name] = "none"
     package = MODELS.parent
     code = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
         code.update(file.relative_to(package).as_posix().encode() + file.read_bytes())
-    found["scenelang's code"] = code.hexdigest()[:12]
+    result["scenelang's code"] = code.hexdigest()[:12]
     for weights in sorted(MODELS.glob("*/weights.safetensors")):
-        found[f"weights of {weights.parent.name}"] = hashlib.sha256(weights.read_bytes()).hexdigest()[:12]
-    return found
+        result[f"weights of {weights.parent.name}"] = hashlib.sha256(weights.read_bytes()).hexdigest()[:12]
+    return result
 
 
 def look(libraries: tuple[str, ...] = ()) -> dict[str, str]:
-    """The fingerprint of the machine where it is called."""
+    """The fingerprint of the machine on which it runs."""
     return fingerprint(libraries)
 
 
 def differences(ours: dict[str, str], theirs: dict[str, str]) -> tuple[list[str], list[str]]:
-    """What a worker has otherwise, in words: what changes results, and what hardly does."""
-    found: tuple[list[str], list[str]] = [], []
+    """Differences of a worker in words: those that change results, and those that hardly do."""
+    result: tuple[list[str], list[str]] = [], []
     for name in sorted(ours.keys() | theirs.keys()):
         here, there = ours.get(name, "none"), theirs.get(name, "none")
         if here != there:
-            found[name in _HARMLESS].append(f"{name} {there}, where {here} is here")
-    return found
+            result[name in _HARMLESS].append(f"{name} {there}, where {here} is here")
+    return result

@@ -13,7 +13,7 @@ pytest.importorskip("igl")
 
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.inverse import sandbox
-from scenelang.inverse.sandbox import Apart
+from scenelang.inverse.sandbox import SandboxProcess
 
 CODE = sandbox._CODE
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="has no such bounds")
@@ -30,7 +30,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Any:
             sandbox, "_CODE", f"{start}sandbox.READ_S = {read_s}\nsandbox.MEGABYTE_S = 0\n{work}"
         )
         heard: list[Any] = []
-        with Apart() as process:
+        with SandboxProcess() as process:
             answers = [process({"cpu_s": cpu_s}, b"abc", {"say": heard.append}) for _ in range(2)]
         assert answers[0] == answers[1]
         return answers[0], heard

@@ -20,7 +20,7 @@ from scenelang.assets.zoo import load_zoo
 from scenelang.cli.main import cli
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.inverse import learn as learning
-from scenelang.inverse.learn import Wish, learn_files
+from scenelang.inverse.learn import LearnOptions, learn_files
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_a_budget_is_recorded_as_steps(folder: Path) -> None:
 
 
 def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    make, fitted = learning.Apart.__call__, []
+    make, fitted = learning.SandboxProcess.__call__, []
 
     def stopped(self: Any, request: Any, *given: Any) -> bytes:
         fitted.append(request["name"])
@@ -121,7 +121,7 @@ def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch:
             raise KeyboardInterrupt
         return make(self, request, *given)
 
-    monkeypatch.setattr(learning.Apart, "__call__", stopped)
+    monkeypatch.setattr(learning.SandboxProcess, "__call__", stopped)
     files, stops = ["star.svg", "a-ball.ply"], "a_ball"
     with pytest.raises(KeyboardInterrupt):
         learn_files(files, "z.safetensors")
@@ -130,19 +130,19 @@ def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch:
     learn_files(files, "z.safetensors")
     assert fitted == ["star", "a_ball", "a_ball"]
     whole = Path("z.safetensors").read_bytes()
-    for wish, again in (
-        (Wish(), 0),
-        (Wish(steps=1), 0),
-        (Wish(license="MIT"), 1),
-        (Wish(max_error=0.02), 1),
-        (Wish(max_error=0.02), 0),
-        (Wish(max_error=1e-9, steps=1), 1),
-        (Wish(max_error=1e-9, steps=1), 0),
-        (Wish(), 1),
+    for options, again in (
+        (LearnOptions(), 0),
+        (LearnOptions(steps=1), 0),
+        (LearnOptions(license="MIT"), 1),
+        (LearnOptions(max_error=0.02), 1),
+        (LearnOptions(max_error=0.02), 0),
+        (LearnOptions(max_error=1e-9, steps=1), 1),
+        (LearnOptions(max_error=1e-9, steps=1), 0),
+        (LearnOptions(), 1),
     ):
         fitted.clear()
-        learn_files(["a-ball.ply"], "z.safetensors", wish)
-        assert len(fitted) == again, wish
+        learn_files(["a-ball.ply"], "z.safetensors", options)
+        assert len(fitted) == again, options
     assert Path("z.safetensors").read_bytes() == whole
     Path("a-ball.ply").write_bytes(Path("2 boxes.stl").read_bytes())
     with pytest.raises(FitError, match="damaged"):

@@ -18,7 +18,7 @@ from scenelang.drawing.exact.mesh import mesh_of
 from scenelang.drawing.exact.originals import FOLDER
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.render import exact_graph
-from scenelang.inverse.learn import Wish, learn_files
+from scenelang.inverse.learn import LearnOptions, learn_files
 from tests.pictures import psnr_db
 
 CUBE = 3**-0.5  # half a side of the one in the unit ball
@@ -41,7 +41,9 @@ class Cube:
 def folder(tmp_path: Path) -> Path:
     trimesh.creation.box((2, 2, 2)).export(tmp_path / "cube.obj")
     (tmp_path / "tile.svg").write_text(SQUARE)
-    learn_files([tmp_path / "cube.obj", tmp_path / "tile.svg"], tmp_path / "zoo.safetensors", Wish(steps=1))
+    learn_files(
+        [tmp_path / "cube.obj", tmp_path / "tile.svg"], tmp_path / "zoo.safetensors", LearnOptions(steps=1)
+    )
     return tmp_path
 
 

@@ -18,7 +18,7 @@ from scenelang.assets.zoo import load_zoo
 from scenelang.drawing.exact import originals
 from scenelang.drawing.exact.mesh import FitError, Mesh, read_solids, whole
 from scenelang.inverse import learn as making
-from scenelang.inverse.learn import Wish, learn_files
+from scenelang.inverse.learn import LearnOptions, learn_files
 
 RED, BLUE = [255, 0, 0, 255], [0, 0, 255, 255]
 
@@ -118,7 +118,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
     (tmp_path / "car.glb").write_bytes(car)
     out = tmp_path / "zoo.safetensors"
     said: list[str] = []
-    made = learn_files([tmp_path / "car.glb"], out, Wish(steps=2, parts=True), say=said.append)
+    made = learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
     zoo = load_zoo(out)
     assert {*zoo.geometries} == {"car", *(part.geometry for part in zoo.groups["car"])}
     assert {element.name for element in made} == {*zoo.geometries}
@@ -127,9 +127,9 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
         points, *_ = shape.surface(100)
         assert abs(shape.distances(points)).max() < 1e-6
         assert shape.size == pytest.approx(element.about["size"]), name
-    learn_files([tmp_path / "car.glb"], out, Wish(steps=2, parts=True), say=said.append)
+    learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
     assert said[-1] == "car: made before of this file"
-    learn_files([tmp_path / "car.glb"], out, Wish(steps=1))
+    learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=1))
     assert load_zoo(out).groups["car"] == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)
     with pytest.raises(FitError, match="no part 9"):
         originals.shape_in(car, ".glb", "auto", 9)
@@ -141,9 +141,9 @@ def test_a_part_that_encloses_nothing_is_left_out() -> None:
     scene.add_geometry(sheet, node_name="sheet")
     said: list[Any] = []
     request: dict[str, Any] = {"suffix": ".glb", "name": "a", "about": {}, "files": {}}
-    wish = {"steps": 1, "parts": True}
+    options = {"steps": 1, "parts": True}
     made = making.make(
-        {**request, "wish": wish}, scene.export(file_type="glb"), lambda *told: said.append(told)
+        {**request, "options": options}, scene.export(file_type="glb"), lambda *told: said.append(told)
     )
     assert any("a_sheet: left out" in told[1] for told in said if told[0] == "say")
     assert b"a_geometry_0" in made
@@ -218,7 +218,7 @@ def test_a_drawing_is_parts_in_its_colours(tmp_path: Path) -> None:
     shapes = "".join(f'<rect fill="{c}" x="{x}" y="{y}" width="{a}" height="{a}"/>' for c, x, y, a in rows)
     (tmp_path / "logo.svg").write_text(f"<svg>{shapes}</svg>")
     out = tmp_path / "zoo.safetensors"
-    learn_files([tmp_path / "logo.svg"], out, Wish(steps=1))
+    learn_files([tmp_path / "logo.svg"], out, LearnOptions(steps=1))
     zoo = load_zoo(out)
     assert list(zoo.geometries) == ["logo", "logo_1", "logo_2"]
     first, second = zoo.groups["logo"]
@@ -228,5 +228,5 @@ def test_a_drawing_is_parts_in_its_colours(tmp_path: Path) -> None:
     assert second.size == pytest.approx(8**0.5 / half)
     shape = originals.shape_in((tmp_path / "logo.svg").read_bytes(), ".svg", "auto", 2)
     assert shape.size == pytest.approx(8**0.5)
-    learn_files([tmp_path / "logo.svg"], out, Wish(steps=1, parts=False))
+    learn_files([tmp_path / "logo.svg"], out, LearnOptions(steps=1, parts=False))
     assert "logo" not in load_zoo(out).groups

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from scenelang.inverse import search
-from scenelang.inverse.search import Axis, Found, Knob, Space
+from scenelang.inverse.search import Axis, Found, Knob, SearchBox
 
 
-def box(*wraps: bool) -> Space:
+def box(*wraps: bool) -> SearchBox:
     axes = tuple(Axis(f"p{at}", wraps=one) for at, one in enumerate(wraps))
-    return Space([Knob(None, 0.0, axes, True)])  # type: ignore[arg-type]
+    return SearchBox([Knob(None, 0.0, axes, True)])  # type: ignore[arg-type]
 
 
 def narrow(u: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.inverse.problem import Moment
-from scenelang.inverse.search import Space, space_of
+from scenelang.inverse.search import SearchBox, space_of
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source, rewritten
 from scenelang.language.parser import parse
@@ -32,7 +32,7 @@ def source(text: str = TEXT) -> Moment:
     return Moment(Source(text=SourceFile("a.nsg", text)).parsed(Diagnostics()))
 
 
-def box(text: str = TEXT, names: tuple[str, ...] = ()) -> Space:
+def box(text: str = TEXT, names: tuple[str, ...] = ()) -> SearchBox:
     return space_of(source(text).evaluated({})[0], names)
 
 

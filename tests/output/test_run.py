@@ -16,7 +16,7 @@ from PIL import Image
 import scenelang as nsg
 from scenelang.drawing.how import How
 from scenelang.language.evaluation import Source
-from scenelang.output import animate, painting
+from scenelang.output import animate
 from scenelang.output.animate import Progress, make
 from scenelang.output.frames import Busy, Clip, Store, find_target
 from scenelang.output.painting import Painter
@@ -142,7 +142,7 @@ def test_no_more_processes_than_frames_or_cores(
         raise Enough(count)
 
     monkeypatch.setattr(animate, "usable_cores", lambda: cores)
-    monkeypatch.setattr(painting, "Workers", start)
+    monkeypatch.setattr(animate, "Workers", start)
     with pytest.raises(Enough, match=f"^{taken}$"):
         nsg.animate(write(tmp_path), tmp_path / "a-%d.png", frames=range(4), size=SMALL, jobs=256)
     one = nsg.animate(write(tmp_path), tmp_path / "b-%d.png", frames=range(1), size=SMALL, jobs=256)

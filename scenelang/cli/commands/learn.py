@@ -111,21 +111,23 @@ def command(
     """
     from scenelang.assets.zoo import SUFFIX, load_zoo
     from scenelang.drawing.exact.mesh import FitError
-    from scenelang.inverse.learn import Wish, learn_files, names_of
+    from scenelang.inverse.learn import LearnOptions, learn_files, names_of
 
     if not out.endswith(SUFFIX):
         raise click.UsageError(f"`{out}` does not end in {SUFFIX}.")
     if preview is not None:
         targets(["preview"], preview)
     try:
-        wish = Wish(sign, max_error, budget, steps, license, source, pictures, texels, parts, color_error)
-        names_of(files, wish, name)
+        options = LearnOptions(
+            sign, max_error, budget, steps, license, source, pictures, texels, parts, color_error
+        )
+        names_of(files, options, name)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            learn_files(files, out, wish, name=name, cluster=cluster, say=say, progress=bar)
+            learn_files(files, out, options, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
         for line in str(error).split("\n"):
             say_trouble(line)
