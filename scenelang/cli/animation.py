@@ -76,16 +76,18 @@ class Film(Record):
             raise click.UsageError(f"{error}.") from None
 
 
-def moves(found: Input, target: Target, film: Film, out: str) -> bool:
+def moves(scene_input: Input, target: Target, film: Film, out: str) -> bool:
     """True where a scene is drawn as an animation and not as one picture; reports where it cannot be.
 
     Raises `click.UsageError` where ``out`` cannot hold a picture.
     """
-    if found.diagnostics.errors or (found.evaluation is not None and found.evaluation.animates):
+    if scene_input.diagnostics.errors or (
+        scene_input.evaluation is not None and scene_input.evaluation.animates
+    ):
         return True
     if film.certain:
         which = "--frames" if film.frames != FrameRange() else "--fps"
-        found.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
+        scene_input.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
         return True
     if target.kind == "sequence":
         return "%" in out
@@ -98,7 +100,7 @@ def moves(found: Input, target: Target, film: Film, out: str) -> bool:
 
 
 def animate(
-    found: Input,
+    scene_input: Input,
     target: Target,
     film: Film,
     how: How,
@@ -110,7 +112,7 @@ def animate(
     """Draw an animation and give the exit code.
 
     Args:
-        found: the scene.
+        scene_input: the scene.
         out: the target, as the user wrote it.
         outputs: to write beside each picture.
         strict: count warnings as errors.
@@ -122,8 +124,8 @@ def animate(
     from scenelang.output.animate import make
     from scenelang.output.painting import Painter
 
-    started, told = time.perf_counter(), found.diagnostics
-    drawn = found.evaluation or ((found.scene,) if found.scene is not None else ())
+    started, told = time.perf_counter(), scene_input.diagnostics
+    drawn = scene_input.evaluation or ((scene_input.scene,) if scene_input.scene is not None else ())
     if told.errors or not drawn:
         say_diagnostics(told)
         return 1
@@ -200,15 +202,15 @@ BESIDE = ("depth", "normal", "object", "alpha", "scene", "program")
 
 def _grid(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
     """NAME=VALUES, or NAME alone; several times."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for text in given:
         name, _, values = (part.strip() for part in text.partition("="))
         if not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise click.BadParameter(f"`{text}` is not NAME=VALUES", ctx, param)
-        if name in found:
+        if name in result:
             raise click.BadParameter(f"`{name}` is given twice", ctx, param)
-        found[name] = values
-    return found
+        result[name] = values
+    return result
 
 
 def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:

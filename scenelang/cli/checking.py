@@ -64,10 +64,10 @@ class Scenes(Record, frozen=False):
         request = replace(self.request, source=own)
         parts, self.unseen = [self.unread.items], 0
         for name, source in sources.items():
-            found = read_input(name, request, text=source)
-            facts = found.tree, found.evaluation, found.scene, found.spans, found.diagnostics
+            result = read_input(name, request, text=source)
+            facts = result.tree, result.evaluation, result.scene, result.spans, result.diagnostics
             self.unseen += check_evaluated(*facts, frames=self.frames)
-            parts.append(found.diagnostics.items)
+            parts.append(result.diagnostics.items)
         parts.append(unused_defines(request))
         every = merged(parts)
         every.items[:] = [d for d in every.items if self.selection.keeps(d)]

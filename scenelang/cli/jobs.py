@@ -31,23 +31,23 @@ if TYPE_CHECKING:
 PROGRAM = ".safetensors"
 
 
-def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
+def compile_input(job: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
     """Compile a scene, if it is one without errors that is not drawn by the reference; ``graphs`` are kept.
 
     Raises:
         OSError: a model has no weights.
     """
-    if found.scene is None or found.how.backend == "reference":
+    if job.scene is None or job.how.backend == "reference":
         return
     with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
-        found.program = compile_scene(
-            found.scene,
-            spans=found.spans,
-            diagnostics=found.diagnostics,
-            after=found.graphs.__setitem__ if graphs else None,
+        job.program = compile_scene(
+            job.scene,
+            spans=job.spans,
+            diagnostics=job.diagnostics,
+            after=job.graphs.__setitem__ if graphs else None,
         )
-        why = why_chosen(found.scene, request.source.model is not None)
-        found.notes = program_notes(found.program, why)
+        why = why_chosen(job.scene, request.source.model is not None)
+        job.notes = program_notes(job.program, why)
 
 
 def prepare_all(
@@ -78,25 +78,25 @@ def prepare_all(
     for name in files:
         try:
             if name.endswith(PROGRAM):
-                found = _stored(name, request, clock, how)
-                found.trouble = stored or found.trouble
+                result = _stored(name, request, clock, how)
+                result.trouble = stored or result.trouble
             else:
-                found = first or read_input(name, request, clock, how)
-                compile_input(found, request, clock, graphs)
+                result = first or read_input(name, request, clock, how)
+                compile_input(result, request, clock, graphs)
         except OSError as error:
             say_trouble(describe(error))
             inputs.append(None)
             code = 2
             continue
-        if found.trouble is not None:
-            say_trouble(f"{name}: {found.trouble}")
-        inputs.append(found)
-    read = [found for found in inputs if found is not None]
+        if result.trouble is not None:
+            say_trouble(f"{name}: {result.trouble}")
+        inputs.append(result)
+    read = [result for result in inputs if result is not None]
     unused = unused_defines(request) if read else []
-    say_diagnostics(merged([*(found.diagnostics.items for found in read), unused]))
+    say_diagnostics(merged([*(result.diagnostics.items for result in read), unused]))
     if unused:
         return [None] * len(inputs), max(code, 1)
-    return inputs, max(code, int(any(found.failed(strict) for found in read)))
+    return inputs, max(code, int(any(result.failed(strict) for result in read)))
 
 
 def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
@@ -109,36 +109,36 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> In
     if name.endswith(PROGRAM):
         raise click.UsageError(f"`{name}` is a compiled program already.")
     clock = clock or Clock()
-    found = read_input(name, request, clock)
-    compile_input(found, request, clock, graphs=True)
-    found.diagnostics.items.extend(unused_defines(request))
-    say_diagnostics(found.diagnostics)
-    return found
+    result = read_input(name, request, clock)
+    compile_input(result, request, clock, graphs=True)
+    result.diagnostics.items.extend(unused_defines(request))
+    say_diagnostics(result.diagnostics)
+    return result
 
 
 def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
     from scenelang.compiler.program import ProgramError, load_program
 
-    found, size, model = Input(name, how), request.source.size, request.source.model
+    result, size, model = Input(name, how), request.source.size, request.source.model
     try:
         with clock("load program"):
             program = load_program(Path(name))
     except ProgramError as error:
-        found.trouble = str(error)
-        return found
+        result.trouble = str(error)
+        return result
     if model not in (None, program.model):
-        found.trouble = f"compiled for model `{program.model}`, not `{model}`"
+        result.trouble = f"compiled for model `{program.model}`, not `{model}`"
     elif request.frame:
-        found.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
+        result.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
     elif size is not None:
         (width, height), (old_width, old_height) = size, program.canvas
         if width * old_height != height * old_width:
             old = f"the {old_width}x{old_height} it was compiled for"
             advice = "objects outside it are gone: compile the scene again"
-            found.trouble = f"{width}x{height} has another shape than {old}; {advice}"
+            result.trouble = f"{width}x{height} has another shape than {old}; {advice}"
         program = replace(program, canvas=size)
-    found.program, found.notes = program, program_notes(program, "named by the program")
-    return found
+    result.program, result.notes = program, program_notes(program, "named by the program")
+    return result
 
 
 def program_notes(program: Program, why: str) -> list[str]:
@@ -362,15 +362,15 @@ def _chosen(
             able.append(point)
         elif point.offered:  # the others are for charts only
             refused[point.name] = why
-    found = offers(able, load_of(program), program.canvas, scale)
+    result = offers(able, load_of(program), program.canvas, scale)
     while True:
-        choice = choose(found, limits, refused)
+        choice = choose(result, limits, refused)
         point = choice.offer.point
         compiled = _compiled(job, program, point)
         if not isinstance(compiled, str):
             return choice, compiled
-        refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
-        found = [offer for offer in found if offer.point.model != point.model]
+        refused |= {o.point.name: compiled for o in result if o.point.model == point.model}
+        result = [offer for offer in result if offer.point.model != point.model]
 
 
 def _compiled(job: Input, program: Program, point: Point) -> Program | str:
@@ -381,11 +381,11 @@ def _compiled(job: Input, program: Program, point: Point) -> Program | str:
     from scenelang.language.diagnostics import Diagnostics
 
     assert job.scene is not None
-    found = Diagnostics()
+    result = Diagnostics()
     try:
-        made = compile_scene(job.scene, spans=job.spans, diagnostics=found, model=point.model)
+        made = compile_scene(job.scene, spans=job.spans, diagnostics=result, model=point.model)
     except SceneError:
-        return found.errors[0].message
+        return result.errors[0].message
     told = {d.code for d in job.diagnostics}
     # a warning that the scene's own model does not give: this one is outside what it was trained on
-    return next((d.message for d in found.items if d.code not in told), made)
+    return next((d.message for d in result.items if d.code not in told), made)

@@ -77,11 +77,11 @@ def check_frames(
         scene, spans = evaluation.run(frame)
         if scene is None or (last is not None and same_nodes(scene, last)):
             continue
-        last, found = scene, Diagnostics()
-        check_compiles(scene, spans, found, after=after, memory=memory)
+        last, result = scene, Diagnostics()
+        check_compiles(scene, spans, result, after=after, memory=memory)
         known = {d.code for d in diagnostics}
-        name_frame(found, 0, frame)
-        for d in found:
+        name_frame(result, 0, frame)
+        for d in result:
             if d.severity == "error" or d.code not in known:
                 diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
     evaluation.warn_of_zeros()
@@ -180,8 +180,8 @@ def fix_text(
 
     def look(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
         text = SourceFile(name, texts[name])
-        found = _look(Source(text=text, params=params, model=model, root=root), False)
-        return [(name if d.span is not None and d.span.source.name == name else None, d) for d in found]
+        result = _look(Source(text=text, params=params, model=model, root=root), False)
+        return [(name if d.span is not None and d.span.source.name == name else None, d) for d in result]
 
     settled = settle({name: text}, look)
     left = Diagnostics()
@@ -190,13 +190,13 @@ def fix_text(
 
 
 def _look(source: Source, all_frames: bool) -> Diagnostics:
-    found = Diagnostics()
+    result = Diagnostics()
     with suppress(SceneError):  # it is not text
-        source = source.parsed(found)
-        evaluation = source.evaluation(found, replays=True)
+        source = source.parsed(result)
+        evaluation = source.evaluation(result, replays=True)
         scene, spans = evaluation.run(0)
         frames: Frames = "all" if all_frames else "some"
-        scene = None if found.errors else scene
-        check_evaluated(source.tree, evaluation, scene, spans, found, frames=frames)
-    found.items[:] = in_file_order(found.items)
-    return found
+        scene = None if result.errors else scene
+        check_evaluated(source.tree, evaluation, scene, spans, result, frames=frames)
+    result.items[:] = in_file_order(result.items)
+    return result

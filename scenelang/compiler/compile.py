@@ -53,16 +53,16 @@ def compile_scene(
         OSError: the file cannot be opened.
         TypeError: neither a Scene nor a path.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    result = diagnostics if diagnostics is not None else Diagnostics()
     if not isinstance(scene, Scene):
         from scenelang.language.evaluation import opened
 
-        scene, spans = opened(scene, found)
-    manifest = find_model(scene, found, model=model, spans=spans)
+        scene, spans = opened(scene, result)
+    manifest = find_model(scene, result, model=model, spans=spans)
     if manifest is not None:
-        graph = check_scene(scene, spans, found, manifest, after, without, memory)
-    if manifest is None or found.errors:
-        raise SceneError(found)
+        graph = check_scene(scene, spans, result, manifest, after, without, memory)
+    if manifest is None or result.errors:
+        raise SceneError(result)
     # Lifting is what needs numpy; scenes that are only checked or have errors never come this far.
     from scenelang.compiler.emit import emit
     from scenelang.compiler.weights import load_codes

@@ -61,14 +61,14 @@ def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
 
 def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:
     """The paints that rows wear, each once in the order of its first row, and which of them each wears."""
-    found: dict[Paint, int] = {}
+    result: dict[Paint, int] = {}
     known: dict[int, int] = {}
     for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
         known[id(look)] = -1
         if look.element is not None:
             steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
-            known[id(look)] = found.setdefault(Paint(look.element, tuple(steps)), len(found))
-    return tuple(found), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
+            known[id(look)] = result.setdefault(Paint(look.element, tuple(steps)), len(result))
+    return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
 
 
 def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
@@ -122,7 +122,7 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
 
 def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     """Boxes (N, 4) of the plane, or balls of space; outside a row makes no difference."""
-    found: list[Bound | None] = []
+    result: list[Bound | None] = []
 
     def bound(fold: Fold, later: Later, joins: bool) -> None:
         for index in range(len(fold.links) - 1, -1, -1):
@@ -132,15 +132,15 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
                 bound(link.node, own, link.op == "intersect")
             else:
                 everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
-                found.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+                result.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
             later = later.before(link.op, link.width)
 
     bound(graph.root, Later(), False)
     whole = graph.window()[:4]
     if graph.stage is not None:
-        reach = max((hypot(*b[:3]) + b[3] for b in found if b is not None), default=0.0)
+        reach = max((hypot(*b[:3]) + b[3] for b in result if b is not None), default=0.0)
         whole = 0.0, 0.0, 0.0, reach * (1.0 + 2.0**-20)
-    exact = np.array([b or whole for b in found[::-1]], dtype=np.float64).reshape(len(found), 4)
+    exact = np.array([b or whole for b in result[::-1]], dtype=np.float64).reshape(len(result), 4)
     most = np.finfo(np.float32).max
     rounded = np.clip(exact, -most, most).astype(np.float32)
     if graph.stage is not None:

@@ -81,15 +81,15 @@ class Look(Record):
 
 def colour_steps(ops: Iterable[MaterialOp]) -> tuple[ColourStep, ...]:
     """The operations on a colour among those of a material."""
-    found: list[ColourStep] = []
+    result: list[ColourStep] = []
     for op in ops:
         if isinstance(op, Color):
-            found.append(("color", *op.rgb))
+            result.append(("color", *op.rgb))
         elif isinstance(op, Grayscale):
-            found.append(("grayscale", op.amount))
+            result.append(("grayscale", op.amount))
         elif isinstance(op, Hue):
-            found.append(("hue", op.angle / tau))
-    return tuple(found)
+            result.append(("hue", op.angle / tau))
+    return tuple(result)
 
 
 def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
@@ -97,16 +97,16 @@ def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
 
     What multiplies by shares, or mixes with the luma by a share, stays in [0, 1]; a hue has a period of 1.
     """
-    found: list[ColourStep] = []
+    result: list[ColourStep] = []
     for step in steps:
         joined: ColourStep | None = step
-        if found and found[-1][0] == step[0] and (step[0] == "hue" or _shares(found[-1])):
-            joined = _joined(found.pop(), step)
+        if result and result[-1][0] == step[0] and (step[0] == "hue" or _shares(result[-1])):
+            joined = _joined(result.pop(), step)
         elif step[0] == "hue":
             joined = _joined(("hue", 0.0), step)
         if joined is not None and joined not in _IDLE:
-            found.append(joined)
-    return tuple(found)
+            result.append(joined)
+    return tuple(result)
 
 
 _IDLE: frozenset[ColourStep] = frozenset((("color", 1.0, 1.0, 1.0), ("grayscale", 0.0), ("hue", 0.0)))
@@ -269,7 +269,7 @@ class Graph(Record):
 
     def rows(self) -> list[Row]:
         """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""
-        found: list[Row] = []
+        result: list[Row] = []
         open_folds = [(iter(self.root.links), False)]
         first: Link | None = None  # of a group, before its first leaf
         while open_folds:
@@ -278,7 +278,7 @@ class Graph(Record):
             if link is None:
                 open_folds.pop()
                 if open_folds:
-                    found[-1] = found[-1]._replace(ends=found[-1].ends + 1)
+                    result[-1] = result[-1]._replace(ends=result[-1].ends + 1)
                 continue
             cuts = cut or link.op == "subtract"
             if isinstance(link.node, Fold):
@@ -286,9 +286,9 @@ class Graph(Record):
                 open_folds.append((iter(link.node.links), cuts))
                 continue
             op, k = (link.op, link.k) if first is None else (first.op, first.k)
-            found.append(Row(op, link.node, k, first is not None, 0, cuts))
+            result.append(Row(op, link.node, k, first is not None, 0, cuts))
             first = None
-        return found
+        return result
 
     def window(self) -> Box:
         """The part of the world that decides the picture.

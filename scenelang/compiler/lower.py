@@ -266,7 +266,7 @@ class _Lowering:
         return element
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
-        found = []
+        result = []
         for at, transform in enumerate(node.transforms):
             if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
                 fact = "`displace` does not stand first in the block of an object"
@@ -281,8 +281,8 @@ class _Lowering:
             if isinstance(step, Refusal):
                 self.say(step.code, step.message, transform, step.help)
             else:
-                found.append(Move(step, self.place(transform)))
-        return tuple(found)
+                result.append(Move(step, self.place(transform)))
+        return tuple(result)
 
     def look(self, material: schema.Material) -> Look:
         known = self.looks.get(id(material))

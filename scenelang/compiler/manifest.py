@@ -209,9 +209,9 @@ def load_manifest(name: str) -> Manifest:
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
     known = _READ.get(path)
     if known is None or known[0] != stamp:
-        found = Manifest.from_json(read_regular(path, _MOST_BYTES))
-        if found.name != name:
-            raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
-        known = _READ[path] = stamp, found
+        result = Manifest.from_json(read_regular(path, _MOST_BYTES))
+        if result.name != name:
+            raise ValueError(f"the manifest of `{name}` calls itself `{result.name[:40]}`")
+        known = _READ[path] = stamp, result
     note_input(os.fspath(path))
     return known[1]

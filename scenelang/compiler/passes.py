@@ -102,14 +102,14 @@ def _mild(step: Step) -> bool:
 
 
 def _places(leaf: Leaf) -> list[Label]:
-    found: list[Label] = []
+    result: list[Label] = []
     seen: set[Span] = {leaf.span} if leaf.span else set()
     for move in leaf.moves:
         if move.span is not None and move.span not in seen:
             seen.add(move.span)
             what = "affine from here on" if isinstance(move.step, Affine) else "deforms here"
-            found.append(Label(move.span, what))
-    return found[:8]
+            result.append(Label(move.span, what))
+    return result[:8]
 
 
 Measures = list[tuple[str, float]]
@@ -168,9 +168,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
     for quantity, subject in _SUBJECTS.items():
-        if found := outside.get(quantity):
-            _, value, leaf = max(found, key=itemgetter(0))
-            more = len({id(leaf) for *_, leaf in found}) - 1
+        if result := outside.get(quantity):
+            _, value, leaf = max(result, key=itemgetter(0))
+            more = len({id(leaf) for *_, leaf in result}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
@@ -217,23 +217,23 @@ def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context
 
 def _measures(leaf: Leaf, space: Space) -> Measures:
     smallest, largest = space.stretches(steps.composed(leaf.steps))
-    found = [("scale", smallest), ("scale", largest)]
+    result = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
-        found.append(("thin", largest / smallest))
+        result.append(("thin", largest / smallest))
     if leaf.look.material == "diffuse":
         row = GEOMETRIES.get(leaf.geometry)
-        found.append(("thickness", smallest * (row.thickness if row else inf)))
+        result.append(("thickness", smallest * (row.thickness if row else inf)))
     for step in leaf.steps:
         if isinstance(step, Warp):
             if step.twirl:
-                found.append(("twirl", step.twirl))
+                result.append(("twirl", step.twirl))
             if step.bend != (0.0, 0.0):
-                found.append(("bend", hypot(*step.bend)))
+                result.append(("bend", hypot(*step.bend)))
         elif isinstance(step, Twist):
-            found.append(("twist", step.twist))
+            result.append(("twist", step.twist))
         elif isinstance(step, Displace):
-            found += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
-    return found
+            result += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
+    return result
 
 
 def _texels(leaf: Leaf, graph: Graph) -> Measures:

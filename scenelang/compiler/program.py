@@ -78,7 +78,7 @@ def read_paints(
     Raises:
         TensorError: they do not agree, or name what is not listed.
     """
-    kinds, rows, found, first = list(STEPS), steps.tolist(), [], 0
+    kinds, rows, result, first = list(STEPS), steps.tolist(), [], 0
     if not all(kind in range(len(kinds)) for kind, *_ in rows):
         raise TensorError("a paint with a step that this version does not know")
     for at, count in table.tolist():
@@ -86,11 +86,11 @@ def read_paints(
             raise TensorError("a paint of an element or of steps that are not listed")
         own = rows[first : first + count]
         named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
-        found.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
+        result.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
         first += count
     if first != len(rows):
         raise TensorError("steps that no paint has")
-    return tuple(found)
+    return tuple(result)
 
 
 def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimension: int) -> str | None:
@@ -461,12 +461,12 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
         isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed
     ):
         raise TensorError("its list of elements is damaged")
-    found = []
+    result = []
     for at, (name, entry) in enumerate(listed):
         if (tensor := file.tensors.pop(f"element.{at}", None)) is None:
             raise TensorError(f"element {at} has no bytes")
-        found.append((name, entry, tensor))
-    return read_elements(found, file.body)
+        result.append((name, entry, tensor))
+    return read_elements(result, file.body)
 
 
 def _count(file: TensorFile) -> int:

@@ -105,8 +105,8 @@ def open_weights(data: bytes) -> Weights:
         ModelError: it is damaged, foreign or hostile, or holds numbers that are not finite.
     """
     try:
-        found = read_tensors(data, MOST_BYTES)
-        return Weights(found.header, found.arrays())
+        result = read_tensors(data, MOST_BYTES)
+        return Weights(result.header, result.arrays())
     except TensorError as error:
         raise ModelError(f"damaged weights: {error}") from None
 
@@ -114,9 +114,9 @@ def open_weights(data: bytes) -> Weights:
 def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
     """Raise ModelError where tensors are not those of a network, float32 and of its shapes."""
     for name in sorted(shapes.keys() | arrays.keys()):
-        found = arrays.get(name)
-        if name not in shapes or found is None or found.shape != shapes[name] or found.dtype != "float32":
-            held = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
+        result = arrays.get(name)
+        if name not in shapes or result is None or result.shape != shapes[name] or result.dtype != "float32":
+            held = "is missing" if result is None else f"is {result.dtype} {list(result.shape)}"
             wanted = f"float32 {list(shapes[name])} is needed" if name in shapes else "none is known"
             raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
 
@@ -178,8 +178,8 @@ def _rows(
 ) -> dict[str, tuple[float, ...]]:
     table = tensors.get(key)
     if table is None or table.dtype not in ("float32", "float16") or table.shape != (len(names), side):
-        found = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
+        result = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
         raise ModelError(
-            f"damaged weights: tensor `{key}` {found}; {len(names)} rows of {side} floats are needed"
+            f"damaged weights: tensor `{key}` {result}; {len(names)} rows of {side} floats are needed"
         )
     return {name: tuple(row) for name, row in zip(names, table.tolist(), strict=True)}

@@ -75,10 +75,10 @@ def semantic_tokens(docs: Workspace, document: Document, place: types.Range | No
     low, high = 0, len(document.text)
     if place is not None:
         low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    found = [item for item in _tokens(docs, document, low, high) if item[1] > low and item[0] < high]
+    result = [item for item in _tokens(docs, document, low, high) if item[1] > low and item[0] < high]
     data: list[int] = []
     line = column = 0
-    for start, end, kind, modifiers in sorted(found):
+    for start, end, kind, modifiers in sorted(result):
         at = document.lines.position(start)
         length = width(document.text[start:end], document.encoding)
         data += (at.line - line, at.character - column if at.line == line else at.character)
@@ -91,40 +91,40 @@ def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tu
     text, tokens = document.text, document.tokens
     names = tables().kinds
     uses = {use.start: use for use in document.names.uses}
-    found: list[tuple[int, int, str, int]] = []
+    result: list[tuple[int, int, str, int]] = []
     before = 0
     for kind, start, end in zip(tokens.kinds, tokens.starts, tokens.ends, strict=True):
         if before < start and before < high and start > low:
-            found += _comments(text, before, start)
+            result += _comments(text, before, start)
         before = end
         if start == end or end <= low or start >= high:
             continue
         use = uses.get(start)
         name = names[kind]
         if use is not None and use.end <= end and use.role not in ("path", "model"):
-            found.append((start, end, *_named(docs, document, use)))
+            result.append((start, end, *_named(docs, document, use)))
         elif name == "NUMBER" or name == "COLOR":
-            found.append((start, end, "number", 0))
+            result.append((start, end, "number", 0))
         elif name == "STRING":
-            found.append((start, end, "string", 0))
+            result.append((start, end, "string", 0))
         elif name[0].isalpha() and name != "NAME":
-            found.append((start, end, "keyword", 0))
+            result.append((start, end, "keyword", 0))
         elif name not in ("NAME", "(", ")", "[", "]", "{", "}", ",", ";", "."):
-            found.append((start, end, "operator", 0))
-    return [item for item in found if "\n" not in text[item[0] : item[1]]]
+            result.append((start, end, "operator", 0))
+    return [item for item in result if "\n" not in text[item[0] : item[1]]]
 
 
 def _comments(text: str, start: int, end: int) -> list[tuple[int, int, str, int]]:
     """Comments between two tokens, line by line, as a token must not span lines."""
-    found = []
+    result = []
     for match in _COMMENTS.finditer(text, start, end):
         at = match.start()
         for part in match[0].splitlines(keepends=True):
             bare = part.rstrip("\r\n")
             if bare:
-                found.append((at, at + len(bare), "comment", 0))
+                result.append((at, at + len(bare), "comment", 0))
             at += len(part)
-    return found
+    return result
 
 
 def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
@@ -140,7 +140,7 @@ def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
 
 def colours(document: Document) -> list[types.ColorInformation]:
     """Colours that are written out: `#hex`, `rgb(…)`, `hsv(…)` and vectors where a colour is wanted."""
-    found = []
+    result = []
     for stmt in document.file.statements:
         wanted: set[int] = set()
         for node in walk(stmt):
@@ -152,9 +152,9 @@ def colours(document: Document) -> list[types.ColorInformation]:
             rgb = _colour(node, id(node) in wanted)
             if rgb is not None:
                 place = document.lines.span(node.span)
-                found.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
-    found.sort(key=lambda c: (c.range.start.line, c.range.start.character))
-    return found
+                result.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
+    result.sort(key=lambda c: (c.range.start.line, c.range.start.character))
+    return result
 
 
 def _colour(node: object, wanted: bool) -> tuple[float, float, float] | None:
@@ -310,8 +310,8 @@ def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
 
 def _steps(transforms: Iterable[Any], space: Space) -> list[Step]:
     """The steps of transforms, without those that have none."""
-    found = [step_of(transform, space) for transform in transforms]
-    return [step for step in found if not isinstance(step, Refusal)]
+    result = [step_of(transform, space) for transform in transforms]
+    return [step for step in result if not isinstance(step, Refusal)]
 
 
 def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
@@ -612,10 +612,10 @@ class _Maker:
         zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
         for name, group in zoo.groups.items() if zoo is not None and not worn else ():
             yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
-        for found in zoo.elements if zoo is not None else ():
-            if found.material == worn:
+        for result in zoo.elements if zoo is not None else ():
+            if result.material == worn:
                 yield Item(
-                    found.name, Kind.Class, f"{found.name} {{ $0 }}", "a", found.kind, found.told(), True
+                    result.name, Kind.Class, f"{result.name} {{ $0 }}", "a", result.kind, result.told(), True
                 )
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:

@@ -153,10 +153,10 @@ def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset())
 
 def _in_comment(read: _Reader, index: int, offset: int) -> bool:
     gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
-    found = list(_COMMENTS.finditer(gap))
-    if not found or found[-1].end() < len(gap):
+    result = list(_COMMENTS.finditer(gap))
+    if not result or result[-1].end() < len(gap):
         return False
-    comment = found[-1][0]
+    comment = result[-1][0]
     return not (comment.endswith("\n") if comment[1] == "/" else comment[2:].endswith("*/"))
 
 
@@ -239,8 +239,10 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
     call = cursor.call
     if call is None:
         return None
-    found = find_symbol(docs, document, document.names, call.name, call.start)
-    return word_of(found) if found is not None else word_for_call(call.name, cursor.block.kind == "material")
+    result = find_symbol(docs, document, document.names, call.name, call.start)
+    return (
+        word_of(result) if result is not None else word_for_call(call.name, cursor.block.kind == "material")
+    )
 
 
 def find_symbol(docs: Workspace, document: Document, names: Names, name: str, offset: int) -> Symbol | None:
@@ -321,17 +323,17 @@ def comment_above(symbol: Symbol) -> str:
     # The node's own text: it may be of an older version than the document's.
     span = symbol.node.span
     text = span.source.text
-    found: list[str] = []
+    result: list[str] = []
     start = text.rfind("\n", 0, span.start) + 1
     while start:
         above = text.rfind("\n", 0, start - 1) + 1
         match = _LINE.match(text[above : start - 1].rstrip("\r"))
         if match is None:
             break
-        found.insert(0, match[1].strip())
+        result.insert(0, match[1].strip())
         start = above
     end = text.find("\n", span.end)
     behind = _LINE.match(text[span.end : end if end >= 0 else len(text)].rstrip("\r"))
     if behind and not isinstance(symbol.node, tree.Module):
-        found.append(behind[1].strip())
-    return "\n".join(found)
+        result.append(behind[1].strip())
+    return "\n".join(result)

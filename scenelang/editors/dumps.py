@@ -395,7 +395,7 @@ def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Spa
 
 def _rounded(statement: str) -> str:
     """A statement as a box shows it, its numbers to five digits."""
-    return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda found: f"{float(found[0]):.5g}", statement.rstrip(";"))
+    return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda match: f"{float(match[0]):.5g}", statement.rstrip(";"))
 
 
 def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:

@@ -78,9 +78,9 @@ def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
 
 
 def _use(docs: Workspace, document: Document, use: Use) -> str | None:
-    found = docs.definition(document, use)
-    if found is not None:
-        return _definition(document, *found)
+    result = docs.definition(document, use)
+    if result is not None:
+        return _definition(document, *result)
     text = use.text
     match use.role:
         case "function" | "constant" | "animated" | "setting":
@@ -117,8 +117,8 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
     if zoo is None:
         return ""
-    found = [element for element in zoo.elements if element.name == name and element.material == worn]
-    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
+    result = [element for element in zoo.elements if element.name == name and element.material == worn]
+    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
         told.append(f"```text\n{name}(): {groups.told(zoo.groups[name])}\n```")
     return "\n\n".join(told)
@@ -248,7 +248,7 @@ def inlay_hints(
 ) -> list[types.InlayHint]:
     """The hints of a range."""
     low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    found: list[types.InlayHint] = []
+    result: list[types.InlayHint] = []
     for stmt in document.file.statements:
         if stmt.span.end < low or stmt.span.start > high:
             continue
@@ -258,11 +258,11 @@ def inlay_hints(
             if isinstance(node, tree.Let) and settings.value_hints:
                 hint = _value(document, node)
                 if hint is not None:
-                    found.append(hint)
+                    result.append(hint)
             elif isinstance(node, tree.Call | tree.CallExpr) and settings.argument_hints:
-                found += _arguments(docs, document, node)
-    found.sort(key=lambda hint: (hint.position.line, hint.position.character))
-    return found
+                result += _arguments(docs, document, node)
+    result.sort(key=lambda hint: (hint.position.line, hint.position.character))
+    return result
 
 
 def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
@@ -297,8 +297,8 @@ def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallE
     args = call.args or ()
     if name in _CLEAR or not args:
         return []
-    found = find_symbol(docs, document, document.names, name, call.name.span.start)
-    callee = word_of(found) if found is not None else word_for_call(name, False)
+    result = find_symbol(docs, document, document.names, name, call.name.span.start)
+    callee = word_of(result) if result is not None else word_for_call(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []
     hints = []
@@ -307,7 +307,7 @@ def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallE
         alike = isinstance(value, tree.NameRef) and value.name.text == param
         if arg.name is not None or alike or isinstance(value, tree.BadExpr):
             continue
-        if found is None and len(param) == 1:
+        if result is None and len(param) == 1:
             continue  # x, y, t: shorter than any help
         place = document.lines.position(arg.span.start)
         hints.append(types.InlayHint(place, f"{param}:", types.InlayHintKind.Parameter, padding_right=True))

@@ -31,19 +31,19 @@ def definition(docs: Workspace, document: Document, offset: int) -> types.Locati
     if use.role == "path":
         library = docs.imported(document, use.text)
         return types.Location(library.uri, library.lines.range(0, 0)) if library is not None else None
-    found = docs.definition(document, use)
-    if found is None and use.symbol is not None and use.symbol.kind == "import":
-        found = document, use.symbol  # a file of elements
-    if found is None:
+    result = docs.definition(document, use)
+    if result is None and use.symbol is not None and use.symbol.kind == "import":
+        result = document, use.symbol  # a file of elements
+    if result is None:
         return None
-    where, symbol = found
+    where, symbol = result
     return types.Location(where.uri, where.lines.span(symbol.span))
 
 
 def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Document, Use]]:
     use = document.names.at(offset)
-    found = docs.definition(document, use) if use is not None else None
-    return list(docs.uses(*found)) if found is not None else []
+    result = docs.definition(document, use) if use is not None else None
+    return list(docs.uses(*result)) if result is not None else []
 
 
 def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
@@ -60,13 +60,13 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
     use = document.names.at(offset)
     if use is None:
         return []
-    found = docs.definition(document, use)
+    result = docs.definition(document, use)
 
     def alike(other: Use) -> bool:
-        if found is None:  # a word of the language: the same word elsewhere
+        if result is None:  # a word of the language: the same word elsewhere
             return other.role == use.role
         meant = docs.definition(document, other)
-        return meant is not None and meant[1] is found[1]
+        return meant is not None and meant[1] is result[1]
 
     same = [other for other in document.names.uses if other.text == use.text and alike(other)]
     read, write = types.DocumentHighlightKind.Read, types.DocumentHighlightKind.Write
@@ -86,10 +86,10 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
     use = document.names.at(offset)
     if use is None:
         return None
-    found = docs.definition(document, use)
-    if found is None:
+    result = docs.definition(document, use)
+    if result is None:
         raise Refused(f"`{use.text}` is not defined in a scene file")
-    _check_owner(found[0], use)
+    _check_owner(result[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
 
@@ -105,10 +105,10 @@ def rename(
         Refused: the new name is none, or would mean something else somewhere.
     """
     use = document.names.at(offset)
-    found = docs.definition(document, use) if use is not None else None
-    if found is None or use is None:
+    result = docs.definition(document, use) if use is not None else None
+    if result is None or use is None:
         return None
-    where, symbol = found
+    where, symbol = result
     _check_owner(where, use)
     if new == symbol.name:
         return None
@@ -178,14 +178,14 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
     """Imports that can be followed."""
-    found = []
+    result = []
     for stmt in document.file.statements:
         if isinstance(stmt, tree.Import):
             library = docs.imported(document, stmt.path.value)
             if library is not None and library.path is not None:
                 place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
-                found.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
-    return found
+                result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    return result
 
 
 Kind = types.SymbolKind
@@ -260,7 +260,7 @@ def _entry(stmt: tree.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[tree.Stmt
 
 def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
     """Definitions at the top of all files whose names have the letters of a query, in order."""
-    query, found = query.lower(), []
+    query, result = query.lower(), []
     for document in docs.known():
         for stmt in document.file.statements:
             if isinstance(stmt, tree.Param | tree.Let | tree.Fn | tree.Module):
@@ -269,10 +269,12 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
                     continue
                 place = types.Location(document.uri, document.lines.span(stmt.name.span))
                 kind = _DEFINES[type(stmt)]
-                found.append(types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name))
-                if len(found) >= 500:
-                    return found
-    return found
+                result.append(
+                    types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name)
+                )
+                if len(result) >= 500:
+                    return result
+    return result
 
 
 # ---------------------------------------------------------------- folding
@@ -280,13 +282,13 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
 
 def folding(document: Document) -> list[types.FoldingRange]:
     """Blocks, brackets, comments and runs of imports that take more than a line."""
-    found: dict[int, types.FoldingRange] = {}
+    result: dict[int, types.FoldingRange] = {}
     lines = document.lines
 
     def add(start: int, end: int, kind: types.FoldingRangeKind | None = None, tail: int = 0) -> None:
         first, last = lines.position(start).line, lines.position(end).line - tail
         if last > first:
-            found.setdefault(first, types.FoldingRange(first, last, kind=kind))
+            result.setdefault(first, types.FoldingRange(first, last, kind=kind))
 
     for stmt in document.file.statements:
         for node in walk(stmt):
@@ -300,7 +302,7 @@ def folding(document: Document) -> list[types.FoldingRange]:
     for match in _COMMENT.finditer(document.text):
         if not match[0].startswith('"'):
             add(match.start(), match.end() - match[0].endswith("\n"), types.FoldingRangeKind.Comment)
-    return [found[line] for line in sorted(found)]
+    return [result[line] for line in sorted(result)]
 
 
 def selection(document: Document, offset: int) -> types.SelectionRange:
@@ -309,11 +311,11 @@ def selection(document: Document, offset: int) -> types.SelectionRange:
     use = document.names.at(offset)
     if use is not None:
         spans.append((use.start, use.end))
-    found: types.SelectionRange | None = None
+    result: types.SelectionRange | None = None
     last = (-1, -1)
     for start, end in spans:
         if (start, end) != last and (last == (-1, -1) or (last[0] <= start and end <= last[1])):
-            found = types.SelectionRange(document.lines.range(start, end), found)
+            result = types.SelectionRange(document.lines.range(start, end), result)
             last = (start, end)
-    assert found is not None
-    return found
+    assert result is not None
+    return result

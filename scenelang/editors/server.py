@@ -118,10 +118,10 @@ def code_actions(
     """What may be done about the mistakes in a range: of the kinds asked for, or of all."""
     lines = document.lines
     start, end = lines.offset(place.start), lines.offset(place.end)
-    found = [*document.syntax, *document.semantic]
+    result = [*document.syntax, *document.semantic]
     here = [
         d
-        for d in found
+        for d in result
         if d.span is not None
         and d.span.source.name == document.source.name
         and lines.position(d.span.start).line <= lines.position(end).line
@@ -132,7 +132,7 @@ def code_actions(
         near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
         actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
     if _wants(only, FIX_ALL):
-        actions += _fix_all(document, found)
+        actions += _fix_all(document, result)
     return actions
 
 
@@ -160,8 +160,8 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
     )
 
 
-def _fix_all(document: Document, found: Sequence[Diagnostic]) -> list[types.CodeAction]:
-    text, done = apply_fixes(document.text, [d for d in found if _is_ours(document, d)])
+def _fix_all(document: Document, diagnostics: Sequence[Diagnostic]) -> list[types.CodeAction]:
+    text, done = apply_fixes(document.text, [d for d in diagnostics if _is_ours(document, d)])
     if not done or text == document.text:
         return []
     title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
@@ -367,8 +367,8 @@ class Server(LanguageServer):
 
     def publish(self, document: Document) -> None:
         """Send what is known now: the syntax of this text, and what the last check found, moved along."""
-        found = [*document.syntax, *document.semantic]
-        shown = [d for d in (to_diagnostic(item, document) for item in found) if d is not None]
+        result = [*document.syntax, *document.semantic]
+        shown = [d for d in (to_diagnostic(item, document) for item in result) if d is not None]
         self.text_document_publish_diagnostics(
             types.PublishDiagnosticsParams(document.uri, shown, document.version)
         )

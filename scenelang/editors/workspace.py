@@ -201,7 +201,7 @@ def check(
     Raises:
         Superseded: ``stop`` was set meanwhile.
     """
-    found, frame = Diagnostics(), 0
+    result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
 
     def watch(span: Span, value: Any) -> None:
@@ -219,19 +219,19 @@ def check(
             raise Superseded
 
     source = Source(path, tree=file, model=model, root=root, texts=texts)
-    evaluation = source.evaluation(found, replays=True, watch=watch)
+    evaluation = source.evaluation(result, replays=True, watch=watch)
     scene, spans = evaluation.run(0)
     after("evaluate")
     manifest = None
     if parsed:
-        find_unused(file, found)
+        find_unused(file, result)
         if scene is not None:
-            manifest = check_compiles(scene, spans, found, after=after)
+            manifest = check_compiles(scene, spans, result, after=after)
         frame = 1
-        check_frames(evaluation, found, first=scene, after=after)
+        check_frames(evaluation, result, first=scene, after=after)
         after("frames")
     wanted = frozenset(evaluation.wanted)
-    return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)
+    return Checked(file.span.source, in_file_order(result.items), wanted, seen, manifest)
 
 
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
@@ -307,8 +307,8 @@ class Document:
             help = "`scenelang check` does, up to 10 MB"
             nowhere = Span(self.source, 0, 0)
             return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
-        found = Diagnostics()
-        return parse(self.source, found), tuple(found)
+        result = Diagnostics()
+        return parse(self.source, result), tuple(result)
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
@@ -456,8 +456,8 @@ class Workspace:
         library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
         if library is None:
             return None
-        found = library.names.top.symbols.get(use.text.partition(".")[0])
-        return (library, found) if found is not None and found.is_exported else None
+        result = library.names.top.symbols.get(use.text.partition(".")[0])
+        return (library, result) if result is not None and result.is_exported else None
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:
         """Every place that means a definition; its own is among them."""

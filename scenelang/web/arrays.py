@@ -135,8 +135,8 @@ def bounds_of(element: Element) -> tuple[float, float, float]:
     # a cell's distances lie between those of its nodes, and beyond the square they grow as the way out does
     least = np.min([grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]], 0)
     most = [np.maximum(length[:-1, :-1], length[1:, 1:]) for length in (abs(x), abs(y))]
-    found = [float((length - least).max()) for length in (*most, np.hypot(*most))]
-    return max(found[0], 1.0), max(found[1], 1.0), max(found[2], 2.0**0.5)
+    result = [float((length - least).max()) for length in (*most, np.hypot(*most))]
+    return max(result[0], 1.0), max(result[1], 1.0), max(result[2], 2.0**0.5)
 
 
 def _picture(element: Element, store: Store) -> dict[str, Any]:
@@ -236,10 +236,10 @@ def stage_of(stage: Stage) -> dict[str, Any]:
 
 
 def _index(known: np.ndarray, code: np.ndarray) -> int:
-    found = np.flatnonzero((known.astype(np.float32) == code).all(1))
-    if not len(found):
+    result = np.flatnonzero((known.astype(np.float32) == code).all(1))
+    if not len(result):
         raise ProgramError("codes that are not the model's")
-    return int(found[0])
+    return int(result[0])
 
 
 def _scales(program: Program, layout: Layout) -> list[float]:

@@ -376,11 +376,11 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]
     if isinstance(source, Scene):
         scene: Scene | None = source
     else:
-        found = Diagnostics()
-        evaluation = source.evaluation(found)
+        result = Diagnostics()
+        evaluation = source.evaluation(result)
         scene = evaluation.run(0)[0]
-        if scene is None or found.errors:
-            raise SceneError(found)
+        if scene is None or result.errors:
+            raise SceneError(result)
     assert scene is not None
     program = compile_scene(scene)
     return scene_view(program, scene, evaluation, title=title), program

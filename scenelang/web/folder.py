@@ -58,7 +58,7 @@ class Folder:
 
     def names(self) -> list[str]:
         """The scenes in it and below, sorted; hidden folders and links to folders left out."""
-        found: list[str] = []
+        result: list[str] = []
         looked = 0
         for where, inner, files in os.walk(self.path):
             deep = len(Path(where).relative_to(self.path).parts)
@@ -68,12 +68,12 @@ class Folder:
             for file in files:
                 name = Path(where, file).relative_to(self.path).as_posix()
                 if fits(name):
-                    found.append(name)
+                    result.append(name)
             looked += len(files) + len(inner)
             self.is_large = looked > MOST_LOOKED
-            if self.is_large or len(found) > MOST_FILES:
+            if self.is_large or len(result) > MOST_FILES:
                 break
-        return sorted(found, key=lambda name: (name.count("/"), name))[:MOST_FILES]
+        return sorted(result, key=lambda name: (name.count("/"), name))[:MOST_FILES]
 
     def place(self, name: str) -> Path:
         """Where a file is or would be; links lead to what lies inside.

@@ -66,8 +66,8 @@ class Scope:
         scope: Scope | None = self
         while scope is not None and alias not in scope.names:
             scope = scope.parent
-        found = None if scope is None else scope.names[alias]
-        return found.inside.names.get(rest) if dot and found is not None and found.inside else found
+        result = None if scope is None else scope.names[alias]
+        return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
 @dataclass(slots=True, eq=False)
@@ -189,13 +189,13 @@ class Names(ABC):
         return set(seen)
 
     def _declare(self, statements: Sequence[nodes.Stmt], scope: Scope) -> list[Bound]:
-        found = []
+        result = []
         for stmt in statements:
             if isinstance(stmt, nodes.Fn | nodes.Module):
                 kind = "fn" if isinstance(stmt, nodes.Fn) else "module"
                 scope.names[stmt.name.text] = bound = Bound(kind, scope, node=stmt)
-                found.append(bound)
-        return found
+                result.append(bound)
+        return result
 
     def _body(self, bound: Bound) -> None:
         """Write a fn or module: size of its calls, defaults, and what it is."""

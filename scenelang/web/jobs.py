@@ -105,12 +105,12 @@ def warm() -> None:
 def _view(job: Job, tell: Tell) -> Answer:
     """The scene for the page's own shader, and what is wrong with it."""
     started = time.perf_counter()
-    found = Diagnostics()
+    result = Diagnostics()
     shown: View | None = None
     lacking: list[str] = []
-    evaluation = _source(job).evaluation(found)
+    evaluation = _source(job).evaluation(result)
     try:
-        shown = _viewed(job, evaluation, found)[0]
+        shown = _viewed(job, evaluation, result)[0]
     except SceneError:
         pass  # its diagnostics are `found`
     except (ProgramError, FileNotFoundError) as error:
@@ -118,7 +118,7 @@ def _view(job: Job, tell: Tell) -> Answer:
     data = {
         **job["message"],
         "view": shown and shown.message(),
-        "problems": [*map(_problem, found.items[:MOST_TOLD]), *map(_warning, lacking)],
+        "problems": [*map(_problem, result.items[:MOST_TOLD]), *map(_warning, lacking)],
         "ms": _since(started),
     }
     head = {"wanted": [str(path) for path in evaluation.wanted]}
@@ -127,11 +127,11 @@ def _view(job: Job, tell: Tell) -> Answer:
     return Answer(_json(data), head)
 
 
-def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View, Program]:
+def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple[View, Program]:
     scene, spans = evaluation.run(0)
-    if scene is None or found.errors:
-        raise SceneError(found)
-    program = compile_scene(scene, spans=spans, diagnostics=found)
+    if scene is None or diagnostics.errors:
+        raise SceneError(diagnostics)
+    program = compile_scene(scene, spans=spans, diagnostics=diagnostics)
     if len(program) > MOST_ROWS:
         raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
     return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
@@ -141,9 +141,11 @@ def _warning(message: str) -> dict[str, Any]:
     return {"code": "", "severity": "warning", "message": message, "line": 1, "column": 1}
 
 
-def _problem(found: Diagnostic) -> dict[str, Any]:
-    line, column = found.span.source.position(found.span.start) if found.span is not None else (1, 1)
-    here = {"code": found.code, "severity": found.severity, "message": found.message}
+def _problem(diagnostic: Diagnostic) -> dict[str, Any]:
+    line, column = (
+        diagnostic.span.source.position(diagnostic.span.start) if diagnostic.span is not None else (1, 1)
+    )
+    here = {"code": diagnostic.code, "severity": diagnostic.severity, "message": diagnostic.message}
     return {**here, "line": line, "column": column}
 
 
@@ -201,13 +203,13 @@ def _figures(job: Job, tell: Tell) -> Answer:
 
 def _figures_of(picture: np.ndarray, exact: np.ndarray) -> dict[str, float | None]:
     """PSNR, SSIM and FLIP; None where the package that measures it is missing."""
-    found: dict[str, float | None] = {"psnr": round(psnr(picture, exact), 2)}
+    result: dict[str, float | None] = {"psnr": round(psnr(picture, exact), 2)}
     for name, measure in (("ssim", ssim), ("flip", flip)):
         try:
-            found[name] = round(measure(picture, exact), 5)
+            result[name] = round(measure(picture, exact), 5)
         except (ImportError, OSError):  # torch's libraries may not fit the memory
-            found[name] = None
-    return found
+            result[name] = None
+    return result
 
 
 def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
@@ -267,8 +269,8 @@ def _file(job: Job, tell: Tell) -> Answer:
     if kind == "png":
         return Answer(_by_network(clip.program(_shot(clip, job["frame"])), tell).encode())
     if kind == "html":
-        found = Diagnostics()
-        view, program = _viewed(job, _source(job).evaluation(found), found)
+        result = Diagnostics()
+        view, program = _viewed(job, _source(job).evaluation(result), result)
         return Answer(page(view, still=still(program)).encode())
     _check_size(clip.first.scene.canvas)
 

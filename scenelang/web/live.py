@@ -144,8 +144,8 @@ class Play:
 def _examples() -> list[str]:
     """Scenes that come with the page."""
     folder = files("scenelang").joinpath("web/editor/examples")
-    found = folder.iterdir() if folder.is_dir() else ()
-    return sorted(place.name for place in found if place.name.endswith(".nsg"))
+    result = folder.iterdir() if folder.is_dir() else ()
+    return sorted(place.name for place in result if place.name.endswith(".nsg"))
 
 
 live_log = logging.getLogger("scenelang.play")
@@ -381,14 +381,14 @@ class Live:
     def _view(self, name: str) -> None:
         version = self.open[name].version
 
-        def found(answer: Answer) -> None:
+        def viewed(answer: Answer) -> None:
             known = self.open.get(name)
             if known is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
                 known.angles = frozenset(answer.head.get("angles", known.angles))
 
         message = {"kind": "view", "file": name, "version": version}
-        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, found)
+        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, viewed)
 
     async def _draw(self, message: Json) -> None:
         name, known = self._known(message)

@@ -110,7 +110,7 @@ def leaves(network: FramedArrays) -> list[Leaf]:
     axis = np.linspace(-RADIUS, RADIUS, NODES)
     p = np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
     off = (axis[1] - axis[0]) * 0.5**0.5  # the way from the next node, at most
-    far, found = float(network.far[0]), []
+    far, result = float(network.far[0]), []
     for code, decoder in zip(network.codes, network.decoders(network.codes), strict=True):
         layers = [(np.asarray(w, np.float64), np.asarray(b, np.float64)) for w, b in decoder.layers]
         slopes = network.slopes.get(code.tobytes())
@@ -123,8 +123,8 @@ def leaves(network: FramedArrays) -> list[Leaf]:
             gaps = [n - (middle - rise) / min(far, 1.0) for n in (*abs(p), radius)]
             bounds = tuple([float(gap[seen].max()) + off for gap in gaps])
             inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
-        found.append(Leaf(*_pruned(layers), far, bounds, inner))
-    return found
+        result.append(Leaf(*_pruned(layers), far, bounds, inner))
+    return result
 
 
 def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats]:

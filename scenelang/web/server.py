@@ -207,10 +207,10 @@ def _same(one: str, other: str) -> bool:
 def is_loopback(host: str) -> bool:
     """Whether nobody but this machine reaches an address."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        result = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         return False
-    return all(ipaddress.ip_address(str(place[4][0]).partition("%")[0]).is_loopback for place in found)
+    return all(ipaddress.ip_address(str(place[4][0]).partition("%")[0]).is_loopback for place in result)
 
 
 watch_log = logging.getLogger("scenelang.play")
@@ -241,8 +241,8 @@ async def watch(play: Play, stop: asyncio.Event) -> None:
                 force_polling=polling or None,
                 poll_delay_ms=SLOW_MS,
             )
-            async for found in changes:
-                play.later(_tell(play, {Path(path) for _, path in found}))
+            async for result in changes:
+                play.later(_tell(play, {Path(path) for _, path in result}))
             return
         except (OSError, RuntimeError) as error:
             watch_log.warning("the system does not tell of changes: %s", error)
@@ -293,10 +293,10 @@ def make_app(play: Play) -> Starlette:
         return Response(text.replace("__NONCE__", nonce), media_type="text/html", headers=headers)
 
     async def download(request: Request) -> Response:
-        found = play.store.take(request.query_params.get("key", ""))
-        if found is None:
+        result = play.store.take(request.query_params.get("key", ""))
+        if result is None:
             return PlainTextResponse("There is no such file any more.\n", 404)
-        name, kind, data = found
+        name, kind, data = result
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}
         return Response(data, media_type=kind, headers=headers)
 
@@ -335,8 +335,8 @@ def make_app(play: Play) -> Starlette:
 
 async def _static(request: Request) -> Response:
     """A file of the package."""
-    found = _STATIC.fullmatch(request.path_params["name"])
-    place = files("scenelang").joinpath(_FROM[found[1]], found[2]) if found is not None else None
+    result = _STATIC.fullmatch(request.path_params["name"])
+    place = files("scenelang").joinpath(_FROM[result[1]], result[2]) if result is not None else None
     if place is None or not place.is_file():
         return PlainTextResponse("There is no such file.\n", 404)
     kind = _KINDS.get(Path(place.name).suffix) or mimetypes.guess_type(place.name)[0]

@@ -76,10 +76,10 @@ def _gates(paint: int, kind: int) -> str:
 
     def largest(first: int, count: int) -> str:
         gates = [f"dot(cells[at + {first + i}].xyz, vec3(d, before, 1.0))" for i in range(count)]
-        found = gates[0]
+        result = gates[0]
         for gate in gates[1:]:
-            found = f"max({found}, {gate})"
-        return f"return clamp({found}, 0.0, 1.0);"
+            result = f"max({result}, {gate})"
+        return f"return clamp({result}, 0.0, 1.0);"
 
     parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
     head = "(int at, float d, float before)"
