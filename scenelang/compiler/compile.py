@@ -40,9 +40,9 @@ def compile_scene(
         model: draw with this model instead of the one the scene names.
         codes: lift with these instead of the model's shipped ones, for weights under trial.
         after: called with ``"lower"`` and the name of each pass and the graph it left.
-        without: names of passes to leave out, of those that only save work (`scenelang.passes.OPTIONAL`).
-        memory: what the frame before left, of an animation whose frames share nodes; the same Program comes
-            out with or without it.
+        without: names of passes of `scenelang.compiler.passes.OPTIONAL` to leave out.
+        memory: of the previous frame of an animation whose frames share nodes; the Program is the same
+            with or without it.
 
     Returns:
         The Program; the same scene always gives the same one, byte for byte.
@@ -73,9 +73,9 @@ def compile_scene(
 def find_model(
     scene: Scene, diagnostics: Diagnostics, *, model: str | None = None, spans: Spans | None = None
 ) -> Manifest | None:
-    """The manifest a scene is compiled for: the one asked for, that it names, or its dimension's usual one.
+    """The manifest of the model asked for, else of the one the scene names, else of the usual one.
 
-    Where there is none of that name, ``diagnostics`` receives E0514.
+    Where no model has that name, ``diagnostics`` receives E0514.
     """
     name = model or scene.model or USUAL[scene_dimension(scene)]
     try:

@@ -612,11 +612,10 @@ class _Maker:
         zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
         for name, group in zoo.groups.items() if zoo is not None and not worn else ():
             yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
-        for result in zoo.elements if zoo is not None else ():
-            if result.material == worn:
-                yield Item(
-                    result.name, Kind.Class, f"{result.name} {{ $0 }}", "a", result.kind, result.told(), True
-                )
+        for element in zoo.elements if zoo is not None else ():
+            if element.material == worn:
+                name, about = element.name, element.told()
+                yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
