@@ -1,7 +1,4 @@
-"""Completion, semantic tokens, and the words of a document's model.
-
-colours that it writes, with what a picker may write instead.
-"""
+"""Completion, semantic tokens and colours of a document, and its values and transforms in words."""
 
 from __future__ import annotations
 
@@ -36,7 +33,7 @@ from scenelang.language.values import POISON, Angle, MaterialValue, RangeValue, 
 from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, TRANSFORMS, UNITS
 
 COLOURED: Final = ("color", "background", "light", "ground")
-"""What has an argument `c` or `color`."""
+"""Words with an argument `c` or `color`."""
 
 TYPES: Final = (
     *("comment", "keyword", "number", "string", "operator"),
@@ -199,7 +196,7 @@ def _clamped(parts: list[float | None], first_free: bool = False) -> tuple[float
 def presentations(
     document: Document, color: types.Color, place: types.Range
 ) -> list[types.ColorPresentation]:
-    """How a picked colour may be written, the way it is written now first."""
+    """The notations of a picked colour, the current one first."""
     red, green, blue = color.red, color.green, color.blue
     bytes_ = [min(max(round(255 * x), 0), 255) for x in (red, green, blue)]
     long = "#" + "".join(f"{b:02x}" for b in bytes_)
@@ -241,7 +238,7 @@ def space_of(document: Document) -> Space:
 
 
 def show_value(value: Any) -> str | None:
-    """A value as one would write it; None for one that a mistake has made unknown."""
+    """A value in the notation of the language; None for one that a mistake has made unknown."""
     cls = value.__class__
     if value is POISON:
         return None
@@ -279,7 +276,7 @@ def show_matrix(rows: Rows, space: Space) -> str:
 
 
 def show_warp(warp: Warp) -> str:
-    """How a point goes back through a warp, in a formula."""
+    """The formula of a warp's inverse at a point."""
     terms = []
     if warp.twirl:
         terms.append(f"{show(warp.twirl)} |p|")
@@ -303,7 +300,7 @@ def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
 
 
 def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
-    """How much the affine maps of a chain scale, at least and at most."""
+    """The least and the greatest scale of a chain's affine maps."""
     low, high = space.stretches(affine.composed(_steps(transforms, space)))
     return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
 
@@ -331,8 +328,8 @@ class Item(Record):
     """A proposal.
 
     Args:
-        text: what is inserted; the label without it.
-        rank: one letter; what is likelier comes first.
+        text: inserted in place of the label.
+        rank: one letter by which proposals are sorted, the likeliest first.
         about: Markdown.
         snippet: whether ``text`` has placeholders.
     """
@@ -358,7 +355,7 @@ def units(typed: str) -> Iterator[Item]:
 
 
 def strings(docs: Workspace, document: Document, before: tuple[str, ...]) -> Iterator[Item]:
-    """What a string may say: a model's name, a file to import."""
+    """Contents of a string: names of models, files to import."""
     if before == ("model",):
         for manifest in map(load_manifest, available()):
             yield Item(manifest.name, Kind.Module, about=manifest.summary)
@@ -383,7 +380,7 @@ _SYMBOLS: Final = {
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
-    """What may stand at an offset."""
+    """Proposals at an offset."""
     names = document.names
     holders = ("let", "argument", "loop", "param")
     values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
@@ -418,7 +415,7 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
 
 
 class _Maker:
-    """Collects what fits at one cursor."""
+    """Proposals for one cursor."""
 
     def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
         self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
@@ -567,7 +564,7 @@ class _Maker:
         yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
 
     def _arguments(self, callee: words.Word) -> Iterator[Item]:
-        """Names of arguments that are left, and values that the one at hand takes."""
+        """Names of arguments that are not given yet, and values for the current one."""
         call = self.cursor.call
         assert call is not None
         positional = callee is not words.TRANSFORMS["shear"]
@@ -630,7 +627,7 @@ def _item(word: words.Word, kind: Kind, rank: str) -> Item:
 
 
 def _ends_operand(text: str) -> bool:
-    """Whether an expression can end with a token, so that an operator and not an operand comes next."""
+    """True for tokens that an expression can end with, so that an operator and not an operand comes next."""
     return text in (")", "]", "}", "true", "false") or (
         (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
     )

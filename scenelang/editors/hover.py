@@ -1,4 +1,4 @@
-"""Hover and inlay hints: what a word means, and what it came to when the scene was evaluated."""
+"""Hover and inlay hints: the meaning of a word, and its value when the scene was evaluated."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _TABLES: Final = {
 def hover(
     docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
 ) -> types.Hover | None:
-    """What there is to say about an offset.
+    """The hover at an offset.
 
     Args:
-        picture: of an element, in Markdown.
+        picture: gives an element's picture in Markdown.
     """
     use = document.names.at(offset)
     if use is not None:
@@ -110,7 +110,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
 
 
 def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
-    """The geometry or the material of an imported file that has a name, as it is shown and told of."""
+    """The geometry or material of an imported file that a name means, in Markdown."""
     worn, symbol = use.role == "material", use.symbol
     if not (worn or use.role == "member") or symbol is None or not isinstance(symbol.node, tree.Import):
         return None
@@ -147,7 +147,7 @@ def _definition(document: Document, where: Document, symbol: Symbol) -> str:
 
 
 def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
-    """What a place had in a document's last check; None where it has been edited since."""
+    """Values of a place in a document's last check; None where it has been edited since."""
     checked = document.checked
     if checked is None:
         return None
@@ -174,7 +174,7 @@ def describe_values(seen: Seen | None) -> str:
 
 
 def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
-    """A geometry or a material, and what it is."""
+    """A geometry or a material with its description."""
     if text not in about:
         return None
     dimension = words.dimension_of(text)
@@ -205,29 +205,29 @@ def _calls(document: Document, use: Use) -> Iterator[tree.Call]:
 
 
 def _transform_facts(document: Document, use: Use) -> str:
-    """The matrix or the formula that a transform came to."""
+    """The matrix or the formula of a transform."""
     node = next(_calls(document, use), None)
     seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
-    made = seen.values if seen is not None else []
+    values = seen.values if seen is not None else []
     parts = []
-    for item in made[:2]:
+    for item in values[:2]:
         shown = completion.show_transform(item, space_of(document))
         if shown is not None:
             parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
-    more = "\n\n…" if len(made) > 2 else ""
+    more = "\n\n…" if len(values) > 2 else ""
     return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
 
 
 def _node_facts(document: Document, node: Any) -> str:
-    """The composed chain of an object or a group, and how often it was made."""
+    """The composed chain of an object or a group, and the number of times that it was created."""
     if not isinstance(node, tree.Call | tree.Node):
         return ""
     seen = seen_at(document, document, node.span.start, node.span.end)
-    made = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
-    if seen is None or not made:
+    created = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
+    if seen is None or not created:
         return ""
     space = space_of(document)
-    item = made[0]
+    item = created[0]
     steps = completion.show_chain(item.transforms, space)
     chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
     times = f" (the first of {seen.count})" if seen.count > 1 else ""
@@ -266,7 +266,7 @@ def inlay_hints(
 
 
 def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
-    """What a let came to, unless it is written there or differs from pass to pass."""
+    """The value of a let, unless it is written there or differs from pass to pass."""
     if _is_plain(let.value):
         return None
     seen = seen_at(document, document, let.name.span.start, let.name.span.end)

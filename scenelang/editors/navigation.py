@@ -1,4 +1,4 @@
-"""Going about: definition, references, highlights, rename, links; symbols, folding, growing selections."""
+"""Navigation: definition, references, highlights, rename, links, symbols, folding, growing selections."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Refused(Exception):
-    """Why a name cannot be changed."""
+    """Raised where a name cannot be changed, with the reason."""
 
 
 def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
-    """Where the name at an offset is defined; for an import's path the file."""
+    """The definition of the name at an offset; for an import's path the file."""
     use = document.names.at(offset)
     if use is None:
         return None
@@ -47,7 +47,7 @@ def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Docume
 
 
 def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
-    """Every place that means the same as the name at an offset."""
+    """All uses of the definition that the name at an offset means."""
     return [
         types.Location(where.uri, where.lines.range(use.start, use.end))
         for where, use in _uses(docs, document, offset)
@@ -56,7 +56,7 @@ def references(docs: Workspace, document: Document, offset: int, declaration: bo
 
 
 def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
-    """The places of this file that mean the same as the name at an offset."""
+    """The uses in this file of the definition that the name at an offset means."""
     use = document.names.at(offset)
     if use is None:
         return []
@@ -96,13 +96,13 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
 def rename(
     docs: Workspace, document: Document, offset: int, new: str, versioned: bool
 ) -> types.WorkspaceEdit | None:
-    """Change a name wherever it is meant, in all files.
+    """Rename a definition and all its uses, in all files.
 
     Args:
-        versioned: whether the client knows edits of a version of a document.
+        versioned: whether the client supports edits of a version of a document.
 
     Raises:
-        Refused: the new name is none, or would mean something else somewhere.
+        Refused: the new name is not a name, or would mean something else somewhere.
     """
     use = document.names.at(offset)
     result = docs.definition(document, use) if use is not None else None
@@ -143,7 +143,7 @@ def _check_name(new: str, symbol: Symbol) -> None:
 
 
 def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
-    """Whether at a place that is renamed the new name stands for something else already."""
+    """Raise `Refused` where the new name already means something else at a place to rename."""
     if place.role in ("member", "argument"):
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
@@ -157,7 +157,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
 
 
 def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
-    """Whether the renamed definition would be meant where the new name means something else now."""
+    """Raise `Refused` where the new name, now of something else, would come to mean the definition."""
     scope = symbol.scope
     if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
         raise Refused(f"`{symbol.owner.name}` has a parameter `{new}` already")
@@ -177,7 +177,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
 
 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
-    """Imports that can be followed."""
+    """Links of imports whose files there are."""
     result = []
     for stmt in document.file.statements:
         if isinstance(stmt, tree.Import):
