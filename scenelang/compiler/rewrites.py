@@ -164,8 +164,9 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
     """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
 
     The effect of a row on the picture stays within its leaf, and there the later union alone decides the
-    sign of the distance and the colour. A blend uses distances, so rows before the last blend stay. A leaf that is
-    drawn twice in the very same place is covered too. A group without blends has its effect within its leaves.
+    sign of the distance and the colour. A blend uses distances, so rows before the last blend stay. A leaf
+    that is drawn twice in the very same place is covered too. A group without blends has its effect within
+    its leaves.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """

@@ -463,7 +463,7 @@ class Plane(Space):
         return stretches(rows[0], rows[1], rows[4], rows[5])
 
     def usable(self, rows: Rows) -> bool:
-        """As for any space; the inverse in float32 must not be singular either, as a thin, slanted one may be."""
+        """As for any space; nor may the inverse be singular in float32, as a thin, slanted one can be."""
         if not super().usable(rows):
             return False
         a, b, _, _, c, d = rows[:6]
