@@ -49,20 +49,20 @@ class Request(Record):
 
 
 class Input(Record, frozen=False):
-    """A scene or a compiled program that the command line names, and what is made of it."""
+    """A scene or a compiled program that the command line names, with its results so far."""
 
     name: str  # as the user wrote it
     how: How = DEFAULT  # how it is drawn
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # what was found so far
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # all so far
     trouble: str | None = None  # why a compiled program cannot be drawn
     tree: nodes.File | None = None  # None if it is not text
     evaluation: Evaluation | None = None  # runs its other frames; None for JSON
     scene: Scene | None = None  # None if it has errors
     spans: SpanMap = field(default_factory=SpanMap)  # where its nodes were written
-    program: Program | None = None  # what the network draws
+    program: Program | None = None  # for the network
     # the graph after `lower` and each pass, in order
     graphs: dict[str, Graph] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
+    notes: list[str] = field(default_factory=list)  # lines for `-v`
 
     def failed(self, strict: bool = False) -> bool:
         """True where there is nothing to draw."""
@@ -70,7 +70,7 @@ class Input(Record, frozen=False):
 
 
 def stem_of(name: str) -> str:
-    """What files made of a scene are called."""
+    """The stem of names of files that are made from a scene."""
     return "stdin" if name == STDIN else Path(name).stem
 
 
@@ -95,7 +95,7 @@ def read_input(
 ) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
-    ``text`` is what it holds, where that was read before. Raises `OSError` where it cannot be opened.
+    ``text`` is its text where that was read before. Raises `OSError` where it cannot be opened.
     """
     clock, result, frame = clock or Clock(), Input(name, how), request.frame or 0
     text = text or read_text(name, result.diagnostics)
@@ -113,10 +113,10 @@ def read_input(
             folder = Path(source.root or Path(name).parent)
             scene, spans = load_json(text, Scene, result.diagnostics, folder)
             if scene is not None and (source.size or source.model):
-                made = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
+                changed = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
                 if spans.span(scene) is not None:
-                    spans.copy(scene, made)
-                scene = made
+                    spans.copy(scene, changed)
+                scene = changed
     else:
         with clock("parse"):
             source = source.parsed(result.diagnostics)
@@ -139,7 +139,7 @@ def unused_defines(request: Request) -> list[Diagnostic]:
 
 
 def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
-    """All diagnostics; what several scenes import and share is said once."""
+    """All diagnostics; those of a file that several scenes import are reported once."""
     result = Diagnostics()
     for d in (d for part in parts for d in part):
         result.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
@@ -160,11 +160,11 @@ def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str
             continue
         try:
             with os.scandir(path) as entries:
-                result = sorted(entries, key=lambda entry: entry.name)
+                found = sorted(entries, key=lambda entry: entry.name)
         except OSError as error:
             lost(error)
             continue
-        shown = [entry for entry in result if not (entry.name.startswith(".") or entry.is_symlink())]
+        shown = [entry for entry in found if not (entry.name.startswith(".") or entry.is_symlink())]
         inside = [e.path for e in shown if e.is_dir() or (e.name.endswith(SUFFIX) and e.is_file())]
         yield from named(inside, lost)
 
@@ -207,7 +207,7 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 
 
 def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """What NAME=VALUE, given several times, says."""
+    """A dictionary from an option NAME=VALUE that may be given several times."""
     result: dict[str, str] = {}
     for value in values:
         name, equals, text = value.partition("=")
@@ -218,8 +218,6 @@ def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, .
 
 
 def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.language.session import Defines
-
     return Defines(assignments(ctx, param, values))
 
 
@@ -318,8 +316,6 @@ def request(command: Callable[..., Any]) -> Callable[..., Any]:
     @root
     @wraps(command)
     def with_request(*arguments: Any, **given: Any) -> Any:
-        from scenelang.language.evaluation import Source
-
         frame, params = given.pop("frame"), given.pop("defines")
         own = {name: given.pop(name) for name in ("model", "root", "size")}
         return command(*arguments, request=Request(Source(params=params, **own), frame), **given)

@@ -16,9 +16,10 @@ from scenelang.cli.main import describe
 from scenelang.cli.say import Clock, say_diagnostics, say_trouble
 from scenelang.compiler.choose import why_chosen
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.how import DEFAULT, How
-from scenelang.language.diagnostics import plural
+from scenelang.drawing.how import DEFAULT, How, threads_for
+from scenelang.language.diagnostics import Diagnostics, plural
 from scenelang.language.reports import SceneError
+from scenelang.language.words import COMBINE
 from scenelang.output.frames import is_animation
 
 if TYPE_CHECKING:
@@ -144,7 +145,6 @@ def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
 def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
     from scenelang.compiler.groups import OPERATOR
-    from scenelang.language.words import COMBINE
 
     shapes = Counter(program.objects)
     words = Counter((program.tokens & OPERATOR).tolist())
@@ -168,14 +168,14 @@ PAGE: Final = ".html"
 def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
     """The file that each scene is written to: ``out`` itself for one scene, else one in the folder ``out``.
 
-    The folder is made if need be; for one scene it is one that is there, or ends in a slash.
+    The folder is created if need be; for one scene ``out`` is a folder that exists or ends in a slash.
 
     Args:
         suffix: of files in a folder: of a picture or of a page.
 
     Raises:
         click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
-        OSError: the folder cannot be made.
+        OSError: the folder cannot be created.
     """
     path = Path(out)
     what, fits = ("a page", page_format) if suffix == PAGE else ("a picture", _picture_format)
@@ -238,8 +238,7 @@ def composed(file: Path) -> Path:
 
 
 def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
-    """Draw a job as it says, and note what it took; ``progress`` is called with the share done, in [0, 1]."""
-    from scenelang.drawing.how import threads_for
+    """Draw a job with its options and add its notes; ``progress`` gets the share done, in [0, 1]."""
     from scenelang.drawing.render import draw, draw_exact
 
     how, program = job.how, job.program
@@ -278,7 +277,7 @@ def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Ima
 
 
 def blank(job: Input, image: Image) -> str | None:
-    """The reason why a picture has nothing to see, where no warning has said so."""
+    """The reason why a picture shows nothing, unless a warning has given it."""
     if any(d.code == "W0402" for d in job.diagnostics):
         return None
     if job.program is not None and not len(job.program.tokens):
@@ -294,7 +293,7 @@ def blank(job: Input, image: Image) -> str | None:
 
 
 def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Clock) -> list[Input]:
-    """Have the frontier choose how to draw; return the jobs that it draws as asked and report the others.
+    """Choose by the frontier how to draw; return the jobs that fit the limits and report the others.
 
     Args:
         model: the only one to choose, where it is given.
@@ -321,7 +320,7 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Cloc
 
 
 def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
-    """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`."""
+    """Choose how to draw a job and compile it for the chosen model; raises `NothingFits`."""
     from scenelang.output.frontier import NothingFits, load_frontier, machine_scale
 
     assert job.program is not None
@@ -339,12 +338,12 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
     device: Device = "cpu" if job.program.stage is None and point.backend == "neural" else "auto"
     samples = point.samples if point.backend == "neural" else "adaptive"
     job.how = How(point.backend, device, job.how.threads, samples)
-    told = f"this machine takes {scale:.2f} times as long as the one that was measured"
+    speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
     like = f"errors are promised for scenes like those of the set `{frontier.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""
     refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
     notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
-    job.notes = [*choice.notes, f"times are for one thread; {told}", like, *refused, *notes]
+    job.notes = [*choice.notes, f"times are for one thread; {speed}", like, *refused, *notes]
 
 
 def _chosen(
@@ -377,15 +376,12 @@ def _compiled(job: Input, program: Program, point: Point) -> Program | str:
     """The Program for a point's model; the reason where it cannot draw the scene as promised."""
     if point.model in (None, program.model):
         return program
-    from scenelang.compiler.compile import compile_scene
-    from scenelang.language.diagnostics import Diagnostics
-
     assert job.scene is not None
     result = Diagnostics()
     try:
-        made = compile_scene(job.scene, spans=job.spans, diagnostics=result, model=point.model)
+        compiled = compile_scene(job.scene, spans=job.spans, diagnostics=result, model=point.model)
     except SceneError:
         return result.errors[0].message
-    told = {d.code for d in job.diagnostics}
+    known = {d.code for d in job.diagnostics}
     # a warning that the scene's own model does not give: this one is outside what it was trained on
-    return next((d.message for d in result.items if d.code not in told), made)
+    return next((d.message for d in result.items if d.code not in known), compiled)
