@@ -112,7 +112,7 @@ def test_a_process_has_so_much_memory_and_no_more() -> None:
 
 def test_nothing_here_loads_torch() -> None:
     code = (
-        "import json, sys\nfrom scenelang.play import jobs\njobs.warm()\n"
+        "import json, sys\nfrom scenelang.web import jobs\njobs.warm()\n"
         "for kind in ('view', 'network', 'reference'):\n"
         "    jobs.do({**json.loads(sys.argv[1]), 'do': kind}, print)\nassert 'torch' not in sys.modules"
     )
