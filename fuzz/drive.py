@@ -17,7 +17,7 @@ OWN_SHARE = 0.7
 """Share of mutations that know the structure; the others are libFuzzer's."""
 SLOW_S = 10.0
 """CPU seconds of one input that are a finding; watched code takes three to five times as long as plain."""
-LEFT_OUT = ("scenelang.measure", "scenelang.cli", "scenelang.__main__")
+LEFT_OUT = ("scenelang.cli", "scenelang.__main__")
 
 
 def main(name: str, folder: Path, seed: int, options: list[str]) -> None:

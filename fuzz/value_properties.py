@@ -148,9 +148,6 @@ def manifests_of_any_names_and_ranges_are_read(data: st.DataObject) -> None:
         "lifting": "exact",
         "geometries": data.draw(_WORDS | st.just(list(shipped.geometries))),
         "materials": materials,
-        "default_material": data.draw(st.sampled_from(materials)),
-        "transforms": data.draw(_WORDS | st.just(list(shipped.transforms))),
-        "material_ops": data.draw(_WORDS | st.just(list(shipped.material_ops))),
         "limits": data.draw(
             st.dictionaries(st.sampled_from(["inner_warps", "outer_warps", "canvas"]), st.integers(0, 2))
         ),

@@ -8,9 +8,10 @@ derivatives (`lab.slopes`), and so has e. The mean value theorem makes one of f 
 whose interval reaches farther than what was seen in their cell are cut in four.
 
 Within half a sector (`SECTORS` of `scenelang.compiler.geometries`) e is the distance to one segment, with a
-sign. Its gradient is the segment's normal beside the segment. Elsewhere it is the direction from the nearest
-point. As p less its nearest point of a convex set changes by no more than p does, that direction changes by at
-most 2 r / (2 d - r) within r of where the distance is d. Where a box meets more half sectors, it may be any's.
+sign. Its gradient is the segment's normal beside the segment. Elsewhere it is the direction from the
+nearest point. As p less its nearest point of a convex set changes by no more than p does, that direction
+changes by at most 2 r / (2 d - r) within r of where the distance is d. Where a box meets more half sectors,
+it may be any's.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,10 @@ from scenelang.compiler.groups import OPERATOR
 from scenelang.compiler.manifest import Manifest
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import (
+    GAP,
     MOST_DB,
     UNCAPPED_DB,
     compare,
-    contact_sheet,
     over_white,
     psnr,
     side_by_side,
@@ -77,6 +77,17 @@ def sheet(
         picture, exact = draw_scene(model, scene)[1], exact_of(scene, model.manifest, kept)
         rows.append(side_by_side(over_white(picture), over_white(exact), label))
     return contact_sheet(rows)
+
+
+def contact_sheet(rows: Sequence[Image], columns: int = 2) -> Image:
+    """Put pictures of one size on a sheet, row by row."""
+    height, width = rows[0].shape[:2]
+    lines = -(-len(rows) // columns)
+    sheet = np.ones((lines * (height + GAP), columns * (width + 3 * GAP), 3), np.float32)
+    for index, row in enumerate(rows):
+        top, left = index // columns * (height + GAP), index % columns * (width + 3 * GAP)
+        sheet[top : top + height, left : left + width] = row
+    return sheet.view(Image)
 
 
 def evaluate_set(

@@ -14,11 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lab.about import Report, about, silent
+from lab.evaluate import contact_sheet
 from lab.sets.scenes import draw_scene, spread
 from lab.solid_probes import shadow
 from scenelang.compiler.manifest import Manifest
 from scenelang.drawing.image import Image
-from scenelang.drawing.metrics import MOST_DB, UNCAPPED_DB, contact_sheet, psnr, side_by_side
+from scenelang.drawing.metrics import MOST_DB, UNCAPPED_DB, psnr, side_by_side
 from scenelang.drawing.neural.load import Model
 from scenelang.language.scene import Scene
 from scenelang.output.plan import reference_of

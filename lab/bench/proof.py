@@ -31,7 +31,8 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.how import keep_memory
 from scenelang.drawing.image import PROVED
-from scenelang.drawing.proof import Band, Enclosure, Stream, known_errors, prove_image
+from scenelang.drawing.neural.meetings import Interval
+from scenelang.drawing.proof import Band, Stream, known_errors, prove_image
 from scenelang.drawing.small import draw_small
 
 ROUNDS = 3
@@ -40,7 +41,7 @@ ROUNDS = 3
 class Formulas(Stream):
     """Exact distances in place of learned ones, also of regions."""
 
-    def distance(self, which: Any, q: Any, exactly: bool) -> Enclosure:
+    def distance(self, which: Any, q: Any, exactly: bool) -> Interval:
         return super().distance(which, q, True)
 
 

@@ -6,11 +6,11 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -144,29 +144,6 @@ def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
     for d in (d for part in parts for d in part):
         result.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
     return result
-
-
-SUFFIX: Final = ".nsg"
-
-
-def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str]:
-    """The scenes of a command line: files, ``-`` too, and those in folders by name; no hidden ones or links.
-
-    ``lost`` is told of folders that cannot be listed.
-    """
-    for path in paths:
-        if not os.path.isdir(path):
-            yield path
-            continue
-        try:
-            with os.scandir(path) as entries:
-                found = sorted(entries, key=lambda entry: entry.name)
-        except OSError as error:
-            lost(error)
-            continue
-        shown = [entry for entry in found if not (entry.name.startswith(".") or entry.is_symlink())]
-        inside = [e.path for e in shown if e.is_dir() or (e.name.endswith(SUFFIX) and e.is_file())]
-        yield from named(inside, lost)
 
 
 Color = Literal["auto", "always", "never"]

@@ -8,9 +8,9 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, Final
 
 import click
 
@@ -18,6 +18,8 @@ from scenelang.language.diagnostics import Diagnostic
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+
+SUFFIX: Final = ".nsg"
 
 
 _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
@@ -160,3 +162,23 @@ class Bar:
                 self._shown.reset(task)
             self._done = done
             self._shown.update(task, description=what, completed=done, total=total)
+
+
+def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str]:
+    """The scenes of a command line: files, ``-`` too, and those in folders by name; no hidden ones or links.
+
+    ``lost`` is told of folders that cannot be listed.
+    """
+    for path in paths:
+        if not os.path.isdir(path):
+            yield path
+            continue
+        try:
+            with os.scandir(path) as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
+        except OSError as error:
+            lost(error)
+            continue
+        shown = [entry for entry in found if not (entry.name.startswith(".") or entry.is_symlink())]
+        inside = [e.path for e in shown if e.is_dir() or (e.name.endswith(SUFFIX) and e.is_file())]
+        yield from named(inside, lost)

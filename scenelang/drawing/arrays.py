@@ -1,12 +1,12 @@
 """The dozen functions by which numpy arrays and torch tensors differ; all else is written as both have it.
 
 The field is written once, for a network whose `xp` is `NUMPY` here or `TORCH` (`arrays_torch.py`). Points lie
-along the last axis, M, and functions leave their arguments as they are, `put` aside.
+along the last axis, M. Functions leave their arguments as they are; `put`, `add` and `unit` write in place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import Any, ClassVar
@@ -88,15 +88,15 @@ class Arrays:
 
     def add_product(self, total: Array, x: Array, factor: Array | float) -> Array:
         """``total + x * factor``, rounded once where the library can."""
-        found = x * factor
-        found += total
-        return found
+        result = x * factor
+        result += total
+        return result
 
     def dense(self, x: Array, w: Array, b: Array) -> Array:
         """A layer ``w @ x + b``: (…, in, M), (…, out, in), (…, out)."""
-        found = w @ x
-        found += b[..., None]
-        return found
+        result = w @ x
+        result += b[..., None]
+        return result
 
     def perceptron(self, x: Array, layers: Layers) -> Array:
         """Layers with rectified linear units between: (out, M) of (in, M); torch takes leading axes too."""
@@ -117,9 +117,9 @@ class Arrays:
 
     def smooth(self, x: Array, layers: Smooth) -> Array:
         """Layers with SiLU between: (out, M) of (in, M)."""
-        found = np.empty((len(layers[-1][1]), x.shape[1]), x.dtype)
+        result = np.empty((len(layers[-1][1]), x.shape[1]), x.dtype)
         for start in range(0, x.shape[1], SMOOTH_BLOCK):
-            into = found[:, start : start + SMOOTH_BLOCK]
+            into = result[:, start : start + SMOOTH_BLOCK]
             inputs = np.ones((len(x) + 1, into.shape[1]), x.dtype)  # a last row for the biases
             inputs[:-1] = x[:, start : start + SMOOTH_BLOCK]
             for weights in layers.joined[:-1]:
@@ -131,7 +131,7 @@ class Arrays:
                 units += 1.0
                 units *= half
             np.matmul(layers.joined[-1], inputs, out=into)
-        return found
+        return result
 
     def take(self, x: Array, index: Array) -> Array:
         """Entries (…, k) of (…, M)."""
@@ -156,6 +156,18 @@ class Arrays:
 
     def one_core(self) -> None:
         """Have this thread compute each operation on one core."""
+
+    def each(self, threads: int, work: Callable[[Any], object], items: Sequence[Any]) -> None:
+        """Call ``work`` on each item, in so many threads if there is more than one item."""
+        if threads == 1 or len(items) == 1:
+            for item in items:
+                work(item)
+            return
+        from concurrent.futures import ThreadPoolExecutor
+
+        # every worker computes on one core; torch would otherwise split each small product again
+        with ThreadPoolExecutor(threads, initializer=self.one_core) as pool:
+            list(pool.map(work, items))
 
 
 NUMPY = Arrays()

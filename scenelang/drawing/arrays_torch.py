@@ -35,10 +35,10 @@ class Torch(Arrays):
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:
-        found = torch.from_numpy(values)
+        result = torch.from_numpy(values)
         if like.device.type == "cuda":  # from page-locked memory, for which the host need not wait
-            found = found.pin_memory()
-        return found.to(like.device, non_blocking=True)
+            result = result.pin_memory()
+        return result.to(like.device, non_blocking=True)
 
     def full(self, shape: tuple[int, ...], value: float, like: Tensor) -> Tensor:
         return like.new_full(shape, value)

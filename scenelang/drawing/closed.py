@@ -1,6 +1,6 @@
-"""The exact field: formulas of leaves and fold in place of the network, with all that the renderer saves.
+"""The exact field: formulas of leaves and fold in place of the network, drawn by the same renderer.
 
-Shapes of users have no formula and stay the grids that they are.
+Shapes that users bring have no formula; they stay grids.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class ExactShape:
         return self.row.distance(q)
 
     def rise(self, q: Floats, radius: Floats) -> Floats:
-        """By how much distances (M,) at leaf coordinates (2, M) differ at most from those within radii."""
+        """Greatest difference (M,) of distances at leaf coordinates (2, M) from those within radii (M,)."""
         return radius
 
 
@@ -82,7 +82,7 @@ class ExactSectors(ExactShape):
 
 
 class ClosedPlane(FramedArrays):
-    """What `FramedArrays` has learned, computed: distances, albedo, and a cell with the weights of the fold.
+    """`FramedArrays` by formulas: distances, albedo, and a cell whose weights are those of the fold.
 
     Args:
         model: whose Programs are drawn.
@@ -95,6 +95,7 @@ class ClosedPlane(FramedArrays):
         self.config = FramedConfig(self.config.code, self.config.material_code)
         self.slopes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
         self.read_slope = np.float32(math.log(4 * SHARP))
+        # a gate is a clamped line: 0.5 where both sides are equal, and open after 1 / (2 slope) world units
         s, k = SHARP, 0.5 / BLEND
         shut = [0.0, 0.0, -1.0]
         # of each token the gates of distance and colour: lines in (d, D), and their biases
@@ -118,7 +119,7 @@ class ClosedPlane(FramedArrays):
 
 
 class ClosedSolids(SolidArrays):
-    """What `SolidArrays` has learned, computed: distances, their gradients, looks and the fold.
+    """`SolidArrays` by formulas: distances, their gradients, looks and the fold.
 
     Args:
         model: whose Programs are drawn.
@@ -157,8 +158,8 @@ class ClosedSolids(SolidArrays):
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
         tokens, joined = cell.own[0], None
         for token in np.unique(tokens):
-            found = _joined(token, cell.past[0], memory[0], d)
-            joined = found if joined is None else np.where(tokens == token, found, joined)
+            result = _joined(token, cell.past[0], memory[0], d)
+            joined = result if joined is None else np.where(tokens == token, result, joined)
         assert joined is not None
         register, paint = memory[1:], joined[2]
         if wanted != Wanted.DISTANCE:

@@ -1,4 +1,4 @@
-"""How a picture may be drawn, why it cannot be, and how the C library gives memory back."""
+"""Options of drawing, the error of drawing, and the process's memory and cores."""
 
 from __future__ import annotations
 

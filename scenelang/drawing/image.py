@@ -1,4 +1,4 @@
-"""Pictures as arrays that save and show themselves, and outputs beside colour with their files.
+"""Pictures as arrays that save and show themselves, and their other outputs with the files of these.
 
 A PNG holds one output in 16 bits, an EXR the picture and all outputs as layers of floats. Both carry a text
 ``scenelang``, JSON, that says what the numbers are and which objects are seen.
@@ -32,20 +32,20 @@ if TYPE_CHECKING:
 
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")
-"""What 2D pictures have."""
+"""Outputs of 2D pictures."""
 DEEP = 0.01
 """World units in a medium where its object is asked for, where it is as deep."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PROVED = 1 / 255
-"""Of a channel: a pixel that is proved to be so near the exact one counts as right."""
+"""Greatest error of a channel in a pixel that counts as proved right."""
 Floats = npt.NDArray[np.float32]
 Source = dict[str, str | int]
-"""Of an object its ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
+"""An object's ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proof:
-    """How far a picture may be from the exact one; row 0 is the top.
+    """Bounds of a picture's distance from the exact one; row 0 is the top.
 
     Args:
         bound: float32 (H, W), no less than the largest difference of a pixel's channels, in [0, 1] and, where
@@ -60,12 +60,12 @@ class Proof:
 
     @property
     def share(self) -> float:
-        """Of pixels that are proved right to `PROVED`."""
+        """Share of pixels that are proved right to `PROVED`."""
         return float((self.bound <= PROVED).mean())
 
     @property
     def left(self) -> int:
-        """How many pixels are not."""
+        """Number of pixels that are not."""
         return int((self.bound > PROVED).sum())
 
     @property
@@ -79,7 +79,7 @@ class Proof:
         return {"to": PROVED, **figures, "unknown": list(self.unknown)}
 
     def told(self) -> str:
-        """What to say about it."""
+        """A sentence about the proof."""
         percent = int(self.share * 1e5) / 1e3  # rounded down, so that only all are 100
         again = f", {self.redrawn:,} of them drawn again" if self.redrawn else ""
         rest = f"; {self.left:,} are not, by at most {255 * self.worst:.0f}/255" if self.left else ""
@@ -116,20 +116,20 @@ class Outputs:
     proof: Proof | None = None
 
     def only(self, wanted: Sequence[Output], sources: Mapping[int, Source]) -> Outputs:
-        """Those that are asked for, with what ``sources`` says of the objects that are seen."""
-        found = {name: getattr(self, name) for name in wanted}
+        """Select the outputs that are wanted, with the ``sources`` of the objects that are seen."""
+        result = {name: getattr(self, name) for name in wanted}
         if self.object is None or "object" not in wanted:
-            return Outputs(**found)
+            return Outputs(**result)
         seen = {n: sources[n] for n in np.unique(self.object).tolist() if n}
-        return Outputs(**found, objects=seen)
+        return Outputs(**result, objects=seen)
 
     @property
     def names(self) -> tuple[Output, ...]:
-        """Those that there are."""
+        """Names of the outputs that are not None."""
         return tuple(name for name in get_args(Output) if getattr(self, name) is not None)
 
     def facts(self, name: Output) -> dict[str, Any]:
-        """What the file of an output says of its numbers, as JSON data."""
+        """Meaning of an output's numbers for its file, as JSON data."""
         said: dict[str, Any] = {"output": name}
         if name == "depth":
             near, far = self.range()
@@ -145,11 +145,11 @@ class Outputs:
     def range(self) -> tuple[float | None, float | None]:
         """Least and greatest depth; None where no surface is seen."""
         assert self.depth is not None
-        found = self.depth[np.isfinite(self.depth)]
-        return (float(found.min()), float(found.max())) if found.size else (None, None)
+        result = self.depth[np.isfinite(self.depth)]
+        return (float(result.min()), float(result.max())) if result.size else (None, None)
 
     def told(self, name: Output) -> str:
-        """What to say about the file of an output."""
+        """A few words about the file of an output."""
         if name != "depth":
             seen = f"{plural(len(self.objects or ()), 'object')} seen"
             known = {"normal": "normals in world axes", "object": seen, "proof": "bounds of pixels"}
@@ -166,8 +166,8 @@ class Outputs:
         Raises:
             ValueError: a number has more than 16 bits.
         """
-        found = getattr(self, name)
-        facts, values = self.facts(name), np.asarray(getattr(found, "bound", found), np.float64)
+        result = getattr(self, name)
+        facts, values = self.facts(name), np.asarray(getattr(result, "bound", result), np.float64)
         if name == "depth":
             values = 65535.0 * (facts["near"] or 0.0) / values
             facts["stored"] = "65535 near / depth, 0 for none"
@@ -194,24 +194,27 @@ class Outputs:
             ValueError: a format that cannot hold them, or what writes it is not installed.
             OSError: a file cannot be written.
         """
-        path, facts = Path(path), [self.facts(name) for name in self.names]
-        files = [output_file(path, name) for name in self.names]
+        path = Path(path)
+        contents = self.packed(path)  # all, before any is written
+        for file, data in contents.items():
+            (write_output if file == path else write_whole)(file, data)
+        return list(contents)
+
+    def packed(self, path: Path, layers: Mapping[str, Floats] | None = None) -> dict[Path, bytes]:
+        """Contents of the files of `save`, with further ``layers`` in an EXR; raises as that does."""
+        files = {output_file(path, name): name for name in self.names}
         if path in files:
-            write_output(path, exr(self.layers(), facts))
-            return [path]
-        pictures = [self.png(name) for name in self.names]  # all, before any is written
-        for file, data in zip(files, pictures, strict=True):
-            write_whole(file, data)
-        return files
+            return {path: exr({**(layers or {}), **self.layers()}, [self.facts(name) for name in self.names])}
+        return {file: self.png(name) for file, name in files.items()}
 
     def layers(self) -> dict[str, Floats]:
         """The channels of an EXR."""
         single = {"depth.Z": self.depth, "object.id": self.object, "alpha.A": self.alpha}
         single |= {"proof.bound": None if self.proof is None else self.proof.bound}
-        found = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
+        result = {name: np.asarray(v, np.float32) for name, v in single.items() if v is not None}
         if self.normal is not None:
-            found |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}
-        return found
+            result |= {f"normal.{axis}": self.normal[..., at] for at, axis in enumerate("XYZ")}
+        return result
 
 
 def chunk(kind: bytes, body: bytes) -> bytes:
@@ -230,7 +233,7 @@ def png16(values: npt.NDArray[np.uint16], text: str) -> bytes:
 
 
 def output_file(path: Path, name: Output) -> Path:
-    """Where an output of a picture goes: ``STEM.depth.png``, or into the picture if that is an EXR.
+    """Path of an output of a picture: ``STEM.depth.png``, or the picture itself if that is an EXR.
 
     Raises:
         ValueError: the picture is neither.
@@ -291,7 +294,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         write_output(path, self.encode(image_format(path)))
 
     def encode(self, kind: str = "PNG") -> bytes:
-        """What a file holds, in one of Pillow's formats or as ``"EXR"``, which has `layers`.
+        """Contents of a file in one of Pillow's formats, or as ``"EXR"``, which has `layers`.
 
         Formats without alpha (JPEG) get the picture over white.
         """
@@ -327,17 +330,13 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
 
 def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
-    """What the files of a picture and of its outputs hold, the picture's first.
+    """Contents of the files of a picture and of its outputs, the picture's first.
 
     Raises:
         ValueError: their format cannot hold them.
     """
-    files = [output_file(path, name) for name in outputs.names]
-    if path in files:
-        facts = [outputs.facts(name) for name in outputs.names]
-        return {path: exr({**image.layers(), **outputs.layers()}, facts)}
-    pictures = {file: outputs.png(name) for file, name in zip(files, outputs.names, strict=True)}
-    return {path: image.encode(image_format(path)), **pictures}
+    contents = outputs.packed(path, image.layers())
+    return contents if path in contents else {path: image.encode(image_format(path)), **contents}
 
 
 def save_outputs(image: Image, outputs: Outputs, path: Path) -> list[Path]:
@@ -412,5 +411,5 @@ def enlarged(picture: Image, canvas: tuple[int, int]) -> Image:
     if clear := picture.shape[2] == 4:
         parts = np.concatenate([parts[..., :3] * parts[..., 3:], parts[..., 3:]], 2)
     channels = [pillow.fromarray(np.ascontiguousarray(part)) for part in np.moveaxis(parts, 2, 0)]
-    found = np.stack([np.asarray(c.resize(canvas, pillow.Resampling.BILINEAR)) for c in channels], 2)
-    return from_samples(found[..., :3], found[..., 3] if clear else None)
+    result = np.stack([np.asarray(c.resize(canvas, pillow.Resampling.BILINEAR)) for c in channels], 2)
+    return from_samples(result[..., :3], result[..., 3] if clear else None)

@@ -6,7 +6,6 @@ All take float arrays (H, W, 3) of sRGB-encoded values in [0, 1].
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ def flip(picture: Array, reference: Array) -> float:
 
 
 def compare(picture: Array, reference: Array) -> dict[str, float]:
-    """How near a picture is to another: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
+    """Similarity of two pictures: PSNR in dB (at most `MOST_DB`), SSIM and FLIP by name.
 
     Args:
         picture: float (H, W, 3) or, with straight alpha, (H, W, 4), sRGB-encoded in [0, 1]; alpha is put over
@@ -111,14 +110,3 @@ def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = 
         sheet.paste(np.asarray(part, np.float32).view(Image).to_pil(), (left, TEXT))
         pen.text((left + 2, 1), f"{name} {label}" if column == 0 else name, fill="black")
     return (np.asarray(sheet, np.float32) / 255).view(Image)
-
-
-def contact_sheet(rows: Sequence[Image], columns: int = 2) -> Image:
-    """Put pictures of one size on a sheet, row by row."""
-    height, width = rows[0].shape[:2]
-    lines = -(-len(rows) // columns)
-    sheet = np.ones((lines * (height + GAP), columns * (width + 3 * GAP), 3), np.float32)
-    for index, row in enumerate(rows):
-        top, left = index // columns * (height + GAP), index % columns * (width + 3 * GAP)
-        sheet[top : top + height, left : left + width] = row
-    return sheet.view(Image)

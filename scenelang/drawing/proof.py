@@ -1,19 +1,16 @@
 """Bounds, proved pixel by pixel, of how far a picture of the plane may differ from the exact one.
 
-They are of the chain as written, so that they cover what the passes make of it.
+A region of the picture has a distance to each object: the exact one at its centre, enclosed in an interval,
+widened by the region's radius in the leaf's own coordinates, as exact distances change by no more. Intervals
+pass through the exact fold, by the formulas of `exact/field.py`; its state is monotonic in both distances, so
+the ends of its interval come from theirs. Where the result is one colour, all samples of the region have it.
+Elsewhere objects that are certain to change nothing are dropped, and the region's quarters are asked, down to
+single samples. All bounds are of the scene as written, so that they cover the compiler's passes too.
 
-The formulas are those of `drawing.exact.field`. The state is monotonic in both distances, so the ends of its
-interval come of theirs.
-
-`python -m lab.errors` proves it. Within `RADIUS` a cell of leaf coordinates says between which
-numbers learned less exact distance lies. Farther points are seen at the rim: a leaf lies in the unit disc,
-so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine of the
-largest angle between the ways from the origin and from a point of the disc.
-
-A region's distance to an object is the exact one at its centre, enclosed, give or take how far the region
-reaches in the leaf's own coordinates, as exact distances change by no more. Intervals through the exact fold
-say what it shows. Where that is one colour, all of its samples do. Elsewhere objects that are certain to
-change nothing are dropped, and the region's quarters are asked, down to single samples.
+The exact distance at a centre is the learned one, less an error that `python -m lab.errors` has enclosed for
+each cell of leaf coordinates within `RADIUS`. The network sees farther points at the rim: a leaf lies in the
+unit disc, so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine
+of the largest angle between the ways from the origin and from a point of the disc.
 """
 
 from __future__ import annotations
@@ -51,10 +48,12 @@ from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
 from scenelang.drawing.neural.meetings import (
     Index,
+    Interval,
     Mask,
     Meetings,
     Nesting,
     Pairs,
+    State,
     Turn,
     flat_nesting,
     meetings_of,
@@ -64,8 +63,8 @@ from scenelang.drawing.neural.meetings import (
 from scenelang.drawing.neural.network import RADIUS, FramedNetwork
 from scenelang.language.words import TOKENS
 
-TAME = 1e-9  # leaf units: what is allowed for in any case
-EPS = 32 * 2.0**-52  # of a number: what one step may lose of it
+TAME = 1e-9  # leaf units: an error that is allowed for in any case
+EPS = 32 * 2.0**-52  # relative error of one step: a few dozen roundings of float64
 
 
 class Written(NamedTuple):
@@ -84,7 +83,7 @@ class Written(NamedTuple):
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
     def discoloured(self, reach: float, far: float) -> float:
-        """Of a channel, by how much the colours of a texture may be off there."""
+        """Greatest error of a channel of a texture's colours there."""
         if self.look.element is None:
             return 0.0
         reach = min(reach, _seen(self.steps, far))
@@ -100,20 +99,20 @@ class Written(NamedTuple):
 
 def written(root: Fold) -> dict[int, Written]:
     """All objects of a lowered graph, by number."""
-    found: dict[int, Written] = {}
+    result: dict[int, Written] = {}
     todo: list[tuple[Node, tuple[Step, ...]]] = [(root, ())]
     while todo:
         node, outer = todo.pop()
         steps = (*[move.step for move in node.moves], *outer)
         if isinstance(node, Leaf):
-            found[node.number] = Written(node.look, steps)
+            result[node.number] = Written(node.look, steps)
         else:
             todo += [(link.node, steps) for link in node.links]
-    return found
+    return result
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
-    """How long leaf coordinates are at most of points that are no longer than ``far`` in the world."""
+    """Greatest length of leaf coordinates of points that are no longer than ``far`` in the world."""
     size = np.full(2, far)
     for step in reversed(steps):
         if isinstance(step, Affine):
@@ -125,7 +124,7 @@ def _seen(steps: Sequence[Step], far: float) -> float:
 
 
 def _misplaced(steps: Sequence[Step], far: float) -> float:
-    """How far float64 may put points, no longer than ``far`` in the leaf, from where they are there.
+    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there.
 
     Everything is by coordinates, without signs: `size` of points behind the steps so far, `ways` how far they
     move in the leaf as they move there, `forth` the reverse.
@@ -147,7 +146,7 @@ def _misplaced(steps: Sequence[Step], far: float) -> float:
 
 
 def _unlike(rows: Rows) -> float | None:
-    """What is lost of a point where a warp moves past a map that counts as similar, None where none does."""
+    """Error of a point where a warp moves past a map that counts as similar, None where none does."""
     a, b, _, x, c, d, _, y = rows[:8]
     turned, mirrored = max(abs(a - d), abs(b + c)), max(abs(a + d), abs(b - c))
     off = max(min(turned, mirrored), abs(x), abs(y)) / (sqrt(abs(a * d - b * c)) or 1.0)
@@ -165,22 +164,15 @@ Floats = npt.NDArray[np.float64]
 NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
 
 
-class Enclosure(NamedTuple):
-    """Numbers from ``low`` to ``high``."""
-
-    low: Floats
-    high: Floats
-
-
 class Enclosed(NamedTuple):
-    """What is certain of regions.
+    """Facts that are certain of regions.
 
     Args:
         shown: channels (K, B).
         left: (P,) objects that may change what is shown.
     """
 
-    shown: Enclosure
+    shown: Interval
     left: Mask
 
 
@@ -204,8 +196,8 @@ class Joins(NamedTuple):
 
 def enclosed(
     meetings: Meetings,
-    distance: Enclosure,
-    colour: Enclosure,
+    distance: Interval,
+    colour: Interval,
     joins: Joins,
     behind: Floats,
     nest: Nesting | None = None,
@@ -225,17 +217,15 @@ def enclosed(
     shut, opened = np.empty((2, pairs), bool)
     if nest is None:
         nest = flat_nesting(meetings)
-    state = _State.empty(count * nest.levels)
+    state, operands = _Exact.empty(NOTHING, count * nest.levels, np.float64), State(distance, colour)
 
     def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
-        part = turn.part
-        own = Enclosure(*(d[part] for d in distance)), Enclosure(*(c[:, part] for c in colour))
-        return state.join(places, *own, joins.some(part), turn.fresh)
+        return state.join(places, operands.at(turn.part), joins.some(turn.part), turn.fresh)
 
     def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
         assert groups is not None
-        joined = state.join(below, *state.at(top), groups.some(ended), np.zeros(len(ended), bool))
-        state.clear(top)
+        joined = state.join(below, state.at(top), groups.some(ended), np.zeros(len(ended), bool))
+        state.clear(top, NOTHING)
         return joined
 
     nest.fold(count, shut, opened, pair, group)
@@ -243,43 +233,25 @@ def enclosed(
     if len(behind) > 3:
         first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
     back = behind[:, None]
-    shown = Enclosure(
+    shown = Interval(
         np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
         np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
     )
     return Enclosed(shown, ~shut)
 
 
-class _State(NamedTuple):
-    """Distances (B,) and colours (3, B) of a fold."""
+class _Exact(State):
+    """States of the exact fold."""
 
-    distance: Enclosure
-    colour: Enclosure
-
-    @classmethod
-    def empty(cls, count: int) -> _State:
-        return cls(Enclosure(*np.full((2, count), NOTHING)), Enclosure(*np.zeros((2, 3, count))))
-
-    def at(self, columns: Index | slice) -> tuple[Enclosure, Enclosure]:
-        """Return distances and colours in some columns."""
-        return tuple(Enclosure(low[..., columns], high[..., columns]) for low, high in self)  # type: ignore[return-value]
-
-    def clear(self, columns: Index | slice) -> None:
-        """Empty it in some columns."""
-        for side, colour in zip(self.distance, self.colour, strict=True):
-            side[columns], colour[:, columns] = NOTHING, 0.0
-
-    def join(
-        self, columns: Index | slice, distance: Enclosure, colour: Enclosure, how: Joins, fresh: Mask
-    ) -> tuple[Mask, Mask]:
+    def join(self, columns: Index | slice, operand: State, how: Joins, fresh: Mask) -> tuple[Mask, Mask]:
         """Take in n operands, ``fresh`` ones as they are; which change nothing, which leave nothing else."""
-        (d, e), (token, k, free) = distance, how
+        (d, e), (token, k, free) = operand.distance, how
         a, b = self.distance.low[columns].copy(), self.distance.high[columns].copy()
         union = token == UNION
         # the object's share of the colour; of a union all or none
         some = union & ((e < np.maximum(a, 0.0)) | (free & (a >= 0.0)))
         most = union & (some | ((d < np.maximum(b, 0.0)) & ~(free & (d >= 0.0))))
-        shares: tuple[Floats, Floats] = some.astype(float), most.astype(float)
+        shares = some.astype(float), most.astype(float)
         ends = np.minimum(a, d), np.minimum(b, e)
         closed, wide = d >= np.where(free, 0.0, np.maximum(b, 0.0)), e < np.where(free, 0.0, a)
         if (which := token == SMOOTH).any():
@@ -301,10 +273,7 @@ class _State(NamedTuple):
             ends, shares = _chosen(fresh, (d, e), ends), _chosen(fresh, (1.0, 1.0), shares)
             closed, wide = closed & ~fresh, wide | fresh
         self.distance.low[columns], self.distance.high[columns] = ends
-        for side, choose, own in zip(self.colour, (np.minimum, np.maximum), colour, strict=True):
-            now = side[:, columns]
-            more = own - now
-            side[:, columns] = now + choose(shares[0] * more, shares[1] * more)
+        self.paint(columns, operand.colour, Interval(*shares))
         return closed, wide
 
 
@@ -314,12 +283,12 @@ def _chosen(which: Mask, new: tuple[Any, Any], old: tuple[Any, Any]) -> tuple[An
 
 def blended(meetings: Meetings, rounds: Mask) -> Mask:
     """After which pairs (P,) a blend follows in their region."""
-    found, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
+    result, seen = np.empty(len(rounds), bool), np.zeros(len(meetings.columns), bool)
     for part in reversed(meetings.slots()):
         n = part.stop - part.start
-        found[part] = seen[:n]
+        result[part] = seen[:n]
         seen[:n] |= rounds[part]
-    return found
+    return result
 
 
 def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
@@ -333,7 +302,7 @@ def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
 CELLS = 128  # along a side of [-RADIUS, RADIUS]
 PROVER = "shapes2d"
 """The model whose distances are proved. It has every leaf of the plane; they tell of any model's pictures."""
-_SLOWEST = (1 - RADIUS**-2) ** 0.5
+_SLOWEST = (1 - RADIUS**-2) ** 0.5  # the cosine of the largest angle, whose sine is 1 / RADIUS
 _CHUNK = 2048  # points that go through a decoder at once
 
 
@@ -349,7 +318,7 @@ class Errors:
         self._layers = layers
         self._low, self._high = (np.asarray(side, np.float64) for side in (low, high))
 
-    def exact(self, q: Floats) -> Enclosure:
+    def exact(self, q: Floats) -> Interval:
         """The exact distance (M,) at leaf coordinates (2, M), leaf units, by the learned one."""
         length = np.sqrt(q[0] * q[0] + q[1] * q[1])
         beyond = np.maximum(length - RADIUS, 0.0)
@@ -357,11 +326,11 @@ class Errors:
         parts = [seen[:, at : at + _CHUNK] for at in range(0, seen.shape[1], _CHUNK)]
         learned = np.concatenate([NUMPY.perceptron(part, self._layers)[0] for part in parts])
         x, y = ((seen + RADIUS) * (CELLS / (2 * RADIUS))).astype(np.intp).clip(0, CELLS - 1)
-        return Enclosure(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
+        return Interval(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
 
 
 def errors_path(name: str) -> Path:
-    """Where the file of a shipped model lies."""
+    """Path of the file of a shipped model."""
     return model_folder(name) / "errors.safetensors"
 
 
@@ -386,7 +355,9 @@ def load_errors(name: str = PROVER) -> dict[str, Errors]:
 def layers_of(network: FramedNetwork, geometry: int) -> Layers:
     """The decoder of a geometry in float64, so that every machine computes the same distances."""
     one = np.append(network.codes[geometry].astype(np.float64), 1.0)
-    parts = [[part.astype(np.float64) for part in found] for found in (network.decoder_w, network.decoder_b)]
+    parts = [
+        [part.astype(np.float64) for part in result] for result in (network.decoder_w, network.decoder_b)
+    ]
     return [(np.tensordot(one, w, 1).T, one @ b) for w, b in zip(*parts, strict=True)]
 
 
@@ -442,13 +413,13 @@ class Stream:
         self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
-        """How many objects a place on the canvas is in reach of, in the mean."""
+        """Mean number of objects that reach a place on the canvas."""
         every, half = np.isinf(self.reach), np.array(canvas)[:, None] / min(canvas)
         low, high = self.frames.boxes(np.where(every, 0.0, self.reach))
         sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
         return float((sides[0] * sides[1]).sum())
 
-    def distance(self, which: Index, q: Floats, exactly: bool) -> Enclosure:
+    def distance(self, which: Index, q: Floats, exactly: bool) -> Interval:
         """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
 
         Args:
@@ -463,15 +434,15 @@ class Stream:
             p = q[:, some]
             if name in self.unknown:
                 length = np.hypot(*p)
-                found = Enclosure(length - 1, length + 1)
+                result = Interval(length - 1, length + 1)
             elif exactly:
-                found = Enclosure(*[leaf_distance(name, p)] * 2)
+                result = Interval(*[leaf_distance(name, p)] * 2)
             else:
-                found = self._known[name].exact(p)
-            low[some], high[some] = found
-        return Enclosure(low, high)
+                result = self._known[name].exact(p)
+            low[some], high[some] = result
+        return Interval(low, high)
 
-    def colour(self, which: Index, q: Floats, sampled: bool) -> Enclosure:
+    def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
         """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
         low, high = self._plain[:, which], self._plain[:, which]
         for at in np.unique(which[self._painted[which]]).tolist():
@@ -480,7 +451,7 @@ class Stream:
             if sampled:
                 seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
-        return Enclosure(low, high)
+        return Interval(low, high)
 
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
@@ -506,18 +477,18 @@ class Band:
         )
         self._every = np.empty((2, grid.high // 2, grid.wide // 2, len(behind)))
         self._every[:] = behind
-        self.shown = Enclosure(*self._every[:, : len(rows), :width])
+        self.shown = Interval(*self._every[:, : len(rows), :width])
         pairs = grid.reached(stream.frames, self._reach)
         for side in SIDES[:-1]:
             columns, shown, pairs = self._looked(pairs, side)
             known = (shown.high - shown.low).max(0) <= FLAT
-            self._write(columns[known], Enclosure(shown.low[:, known], shown.high[:, known]), side)
+            self._write(columns[known], Interval(shown.low[:, known], shown.high[:, known]), side)
             done = np.zeros(grid.wide * grid.high // side**2, bool)
             done[columns[known]] = True
             pairs = pairs.take(~done[pairs.block])
             if side > 2:
                 pairs = pairs.split(grid.wide // side, 2)
-        self._pixels = pairs  # those that are told by their samples
+        self._pixels = pairs  # pixels that are drawn by their samples
         self._sampled(exactly=False)
 
     def draw(self, wanted: Mask) -> None:
@@ -527,7 +498,7 @@ class Band:
         self._pixels = self._pixels.take(every.ravel()[self._pixels.block])
         self._sampled(exactly=True)
 
-    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Enclosure, Pairs]:
+    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Interval, Pairs]:
         """Regions, what they show (K, B), and the pairs that have to be asked again."""
         stream, grid = self._stream, self._grid
         place, half = np.stack(grid.place(pairs.block, side)), (side - 1) / 2
@@ -543,18 +514,18 @@ class Band:
         exact, colour = stream.distance(thing, q, exactly), stream.colour(thing, q, side == 1)
         # what is not a number bounds nothing
         low = np.fmax((exact.low - radius) * scale, -NOTHING)
-        world_distance = Enclosure(low, np.fmin((exact.high + radius) * scale, NOTHING))
+        world_distance = Interval(low, np.fmin((exact.high + radius) * scale, NOTHING))
         joins, nest = stream.joins.some(thing), None
         if stream.groups.deepest:
             nest = nesting(meetings, stream.groups)
         else:
             joins = joins._replace(free=~blended(meetings, stream.rounds[thing]))
-        told = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
+        result = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
         left = np.empty(len(pairs), bool)
-        left[source] = told.left
-        return meetings.columns, told.shown, pairs.take(left)
+        left[source] = result.left
+        return meetings.columns, result.shown, pairs.take(left)
 
-    def _write(self, region: Index, shown: Enclosure, side: int) -> None:
+    def _write(self, region: Index, shown: Interval, side: int) -> None:
         x, y = self._grid.place(region, side)
         for every, values in zip(self._every, shown, strict=True):
             shape = self._grid.high // side, side // 2, -1, side // 2, len(self._behind)
@@ -614,15 +585,15 @@ def prove_image(
     for top in range(0, height, rows):
         part = range(top, min(top + rows, height))
         band, drawn = Band(stream, graph.canvas, part, behind), picture[part.start : part.stop]
-        found = _off(drawn, band.shown)
-        if redraw and (bad := found > PROVED).any():
+        result = _off(drawn, band.shown)
+        if redraw and (bad := result > PROVED).any():
             band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))
             middle = (band.shown.low + band.shown.high) / 2
             bad &= _off(middle, band.shown) <= PROVED  # what stays open stays as it was drawn
             drawn[bad] = middle[bad]
-            found = _off(drawn, band.shown)
+            result = _off(drawn, band.shown)
             redrawn += int(bad.sum())
-        bound[part.start : part.stop] = found
+        bound[part.start : part.stop] = result
     if redrawn:
         credit = image.credit
         image = from_samples(picture[..., :3], picture[..., 3] if clear else None)
@@ -630,17 +601,17 @@ def prove_image(
     return image, Proof(bound, redrawn, stream.unknown)
 
 
-def _off(drawn: Floats, shown: Enclosure) -> Floats:
-    """How far pixels (H, W, K) may lie from what is shown, by their worst channels."""
+def _off(drawn: Floats, shown: Interval) -> Floats:
+    """Greatest difference of pixels (H, W, K) from an enclosed picture, over their channels."""
     far = np.maximum(shown.high - drawn, drawn - shown.low)
-    worst = far[..., 0]
+    worst: Floats = far[..., 0]
     for channel in range(1, far.shape[-1]):
         worst = np.maximum(worst, far[..., channel])
     return worst + ROUNDING
 
 
 def known_errors(manifest: Manifest) -> dict[str, Errors]:
-    """What is proved of the distances of geometries; raises as `prove_image`."""
+    """Proved errors of the distances of geometries; raises as `prove_image`."""
     if manifest.dimension != 2:
         raise ProofError("pictures of solids are not proved, those of the plane are")
     if manifest.lifting != "exact":

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from scenelang.compiler.program import Place, Program
     from scenelang.drawing.exact.mesh import Shape
     from scenelang.drawing.image import Image
-    from scenelang.drawing.neural.draw import Drawing, Kept
+    from scenelang.drawing.neural.draw import Drawing, Run
 
 
 def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[str, Shape]]:
@@ -27,11 +27,11 @@ def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[s
     from scenelang.compiler.compile import find_model
     from scenelang.compiler.lower import lower
 
-    found = Diagnostics()
-    manifest = find_model(scene, found, spans=spans)
-    graph = lower(scene, manifest, spans, found) if manifest is not None else None
-    if graph is None or found.errors:
-        raise SceneError(found)
+    result = Diagnostics()
+    manifest = find_model(scene, result, spans=spans)
+    graph = lower(scene, manifest, spans, result) if manifest is not None else None
+    if graph is None or result.errors:
+        raise SceneError(result)
     if not graph.elements:
         return graph, {}
     from scenelang.drawing.exact.mesh import FitError
@@ -72,9 +72,7 @@ def draw(
     how: How = DEFAULT,
     *,
     place: str | None = None,
-    split: int | None = None,
-    kept: Kept | None = None,
-    progress: Callable[[float], None] | None = None,
+    **run: Unpack[Run],
 ) -> Drawing:
     """Draw a Program by the library that fits.
 
@@ -82,14 +80,12 @@ def draw(
         how: with a backend that draws Programs.
         place: ``"numpy"`` or a torch device; by default numpy for solids and small pictures, else
             ``how.device``.
-        split: threads that the picture is split for, which shows in the last bits; by default as many as
-            draw.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        progress: called with the share done, in [0, 1], from any thread.
+        **run: ``split``, ``kept`` and ``progress``, as of `Run`.
 
     Raises:
         RenderError: as `render`.
     """
+    run = {"threads": how.threads, **run, **how.care}
     if place is None:
         from scenelang.drawing.small import choose_drawer
 
@@ -98,16 +94,11 @@ def draw(
     if place == "numpy":
         from scenelang.drawing.small import draw_small
 
-        exact = how.backend == "exact"
-        return draw_small(
-            program, threads=how.threads, split=split, kept=kept, progress=progress, exact=exact, **how.care
-        )
+        return draw_small(program, exact=how.backend == "exact", **run)
     from scenelang.drawing.torch_backend import choose_device, draw_program, open_model
 
     model = open_model(program.model, choose_device(place), program.weights)
-    return draw_program(
-        program, model, threads=how.threads, split=split, kept=kept, progress=progress, **how.care
-    )
+    return draw_program(program, model, **run)
 
 
 def render(
@@ -144,10 +135,10 @@ def render(
         ValueError, TypeError: an argument is none of the above.
     """
     way = How(**how).checked()
-    found, spans = given(program_or_scene, size, way.backend)
-    if isinstance(found, Scene):
-        return draw_exact(found, spans=spans, progress=progress)
-    return draw(found, way, progress=progress).image
+    result, spans = given(program_or_scene, size, way.backend)
+    if isinstance(result, Scene):
+        return draw_exact(result, spans=spans, progress=progress)
+    return draw(result, way, progress=progress).image
 
 
 def given(
@@ -161,22 +152,22 @@ def given(
     """
     from scenelang.compiler.program import Program
 
-    found = program_or_scene
-    if isinstance(found, str | os.PathLike) and Path(found).suffix == ".safetensors":
+    result = program_or_scene
+    if isinstance(result, str | os.PathLike) and Path(result).suffix == ".safetensors":
         from scenelang.compiler.program import load_program
 
-        found = load_program(Path(found))
-    if isinstance(found, Program):
+        result = load_program(Path(result))
+    if isinstance(result, Program):
         if size is not None:
             raise ValueError("a size for a program, which is compiled for its canvas: give it with the scene")
         if backend == "reference":
             raise RenderError("the reference draws scenes; a program keeps only what the network needs")
-        return found, None
+        return result, None
     from scenelang.compiler.compile import compile_scene
     from scenelang.language.evaluation import opened
 
     diagnostics = Diagnostics()
-    scene, spans = opened(found, diagnostics, size)
+    scene, spans = opened(result, diagnostics, size)
     if backend == "reference":
         return scene, spans
     try:
@@ -218,9 +209,9 @@ def prove(
     if way.backend != "neural":
         raise RenderError(f"a proof is of what the network draws, and backend {way.backend} is exact")
     graphs: dict[str, Graph] = {}
-    found = Diagnostics()
-    scene, spans = opened(scene, found, size)
-    program = compile_scene(scene, spans=spans, diagnostics=found, after=graphs.__setitem__)
+    result = Diagnostics()
+    scene, spans = opened(scene, result, size)
+    program = compile_scene(scene, spans=spans, diagnostics=result, after=graphs.__setitem__)
 
     return prove_drawn(
         graphs, program.model, lambda: draw(program, way).image if image is None else image, redraw
@@ -279,8 +270,8 @@ def render_outputs(
         if name not in known:
             raise ValueError(f"unknown output `{name}`; there are {', '.join(known)}")
     how = How(backend, threads=threads).checked()
-    found, spans = given(program_or_scene, size, backend)
-    return outputs_of(found, outputs, how, spans=spans)
+    result, spans = given(program_or_scene, size, backend)
+    return outputs_of(result, outputs, how, spans=spans)
 
 
 def outputs_of(
@@ -317,12 +308,12 @@ def _neural(program: Program, wanted: Sequence[Output], how: How) -> Outputs:
             raise RenderError(f"model `{program.model}` draws colours only")
         keep_memory()
         field = field_of(program, how.backend == "exact")
-        found = program_outputs(field, program, threads=how.threads or threads_for(program.canvas))
+        result = program_outputs(field, program, threads=how.threads or threads_for(program.canvas))
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None
-    return found.only(wanted, _sources(program.numbers, program.objects, program.places))
+    return result.only(wanted, _sources(program.numbers, program.objects, program.places))
 
 
 def _exact(scene: Scene, wanted: Sequence[Output], spans: Spans | None) -> Outputs:
@@ -334,12 +325,12 @@ def _exact(scene: Scene, wanted: Sequence[Output], spans: Spans | None) -> Outpu
     graph, brought = exact_graph(scene, spans)
     _check(wanted, graph.stage is None)
     try:
-        found = graph_outputs(graph, brought)
+        result = graph_outputs(graph, brought)
     except ValueError as error:
         raise RenderError(str(error)) from None
     objects = list(leaves(graph.root))
     names, numbers = [leaf.geometry for leaf in objects], [leaf.number for leaf in objects]
-    return found.only(wanted, _sources(numbers, names, places_of([leaf.span for leaf in objects])))
+    return result.only(wanted, _sources(numbers, names, places_of([leaf.span for leaf in objects])))
 
 
 def _check(wanted: Sequence[Output], flat: bool) -> None:

@@ -1,14 +1,14 @@
 """Small pictures, drawn by numpy without waiting for torch to be imported.
 
 Numpy on one core draws as fast as torch on one core. Torch has more cores and devices, and takes one to two
-seconds to import; so a single picture is worth it from some amount of work on. That amount is counted from
-the Program and never measured while drawing: the same Program is always drawn by the same library.
+seconds to import, which pays from some amount of work on. That amount is counted from the Program and never
+measured while drawing: the same Program is always drawn by the same library.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, Unpack
 
@@ -23,9 +23,9 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError
 from scenelang.drawing.closed import field_of
-from scenelang.drawing.how import Care, Device, RenderError, Samples, keep_memory, threads_for
+from scenelang.drawing.how import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.drawing.image import Image
-from scenelang.drawing.neural.draw import Drawing, Kept, draw_objects
+from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
 
@@ -35,7 +35,7 @@ PROBE: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What a frame's time depends on.
+    """Numbers that a frame's time depends on.
 
     Args:
         objects: rows of the Program.
@@ -87,11 +87,11 @@ _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 `python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
-"""Of that, what other ways to sample take."""
+"""Shares of that for other ways to sample."""
 
 
 class Drawer(NamedTuple):
-    """Which library draws a picture, and the reason in words."""
+    """The library that draws a picture, and the reason in words."""
 
     library: Literal["numpy", "torch"]
     why: str
@@ -100,7 +100,7 @@ class Drawer(NamedTuple):
 def choose_drawer(
     program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
 ) -> Drawer:
-    """Who draws a single picture: a function of the Program, and of where a caller wants it drawn.
+    """Choose the library for a single picture, from the Program and the caller's device alone.
 
     Args:
         device, samples: as of `How`.
@@ -128,29 +128,18 @@ def choose_drawer(
 
 
 def work_ms(program: Program, samples: Samples = "adaptive") -> float:
-    """What drawing a Program takes on one core of the machine that was measured, in milliseconds."""
+    """Milliseconds to draw a Program on one core of the machine that was measured."""
     row = load_of(program).row(skip=True)
     return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
 
 
-def draw_small(
-    program: Program,
-    *,
-    kept: Kept | None = None,
-    progress: Callable[[float], None] | None = None,
-    threads: int | None = None,
-    split: int | None = None,
-    exact: bool = False,
-    **care: Unpack[Care],
-) -> Drawing:
+def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:
     """Draw a Program by numpy, on one core, or solids, if they are large, on several.
 
     Args:
         program: of any size, for a model with a framed or a solids' network.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        threads, split: of solids, as for `scenelang.drawing.torch_backend.draw_program`.
         exact: ask formulas in place of the network.
-        **care: ``samples``, as of `How`.
+        **run: as of `Run`; ``threads`` and ``split`` are those of solids.
 
     Raises:
         RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
@@ -160,16 +149,9 @@ def draw_small(
     try:
         network = field_of(program, exact)
         if program.stage is None:
-            threads = split = 1
-        drawing = draw_objects(
-            network,
-            program,
-            threads=threads or threads_for(program.canvas),
-            split=split,
-            kept=kept,
-            progress=progress,
-            **care,
-        )
+            run |= {"threads": 1, "split": 1}
+        run["threads"] = run.get("threads") or threads_for(program.canvas)
+        drawing = draw_objects(network, program, **run)
     except (ModelError, ProgramError) as error:
         raise RenderError(str(error)) from None
     drawing.image.credit = credit_of(program.elements)

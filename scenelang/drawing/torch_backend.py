@@ -7,18 +7,17 @@ after every small product, and beside another busy process took up to thirty tim
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Unpack
 
 from scenelang.assets.element import credit_of
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.compiler.weights import replaced
-from scenelang.drawing.how import Care, RenderError, keep_memory, threads_for
-from scenelang.drawing.how import usable_cores as usable_cores
-from scenelang.drawing.neural.draw import Drawing, Kept, draw_objects
-from scenelang.drawing.neural.load import Model, ModelError, Network, load_model, place_of
+from scenelang.compiler.weights import ModelError, replaced
+from scenelang.drawing.how import RenderError, keep_memory, threads_for
+from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
+from scenelang.drawing.neural.load import Model, Network, load_model, place_of
 from scenelang.drawing.neural.paper import draw_whole
 from scenelang.drawing.neural.torch_networks import Framed, Solids
 
@@ -92,7 +91,7 @@ def _one_torch_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _by_kernel(network: Network, program: Program, care: Care) -> Drawing | None:
+def _by_kernel(network: Network, program: Program, samples: str) -> Drawing | None:
     """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
     if not isinstance(network, Framed) or place_of(network).type != "cuda":
         return None
@@ -100,31 +99,17 @@ def _by_kernel(network: Network, program: Program, care: Care) -> Drawing | None
         from scenelang.drawing.neural.device import draw_on_device, ready
     except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
         return None
-    return draw_on_device(network, program, **care) if ready() else None
+    return draw_on_device(network, program, samples) if ready() else None
 
 
-def draw_program(
-    program: Program,
-    model: Model,
-    *,
-    threads: int | None = None,
-    split: int | None = None,
-    kept: Kept | None = None,
-    skip: bool = True,
-    progress: Callable[[float], None] | None = None,
-    **care: Unpack[Care],
-) -> Drawing:
+def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Unpack[Run]) -> Drawing:
     """Draw a Program.
 
     One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
 
     Args:
-        threads: tiles drawn at the same time; by default as `threads_for` says.
-        split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
-        kept: the picture before this one, of which tiles that show the same are taken over.
         skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
-        progress: called with the share done, in [0, 1], from any thread.
-        **care: ``samples``, as of `How`, with framed and solids' renderers.
+        **run: as of `Run`; ``samples`` with framed and solids' renderers.
 
     Raises:
         RenderError: the Program was compiled for another model or other weights, its vectors are not
@@ -133,31 +118,23 @@ def draw_program(
     name, network = model.manifest.name, model.network
     if program.model != name:
         raise RenderError(f"a program for model `{program.model}`, not `{name}`")
-    threads = threads_for(program.canvas) if threads is None else threads
+    threads, samples, progress = run.get("threads"), run.get("samples", "adaptive"), run.get("progress")
+    run["threads"] = threads_for(program.canvas) if threads is None else threads
     if place_of(network).type != "cpu":
-        threads, split = 1, 1  # the device is busy with one tile
+        run |= {"threads": 1, "split": 1}  # the device is busy with one tile
     with _drawing, _one_torch_thread():
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
-                drawing = _by_kernel(network, program, care) if skip else None
+                drawing = _by_kernel(network, program, samples) if skip else None
                 if drawing is not None and progress is not None:
                     progress(1.0)
-                drawing = drawing or draw_objects(
-                    network,
-                    program,
-                    threads=threads,
-                    split=split,
-                    kept=kept,
-                    skip=skip,
-                    progress=progress,
-                    **care,
-                )
+                drawing = drawing or draw_objects(network, program, skip=skip, **run)
                 drawing.image.credit = credit_of(program.elements)
                 return drawing
-            if (samples := care.get("samples", "adaptive")) != "adaptive":
+            if samples != "adaptive":
                 raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
-            torch.set_num_threads(threads)
+            torch.set_num_threads(run["threads"] or 1)
             return draw_whole(network, program, progress=progress)
         except ProgramError as error:
             raise RenderError(str(error)) from None

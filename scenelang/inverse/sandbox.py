@@ -31,8 +31,8 @@ TIMES: Final = 48  # more for each byte of the file
 _CODE: Final = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
-from scenelang.fitting import apart, making
-apart.serve(making.make)
+from scenelang.inverse import learn, sandbox
+sandbox.serve(learn.make)
 """
 _REFUSED: Final = (
     "socket.connect",

@@ -154,7 +154,7 @@ def test_models() -> None:
 def test_compiling_loads_no_torch_and_checking_no_numpy() -> None:
     code = (
         "import sys, scenelang as nsg\n"
-        "from scenelang.passes import check_scene\n"
+        "from scenelang.compiler.passes import check_scene\n"
         "from scenelang.compiler.manifest import load_manifest\n"
         "scene = nsg.Scene(nodes=(nsg.Object('star'),))\n"
         "check_scene(scene, None, nsg.Diagnostics(), load_manifest('shapes2d'))\n"

@@ -12,7 +12,7 @@ from lab import errors as lab
 from scenelang.compiler.geometries import SECTORS
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.weights import ModelError
-from scenelang.drawing.exact import proof
+from scenelang.drawing import proof
 from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import RADIUS

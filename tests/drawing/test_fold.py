@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scenelang.compiler.groups import OPERATOR, felt, read_groups, widths_of
-from scenelang.drawing.neural.meetings import Pairs, meetings_of, nesting
-from scenelang.drawing.proof import Enclosure, Joins, blended, enclosed
+from scenelang.drawing.neural.meetings import Interval, Pairs, meetings_of, nesting
+from scenelang.drawing.proof import Joins, blended, enclosed
 from tests.groups import State, folded, random_tokens
 from tests.pictures import Array
 
@@ -46,7 +46,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
     colours = rng.choice(2, (3, len(block))).astype(float)
     never = np.zeros(len(block), bool)
     meetings, source = meetings_of(Pairs(block, np.arange(len(block)), never, never, rise))
-    some = Enclosure((middle - rise)[source], (middle + rise)[source])
+    some = Interval((middle - rise)[source], (middle + rise)[source])
     own = np.where(groups.first, 0.0, widths)
     joins, first = Joins(groups.tokens, own, np.concatenate(free)).some(source), groups.rows
     nest = nesting(meetings, groups) if deepest else None
@@ -55,7 +55,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
     told = enclosed(
         meetings,
         some,
-        Enclosure(colours[:, source], colours[:, source]),
+        Interval(colours[:, source], colours[:, source]),
         joins,
         behind,
         nest,

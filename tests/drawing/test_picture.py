@@ -13,8 +13,8 @@ from lab.sets.plane import SETS
 from lab.sets.scenes import sets_of
 from scenelang.assets.zoo import zoo_bytes
 from scenelang.compiler.manifest import load_manifest
-from scenelang.drawing.exact import proof as errors
-from scenelang.drawing.exact import proof as picture
+from scenelang.drawing import proof as errors
+from scenelang.drawing import proof as picture
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED
 from scenelang.drawing.proof import Stream
@@ -156,6 +156,7 @@ def test_what_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         nsg.prove(scene, nsg.render(scene, size=(9, 9)))
     with pytest.raises(ValueError, match="unknown output"):
         nsg.render_outputs(scene, ["proof"])
-    monkeypatch.setattr(picture, "load_errors", lambda: errors.load_errors("shapes2d-w16"))
+    load = errors.load_errors
+    monkeypatch.setattr(picture, "load_errors", lambda: load("shapes2d-w16"))
     with pytest.raises(RenderError, match="no proof"):
         nsg.prove(scene)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 from torch import nn
-from torch.nn.functional import interpolate
 
 from scenelang.drawing.neural.paper import FILTERS, ConvLSTM, Streaming, StreamingConfig
 
@@ -31,31 +30,6 @@ def convolve(x: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
 
 def sigmoid(x: np.ndarray) -> np.ndarray:
     return 1 / (1 + np.exp(-x))
-
-
-def test_a_level_begins_as_the_one_below_enlarged() -> None:
-    """The deconvolution is the bilinear enlargement of another library, and the picture hardly changes."""
-    torch.manual_seed(3)
-    config = StreamingConfig(vector=8, resolution=8, width=1 / 32)
-    network = Streaming(config, grown=True).eval()
-    vectors, tokens = torch.randn(2, 3, 8), torch.randint(0, 4, (2, 3))
-    with torch.no_grad():
-        low = network(vectors, tokens, resolution=4)
-        assert network.enlarge(8)
-        high = network(vectors, tokens, resolution=8)
-        maps = torch.rand(1, 8, 4, 4)
-        inner = network.deconvolutions[2](maps)[..., 1:-1, 1:-1]
-    enlarged = interpolate(maps, scale_factor=2, mode="bilinear", align_corners=False)[..., 1:-1, 1:-1]
-    torch.testing.assert_close(inner, enlarged)
-    spread = (low - low.mean()).abs().mean()
-    assert (high - interpolate(low, scale_factor=2, mode="bilinear")).abs().mean() < spread
-
-
-def test_levels_of_other_filters_begin_by_themselves() -> None:
-    network = Streaming(StreamingConfig(vector=4, resolution=64, width=1 / 32), grown=True)
-    before = network.deconvolutions[5].weight.clone()
-    assert not network.enlarge(64)
-    assert torch.equal(network.deconvolutions[5].weight, before)
 
 
 def test_the_cell_is_a_convolutional_lstm() -> None:

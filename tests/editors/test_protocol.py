@@ -176,7 +176,7 @@ import sys, time
 from collections.abc import Iterator
 from pathlib import Path
 from scenelang.cli.main import main
-from scenelang.lsp import server
+from scenelang.editors import server
 check, begun, gate = server.check, Path(sys.argv[1]), Path(sys.argv[2])
 def held(*given):
     begun.touch()

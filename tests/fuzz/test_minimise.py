@@ -41,7 +41,7 @@ def test_minimise_leaves_what_matters() -> None:
     ("data", "signature"),
     [
         (b"a", "no a"),
-        (b"b", "Problem in evaluate/values/operators.py:divide"),
+        (b"b", "Problem in language/values.py:divide"),
         (b"c1", "ZeroDivisionError in outside"),
         (b"", None),
     ],

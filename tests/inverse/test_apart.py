@@ -24,9 +24,11 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Any:
     """What code makes of bytes in such a process."""
 
     def ask(code: str, cpu_s: float = 60.0, read_s: float = 60.0) -> tuple[bytes, list[Any]]:
-        start, *_ = CODE.partition("apart.serve")
-        work = f"def make(request, data, tell):\n    import os\n    {code}\napart.serve(make)\n"
-        monkeypatch.setattr(sandbox, "_CODE", f"{start}apart.READ_S = {read_s}\napart.MEGABYTE_S = 0\n{work}")
+        start, *_ = CODE.partition("sandbox.serve")
+        work = f"def make(request, data, tell):\n    import os\n    {code}\nsandbox.serve(make)\n"
+        monkeypatch.setattr(
+            sandbox, "_CODE", f"{start}sandbox.READ_S = {read_s}\nsandbox.MEGABYTE_S = 0\n{work}"
+        )
         heard: list[Any] = []
         with Apart() as process:
             answers = [process({"cpu_s": cpu_s}, b"abc", {"say": heard.append}) for _ in range(2)]
@@ -51,10 +53,10 @@ def test_what_was_read_has_longer(made: Any) -> None:
     ("code", "words"),
     [
         ("while True: pass", "takes too much processor time"),
-        ("return bytes(apart.MEMORY)", r"more than 1,024 MiB of memory"),
+        ("return bytes(sandbox.MEMORY)", r"more than 1,024 MiB of memory"),
         (f"os.kill(os.getpid(), {int(signal.SIGSEGV)})", f"has failed .signal {int(signal.SIGSEGV)}"),
         ("os._exit(3)", "has failed .status 3"),
-        ("raise apart.FitError('what is wrong')", "^what is wrong$"),
+        ("raise sandbox.FitError('what is wrong')", "^what is wrong$"),
         ("return 1 / 0", "has failed .ZeroDivisionError: division by zero"),
         ("import socket; socket.create_connection(('127.0.0.1', 9))", "has failed .PermissionError: socket"),
         ("os.system('true')", "has failed .PermissionError: os.system"),

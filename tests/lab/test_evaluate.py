@@ -56,7 +56,7 @@ def test_a_set_of_another_dimension_is_refused(tmp_path: Path) -> None:
 
 def test_any_trees(tmp_path: Path) -> None:
     """The operator of the last row, whatever groups end behind it."""
-    asked = ["shapes2d", "--set", "trees", "--scenes", "4", "--side", "24", "-o", str(tmp_path)]
+    asked = ["eval", "shapes2d", "--set", "trees", "--scenes", "4", "--side", "24", "-o", str(tmp_path)]
     done = CliRunner().invoke(command, asked)
     assert done.exit_code == 0, done.output
     found = json.loads((tmp_path / "trees.json").read_text("utf-8"))

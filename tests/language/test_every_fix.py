@@ -36,7 +36,7 @@ SINGLE += [
     ("an invisible space", "square { sc\u200bale(0.5); }"),
     ("a control character", "square { scale(0.5); }\x07"),
 ]
-MANY = sorted([*(TESTS / "evaluate/malformed").glob("*.nsg"), *(TESTS / "syntax/malformed").glob("*.nsg")])
+MANY = sorted([*(TESTS / "language/malformed").glob("*.nsg"), *(TESTS / "language/wrong").glob("*.nsg")])
 
 EXAMPLES = sorted((TESTS.parent / "examples").glob("*.nsg"))
 

@@ -12,7 +12,7 @@ import click
 from scenelang.assets.files import followed, write_whole
 from scenelang.cli import inputs
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
+from scenelang.cli.say import SUFFIX, named, say_trouble, show_difference, wants_color, width_of
 from scenelang.language.diagnostics import plural
 from scenelang.language.reports import printable
 
@@ -123,10 +123,9 @@ def command(
 
 def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     """Take in all scenes, folders' too; False where something cannot be read."""
-    from scenelang.cli import inputs
 
     lost: list[OSError] = []
-    names = list(inputs.named(paths, lost.append))
+    names = list(named(paths, lost.append))
     for name in names:
         try:
             scenes.read(name)
@@ -135,7 +134,7 @@ def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
     for trouble in lost:
         say_trouble(describe(trouble))
     if not lost and not names:
-        say_trouble(f"no scenes (*{inputs.SUFFIX}) there")
+        say_trouble(f"no scenes (*{SUFFIX}) there")
     return bool(names) and not lost
 
 

@@ -9,9 +9,8 @@ import click
 
 from scenelang.assets.files import followed, read_regular, write_whole
 from scenelang.assets.records import deep_stack
-from scenelang.cli.inputs import SUFFIX, named
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_diagnostics, say_trouble, show_difference
+from scenelang.cli.say import SUFFIX, named, say_diagnostics, say_trouble, show_difference
 from scenelang.language.diagnostics import plural
 from scenelang.language.limits import MAX_BYTES
 from scenelang.language.reports import SceneError

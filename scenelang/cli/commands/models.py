@@ -80,5 +80,5 @@ def _line(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(_line, value))
     if isinstance(value, float):
-        return f"{value:.5g}"
+        return f"{value:.4g}"
     return f"{value:,}" if type(value) is int else str(value)

@@ -65,10 +65,10 @@ def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
 @lru_cache(maxsize=16)
 def _values(element: Element, light: bool) -> Values:
     """Colours (h, w, 3) or (n, n, n, 3)."""
-    found = texels(element).astype(np.float64)
+    result = texels(element).astype(np.float64)
     if element.form == "picture":  # of 8 bits
-        found = np.rint(found * 255) / 255
-    return np.asarray(decoded(found), np.float64) if light else found
+        result = np.rint(result * 255) / 255
+    return np.asarray(decoded(result), np.float64) if light else result
 
 
 def _mixed(values: Values, places: list[Values]) -> Values:
@@ -294,7 +294,7 @@ _DIGITS = 1e-12  # of a coordinate: more than float64 loses in a step
 def parts(
     root: Fold, canvas: tuple[int, int], brought: Brought | None
 ) -> Iterator[tuple[Node, range, range]]:
-    """What there is to draw in each part of a picture: a node, rows and columns."""
+    """Parts of a picture: the node that may be seen there, rows and columns."""
     (width, height), unit = canvas, min(canvas) / 2
     todo: list[tuple[Node, range, range]] = [(root, range(height), range(width))]
     while todo:
@@ -369,5 +369,5 @@ def _carried(steps: tuple[Step, ...], centre: Array, radius: float) -> tuple[Arr
 
 @lru_cache(maxsize=1 << 12)
 def _stretch(step: Affine) -> float:
-    """By how much the way back through an affine map lengthens at most."""
+    """Greatest factor by which the way back through an affine map lengthens."""
     return float(np.linalg.norm(frame_back(step, 2)[:, :2], 2))

@@ -1,9 +1,9 @@
 """Triangle meshes as solids: read, put into the unit ball, asked for distances and colours.
 
-Colours are what files mean, as numbers of sRGB. What glTF writes of colours is linear, its textures aside.
+Colours are in sRGB. The colours of a glTF are linear, its textures aside, and are converted.
 
-Needs trimesh and libigl, which measures. Every mesh is taken for a stranger's: what libigl would not survive
-is refused here.
+Needs trimesh, which reads, and libigl, which measures. No mesh is trusted: meshes that would crash libigl are
+refused here.
 """
 
 from __future__ import annotations
@@ -56,16 +56,16 @@ class Look:
 
     def at(self, triangles: Rows, share: Points) -> Points:
         """Colours (M, 3) of sRGB, 0 to 1, at points of triangles (M,), by barycentric shares (M, 3)."""
-        found = (self.tint[triangles] * share[..., None]).sum(1)
+        result = (self.tint[triangles] * share[..., None]).sum(1)
         linear = self.linear[triangles]
-        texel = np.ones_like(found)
+        texel = np.ones_like(result)
         uv = (self.uv[triangles] * share[..., None]).sum(1)
         for k, image in enumerate(self.images):
             on = self.image[triangles] == k
             texel[on] = _looked_up(image, uv[on])
-        found[linear] = encoded(found[linear] * decoded(texel[linear]))
-        found[~linear] *= texel[~linear]
-        return np.asarray(found.clip(0, 1))
+        result[linear] = encoded(result[linear] * decoded(texel[linear]))
+        result[~linear] *= texel[~linear]
+        return np.asarray(result.clip(0, 1))
 
     @property
     def plain(self) -> tuple[float, float, float] | None:
@@ -83,12 +83,12 @@ def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
 
     place = np.stack([1 - uv[:, 1], uv[:, 0]]) % 1.0 * np.array([image.shape[:2]]).T - 0.5
     channels = np.moveaxis(image, -1, 0)
-    found = [map_coordinates(c, place, np.float64, order=1, mode="grid-wrap") for c in channels]
-    return np.stack(found, 1) / 255
+    result = [map_coordinates(c, place, np.float64, order=1, mode="grid-wrap") for c in channels]
+    return np.stack(result, 1) / 255
 
 
 def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:
-    """What a mesh as trimesh reads it looks like; None where its file does not say.
+    """Colours of a mesh as trimesh reads it; None where its file has none.
 
     Args:
         linear: whether the numbers of its file are, as those of glTF.
@@ -158,11 +158,11 @@ _TOUCHING: Final = 1e-6  # leaf units from a surface to where its normals are th
 
 
 class FitError(ValueError):
-    """What cannot be made an element, or which scene cannot be fitted to a picture, and why."""
+    """A file cannot be made an element, or a scene cannot be fitted to a picture."""
 
 
 class Shape(Protocol):
-    """What is to be made an element, in the unit ball or disc."""
+    """A shape to make an element of, in the unit ball or disc."""
 
     @property
     def dimension(self) -> int:
@@ -170,7 +170,7 @@ class Shape(Protocol):
 
     @property
     def centre(self) -> tuple[float, ...]:
-        """Of the ball, in the file's own coordinates."""
+        """Centre of the ball, in the file's own coordinates."""
 
     @property
     def size(self) -> float:
@@ -207,7 +207,7 @@ class Mesh:
 
     @cached_property
     def _trees(self) -> tuple[Any, Any]:
-        """What finds the nearest triangle, and winding numbers."""
+        """Search trees for the nearest triangle and for winding numbers."""
         igl = _igl()
         boxes, windings = igl.AABB(), igl.FastWindingNumberBVH()
         boxes.init(self.vertices, self.triangles)
@@ -279,22 +279,22 @@ class Mesh:
         _ = None if self.closed else self._trees
         for few, least in ((16, 0.0), (500, _ENCLOSED - 0.1), (count, _ENCLOSED)):
             started = time.process_time()
-            found, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
-            spent_s, enclosed = time.process_time() - started, len(found) / len(points[:few])
+            result, out, thin = outer(self.distances, points[:few], normals[:few], _BESIDE)
+            spent_s, enclosed = time.process_time() - started, len(result) / len(points[:few])
             if few < count and not self.closed and spent_s > 1 + _SLOW_S * few:
                 raise FitError("its triangles overlap so much that distances to it would take minutes")
             if enclosed < least:
                 open_ = f"{100 * (1 - enclosed):.0f} % of the surface has no inside"
                 raise FitError(f"{open_} {_BESIDE:g} radii below it: it encloses no solid")
-        return found, out, thin
+        return result, out, thin
 
 
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
 ) -> tuple[Points, Points, float]:
-    """Of points of surfaces (M, d) those with an inside on one side alone (K, d), and outward normals.
+    """Select points of surfaces (M, d) that have an inside on one side alone (K, d), with outward normals.
 
-    Also the share of those that have none on either side.
+    Also returns the share of points that have none on either side.
 
     Args:
         distances: signed, of points.
@@ -308,7 +308,7 @@ def outer(
 
 
 def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Which of triangles (F, 3) are the first with their corners in their order round."""
+    """A mask (F,) of triangles (F, 3) that are the first with their corners in their order round."""
     from trimesh.grouping import unique_rows
 
     turned = np.take_along_axis(triangles, (triangles.argmin(1)[:, None] + np.arange(3)) % 3, 1)
@@ -381,9 +381,9 @@ def mesh_of(
         notes.append("inside out, turned")
         mesh.invert()
         look = look and replace(look, tint=look.tint[:, ::-1], uv=look.uv[:, ::-1])
-    told = "normals" if by_normals else "winding numbers"
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
-    notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {told}"]
+    rule = "normals" if by_normals else "winding numbers"
+    notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {rule}"]
     return Mesh(
         np.ascontiguousarray(mesh.vertices, float),
         np.ascontiguousarray(mesh.faces, np.int64),
@@ -396,9 +396,7 @@ def mesh_of(
 
 
 MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file
-_MOST_PIECES: Final = (
-    10_000  # objects, groups and changes of material of a file; nodes and primitives of glTF
-)
+_MOST_PIECES: Final = 10_000  # objects, groups and changes of material; nodes and primitives of glTF
 _MOST_CORNERS: Final = 1000  # of a face
 _MOST_DEPTH: Final = 100  # of nodes within nodes
 _MOST_NUMBERS: Final = 10 * MOST_TRIANGLES  # elements of all accessors, which may be more than their bytes
@@ -407,7 +405,7 @@ _IGNORED: Final = ("animations", "cameras", "skins")
 
 
 class Solid(NamedTuple):
-    """What has a name of its own in a file.
+    """A named mesh of a file.
 
     Args:
         vertices: (V, 3), where they lie in the whole.
@@ -452,8 +450,8 @@ def read_solids(
                 _few(data)
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
-            found = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
-            solids = _solids(found, suffix, files is not None)
+            result = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
+            solids = _solids(result, suffix, files is not None)
     except (FitError, MemoryError):
         raise
     except Exception as error:
@@ -474,7 +472,7 @@ def _few(data: bytes) -> None:
 
 
 def _notes(data: bytes) -> list[str]:
-    """What of a glTF is left out.
+    """Notes on parts of a glTF that are left out.
 
     Raises:
         FitError: it cannot be read without an extension.
@@ -511,7 +509,7 @@ def _notes(data: bytes) -> list[str]:
 
 
 def _beside(files: Mapping[str, bytes] | None) -> Any:
-    """What has the files that a file names, and notes which are missing."""
+    """A resolver, for trimesh, of the files that a file names; it notes the missing ones."""
     import trimesh
 
     class Beside(trimesh.resolvers.Resolver):

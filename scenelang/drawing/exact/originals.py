@@ -1,6 +1,6 @@
 """Files that elements were made from: the shapes in them, from which the exact picture is drawn.
 
-Of parts that are copies of each other, turned, mirrored, larger or smaller, the first one's shape serves all.
+Parts that are copies of each other, turned, mirrored or scaled, share the shape of the first one.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those o
 
 
 class Brought(NamedTuple):
-    """What a file is made.
+    """The shapes of a file.
 
     Args:
         shapes: what each element is made of, by its name; the whole comes last.
@@ -49,7 +49,7 @@ class Brought(NamedTuple):
 def brought(
     data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
 ) -> Brought:
-    """What the bytes of a file bring.
+    """Read shapes from the bytes of a file.
 
     Args:
         suffix: one that `scenelang.drawing.exact.mesh` or `scenelang.drawing.exact.outline` reads.
@@ -59,9 +59,9 @@ def brought(
     """
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
-    found, notes = solids.read_solids(data, suffix, files)
-    made = solid_parts(found, name, sign, bool(apart))
-    return made._replace(notes=(*made.notes, *notes))
+    result, notes = solids.read_solids(data, suffix, files)
+    shapes = solid_parts(result, name, sign, bool(apart))
+    return shapes._replace(notes=(*shapes.notes, *notes))
 
 
 def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
@@ -74,9 +74,9 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
         if layers:
             return Outline(layers[0])
     else:
-        found, _ = solids.read_solids(data, suffix)
-        if number <= len(found):
-            return solids.whole(found[number - 1 : number] if number else found, sign)
+        result, _ = solids.read_solids(data, suffix)
+        if number <= len(result):
+            return solids.whole(result[number - 1 : number] if number else result, sign)
     raise FitError(f"it has no part {number}")
 
 
@@ -85,22 +85,22 @@ def said(text: str) -> str:
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in text).strip("_")
 
 
-def solid_parts(found: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
-    """What a file of meshes brings.
+def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
+    """Shapes of a file of meshes.
 
     Args:
         name: of the whole.
         apart: whether its solids are elements of their own.
     """
-    whole = solids.whole(found, sign)
-    if not apart or len(found) < 2:
+    whole = solids.whole(parts, sign)
+    if not apart or len(parts) < 2:
         return Brought({name: whole}, {}, _alone(name, whole), whole.notes)
-    _few(len(found))
+    _few(len(parts))
     shapes: dict[str, Shape] = {}
     numbers = {}
     firsts: list[tuple[Solid, Mesh, str]] = []
     group = []
-    for number, solid in enumerate(found, 1):
+    for number, solid in enumerate(parts, 1):
         mesh = solids.whole([solid], sign)
         rows, centre, size = np.eye(3), np.array(mesh.centre), mesh.size
         for first, like, called in firsts:  # noqa: B007, a copy goes by the first one's name
@@ -153,7 +153,7 @@ def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
 
 
 def _alike(one: Look | None, other: Look | None) -> bool:
-    """Whether copies may share their element: both of one colour each, or looking the same."""
+    """True where copies may share an element: both have one colour each, or they look the same."""
     if one is None or other is None:
         return one is other
     if one.plain is not None or other.plain is not None:
@@ -164,7 +164,7 @@ def _alike(one: Look | None, other: Look | None) -> bool:
 
 
 def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
-    """What a drawing brings: what it paints in one colour after another, each a part."""
+    """Shapes of a drawing: areas of one colour, in the order in which they are painted."""
     painted = [(colour, Outline(layers)) for colour, layers in whole.painted()]
     if len(painted) < 2 or apart is False or (apart is None and len(painted) > MOST_PARTS):
         colours = {colour for colour, _ in painted if colour}
@@ -207,18 +207,18 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     if not file or not digest or folder is None:
         raise FitError(f"the exact shape of `{name}` is not known: it does not say what it was made from")
     path = Path(folder, file)
-    made = f"`{name}` was made from `{file}`"
+    origin = f"`{name}` was made from `{file}`"
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         ships = library.owns(Path(folder, file).resolve())
         means = ", which `python -m lab docs meshes` of the repository makes" if ships else ""
         raise FitError(
-            f"{made}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
+            f"{origin}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
         )
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
     shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)
     if shape is None:
-        raise FitError(f"{made}, and `{path}` is another file of that name")
+        raise FitError(f"{origin}, and `{path}` is another file of that name")
     return shape
 
 

@@ -1,10 +1,10 @@
 """Pictures as textures, and drawings and pictures as flat shapes.
 
-What is tried is WebP without loss, which suits drawings, and AV1 still pictures of one quality after another,
-found by halving. Others were measured and are larger (docs/training-log.md, Textures).
+A shape is a union of layers: filled areas, and strokes of their drawn width with round joins and ends. A
+texture is stored as lossless WebP, which suits drawings, or as an AV1 still picture, whose quality is
+searched by halving. Other formats were measured and are larger (docs/training-log.md, Textures).
 
-Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy. A shape is a union of
-layers: filled areas, and strokes as wide as they are drawn, with round joins and ends.
+Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy.
 """
 
 from __future__ import annotations
@@ -71,13 +71,13 @@ def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(io.BytesIO(data), formats=["PNG", "JPEG"]) as found:
-                if found.width * found.height > most:
+            with Image.open(io.BytesIO(data), formats=["PNG", "JPEG"]) as result:
+                if result.width * result.height > most:
                     raise FitError(f"a picture of more than {most:,} pixels")
-                scans = data.count(b"\xff\xda") if found.format == "JPEG" else 1
-                if found.width * found.height * scans > MOST_DECODED:
+                scans = data.count(b"\xff\xda") if result.format == "JPEG" else 1
+                if result.width * result.height * scans > MOST_DECODED:
                     raise FitError(f"a picture of {scans:,} scans")
-                yield found
+                yield result
     except (FitError, MemoryError):
         raise
     except UnidentifiedImageError:
@@ -125,12 +125,12 @@ def _profiled(image: Image.Image, profile: bytes | None, notes: list[str]) -> Im
         called = "".join(c for c in ImageCms.getProfileDescription(known).strip() if c.isprintable())[:60]
         if "srgb" in called.lower():
             return image
-        found = ImageCms.profileToProfile(image, known, ImageCms.createProfile("sRGB"), outputMode="RGB")
+        result = ImageCms.profileToProfile(image, known, ImageCms.createProfile("sRGB"), outputMode="RGB")
     except (ImageCms.PyCMSError, OSError, ValueError, TypeError):
         notes.append("its colour profile cannot be read: taken as sRGB")
         return image
     notes.append(f"from the colour profile `{called}`")
-    return found or image
+    return result or image
 
 
 def fit_picture(
@@ -202,7 +202,7 @@ Inside = Callable[[Points], npt.NDArray[np.bool_]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """What lies on one side of edges, or near them.
+    """The area on one side of edges, or near them.
 
     Args:
         edges: (E, 2, 2).
@@ -217,7 +217,7 @@ class Layer:
     color: Painted = ()
 
     def touches(self, other: Layer) -> bool:
-        """Whether the boxes around both share a point."""
+        """True where the boxes around both share a point."""
         boxes = [
             (layer.edges.min((0, 1)) - layer.half, layer.edges.max((0, 1)) + layer.half)
             for layer in (self, other)
@@ -234,11 +234,11 @@ class Layer:
         step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
         a, b = self.edges[at, 0], self.edges[at, 1]
         ends = [a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)]
-        found = np.stack(ends, 1)
+        result = np.stack(ends, 1)
         if self.inside is None:
-            return found
-        middle, beside = found.mean(1), _BESIDE * _normals(found)
-        return np.asarray(found[self.inside(middle + beside) != self.inside(middle - beside)])
+            return result
+        middle, beside = result.mean(1), _BESIDE * _normals(result)
+        return np.asarray(result[self.inside(middle + beside) != self.inside(middle - beside)])
 
 
 def _normals(edges: Edges) -> Points:
@@ -292,22 +292,22 @@ class Outline:
 
         A layer joins earlier ones of its colour where nothing that was painted since touches it.
         """
-        found: list[tuple[Painted, list[Layer]]] = []
+        result: list[tuple[Painted, list[Layer]]] = []
         for layer in self._source:
-            for color, layers in reversed(found):
+            for color, layers in reversed(result):
                 if color == layer.color:
                     layers.append(layer)
                     break
                 if any(layer.touches(other) for other in layers):
-                    found.append((layer.color, [layer]))
+                    result.append((layer.color, [layer]))
                     break
             else:
-                found.append((layer.color, [layer]))
-        return found
+                result.append((layer.color, [layer]))
+        return result
 
     def distances(self, p: Points) -> Points:
         """Signed distances (M,) of points (M, 2), negative inside."""
-        found = np.full(len(p), np.inf)
+        result = np.full(len(p), np.inf)
         for layer, pieces, tree in self._layers:
             _, near = tree.query(p, k=min(4, len(pieces)))
             ends = pieces[near.reshape(len(p), -1)]  # (M, k, 2, 2)
@@ -318,8 +318,8 @@ class Outline:
                 away -= layer.half
             else:
                 away[layer.inside(p)] *= -1
-            found = np.minimum(found, away)
-        return found
+            result = np.minimum(result, away)
+        return result
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
         """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
@@ -338,10 +338,10 @@ class Outline:
                 normals.append(side * way)
         all_points, all_normals = np.concatenate(points), np.concatenate(normals)
         chosen = random.choice(len(all_points), min(count, len(all_points)), replace=False)
-        found, out, thin = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
-        if not len(found):
+        result, out, thin = outer(self.distances, all_points[chosen], all_normals[chosen], _BESIDE)
+        if not len(result):
             raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
-        return found, out, thin
+        return result, out, thin
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:
@@ -349,7 +349,7 @@ def _moved(inside: Inside, middle: Points, size: float) -> Inside:
 
 
 def winding(edges: Edges, odd: bool) -> Inside:
-    """Whether points lie within closed polygons, by the rule ``nonzero`` or ``evenodd``."""
+    """A test of points against closed polygons, by the rule ``nonzero`` or ``evenodd``."""
 
     low, high = edges[..., 1].min(1), edges[..., 1].max(1)
 
@@ -426,32 +426,32 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
 
 def _simplified(root: Any, svg: Any) -> list[str]:
     """Change a tree into what svgelements draws as it is meant; what is lost by that."""
-    found = [(element, element.tag.rpartition("}")[2]) for element in root.iter()]
-    named = {element.get("id"): element for element, _ in found}
-    if sum(len(element.text or "") for element, tag in found if tag == "style") > _MOST_STYLE:
+    result = [(element, element.tag.rpartition("}")[2]) for element in root.iter()]
+    named = {element.get("id"): element for element, _ in result}
+    if sum(len(element.text or "") for element, tag in result if tag == "style") > _MOST_STYLE:
         raise FitError(f"style sheets of more than {_MOST_STYLE:,} letters")
-    said = (value for element, _ in found for key, value in element.items() if not key.endswith("href"))
+    said = (value for element, _ in result for key, value in element.items() if not key.endswith("href"))
     if sum(map(len, said)) > _MOST_SAID:
         raise FitError(f"paths and styles of more than {_MOST_SAID:,} letters")
     if _drawn(root, named) > _MOST_DRAWN:
         raise FitError(f"a drawing of more than {_MOST_DRAWN:,} elements")
     means = {
-        element.get("id"): _mean(element, named, svg) for element, tag in found if tag.endswith("Gradient")
+        element.get("id"): _mean(element, named, svg) for element, tag in result if tag.endswith("Gradient")
     }
-    notes = [f"{said} left out" for tag, said in _UNSEEN.items() if any(tag == t for _, t in found)]
+    notes = [f"{said} left out" for tag, said in _UNSEEN.items() if any(tag == t for _, t in result)]
     notes += ["gradients in their mean colours"] if means else []
-    notes += ["patterns left out"] if any(tag == "pattern" for _, tag in found) else []
+    notes += ["patterns left out"] if any(tag == "pattern" for _, tag in result) else []
 
     def meant(match: re.Match[str]) -> str:
         return means.get(match[1], "none")
 
-    for element, _ in found:
+    for element, _ in result:
         for key in ("fill", "stroke", "style"):
             if key in element.attrib:
                 element.set(key, _PAINT.sub(meant, element.get(key)))
         if element.text and "url(" in element.text:
             element.text = _PAINT.sub(meant, element.text)
-    for element, _ in found:
+    for element, _ in result:
         opacity = _opacity(element)
         for child in list(element):
             tag = child.tag.rpartition("}")[2]
@@ -462,13 +462,13 @@ def _simplified(root: Any, svg: Any) -> list[str]:
                 ElementTree.SubElement(element, child.tag.replace("symbol", "defs")).append(child)
             elif (own := opacity * _opacity(child)) < 1:
                 child.set("opacity", str(own))
-    if any(_opacity(element) < 1 or "opacity" in "".join(element.attrib) for element, _ in found):
+    if any(_opacity(element) < 1 or "opacity" in "".join(element.attrib) for element, _ in result):
         notes.append("what is not opaque mixed with white")
     return notes
 
 
 def _drawn(root: Any, named: dict[str, Any]) -> int:
-    """How many elements svgelements goes through, those that are used as often as they are.
+    """Number of elements that svgelements visits; one that is used twice counts twice.
 
     A use of itself counts as too many.
     """
@@ -540,7 +540,7 @@ def _seen(paint: Any, shape: Any) -> Painted | None:
 
 
 def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
-    """What a shape of a drawing paints, y up."""
+    """Layers that a shape of a drawing paints, y up."""
     open_edges, closing = [], []
     for part in svg.Path(shape).as_subpaths():
         points = [at for segment in svg.Path(part) for at in _ends(segment, svg)]
@@ -567,5 +567,5 @@ def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:
         return []
     if isinstance(segment, svg.Move | svg.Line | svg.Close):
         return [(segment.end.x, segment.end.y)]
-    found = [segment.point(at) for at in np.linspace(0, 1, _CURVE + 1)[1:]]
-    return [(point.x, point.y) for point in found]
+    result = [segment.point(at) for at in np.linspace(0, 1, _CURVE + 1)[1:]]
+    return [(point.x, point.y) for point in result]

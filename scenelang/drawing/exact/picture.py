@@ -80,32 +80,32 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     """
     check_shapes(graph, brought)
     width, height = graph.canvas
-    found = np.zeros((6, height, width))  # depth, normal, object and alpha
+    result = np.zeros((6, height, width))  # depth, normal, object and alpha
     if graph.stage is None:
         for node, rows, columns in parts(graph.root, graph.canvas, brought):
             part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
             p = sample_points(graph.canvas, rows, 1, columns)
             d, owner = evaluate(node, p, owners=True, brought=brought)
-            found[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
+            result[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
             covered = evaluate(node, sample_points(graph.canvas, rows, 2, columns), brought=brought)[0] < 0
-            found[5][part] = covered.reshape(len(rows), 2, len(columns), 2).mean((1, 3))
-        return Outputs(object=found[4].astype(np.int32), alpha=found[5].astype(np.float32))
+            result[5][part] = covered.reshape(len(rows), 2, len(columns), 2).mean((1, 3))
+        return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
     step = max(1, TILE // (4 * width))
     field = Field(graph.root, brought)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
         alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
-        found[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
-        found[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
-    depth, normal, owner, alpha = found[0], np.moveaxis(found[1:4], 0, 2), found[4], found[5]
+        result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
+        result[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
+    depth, normal, owner, alpha = result[0], np.moveaxis(result[1:4], 0, 2), result[4], result[5]
     return Outputs(
         depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
     )
 
 
 def _covered(field: Field, stage: Stage, d: Array) -> Array:
-    """How much of what is behind objects hide along unit directions d (3, M)."""
+    """Share of the background (M,) that objects hide along unit directions d (3, M)."""
     _, end, changes = seen_along(field, stage, d)
     hit = changes.after == OPAQUE
     end[changes.ray[hit]] = changes.t[hit]

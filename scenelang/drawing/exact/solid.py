@@ -3,8 +3,8 @@
 A world point goes back through maps and turns. A turn is a warp or a twist: ``p -> R(a) p`` in the plane of x
 and another axis, with ``a = twirl |p| + slope . p``.
 
-A ray steps as far as the field says that nothing changes, and at least `STEP`; so what is thinner than that,
-along the ray, may be passed over.
+A ray steps as far as the field says that nothing changes, and at least `STEP`; so it may miss things that are
+thinner than that along the ray.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class Body:
         self.centre, self.radius = centre, radius
 
     def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
-        """Where rays o + t d enter and leave the ball, an ellipsoid of the world, and how fast they go there.
+        """Entry and exit t of rays o + t d through the ball, an ellipsoid of the world, and their speed.
 
         Rays that miss it enter at inf and leave at -inf. The speed is that behind the first map.
         """
@@ -228,7 +228,7 @@ _MARGIN = 2e-2
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What a fold carries: distance (M,), whether the material is a medium, and what else was asked for.
+    """State of a fold: distance (M,), whether the material is a medium, and optional values.
 
     Args:
         d: distance.
@@ -293,14 +293,14 @@ class Field:
 
     def __init__(self, root: Fold, brought: Brought | None = None) -> None:
         self.root = root
-        found = list(_leaves(root))
+        result = list(_leaves(root))
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
-        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in found), default=0.0)
+        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in result), default=0.0)
         self.bodies = [
             Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
-            for leaf, steps, taken in found
+            for leaf, steps, taken in result
         ]
         kinds = {body.medium for body in self.bodies}
         self.mixed = len(kinds) > 1
@@ -396,7 +396,7 @@ Kinds = npt.NDArray[np.int8]
 
 
 class Changes(NamedTuple):
-    """What M rays meet up to where they end or meet something opaque.
+    """Changes of material along M rays, up to their end or the first opaque surface.
 
     Args:
         first, last: the kind where each starts and where it ends, (M,).
@@ -446,7 +446,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
     stop, t = leave.max(0, initial=-np.inf), np.maximum(enter.min(0, initial=np.inf), 0.0)
     origin, along, speed = o.take(ray, 1), d.take(ray, 1), speed.take(ray, 1)
     lower: Any = None
-    found: list[tuple[Any, ...]] = []
+    result: list[tuple[Any, ...]] = []
     taken = 0
     while len(ray):
         taken += 1
@@ -458,7 +458,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
             lower = t, np.full_like(t, FAR), first[ray]
         at = np.nonzero(kind != lower[2])[0]
         if len(at):
-            found.append((ray[at], *(v[at] for v in (*lower, t, value, kind))))
+            result.append((ray[at], *(v[at] for v in (*lower, t, value, kind))))
         last[ray] = kind
         following = np.where(enter > t, enter, np.inf).min(0)
         lower, t = (t, value, kind), np.minimum(np.minimum(t + np.maximum(way, STEP), following), stop)
@@ -468,9 +468,9 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
             origin, along, enter, leave, speed = (
                 v.take(going, 1) for v in (origin, along, enter, leave, speed)
             )
-    if not found:
+    if not result:
         return Changes(first, last, np.zeros(0, int), np.zeros(0), first[:0], first[:0])
-    ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*found, strict=True))
+    ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*result, strict=True))
     # Where d passes through 0 a straight line finds the place; where the material alone changes, halving.
     surface = (before == OUT) != (after == OUT)
     for at, rounds in ((np.nonzero(surface)[0], 2), (np.nonzero(~surface)[0], 20)):
@@ -563,7 +563,7 @@ def radiance(field: Field, stage: Stage, d: Array) -> Array:
 
 
 def seen_along(field: Field, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
-    """Of rays along d (3, M) where each begins (3, M), where the ground ends it (M,), and what it meets."""
+    """Origins (3, M) of rays along d (3, M), distances to the ground (M,), and materials on the way."""
     o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
     end = np.full(d.shape[1], np.inf)
     if stage.ground and stage.camera.eye[1] > stage.ground.y:
@@ -584,7 +584,7 @@ def ways(stage: Stage, canvas: tuple[int, int], rows: range, per_side: int) -> A
 
 
 def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
-    """What holds just behind surface points met along d, and unit normals towards where d comes from."""
+    """The state just behind surface points that rays along d met, and unit normals against d."""
     state = field.at(p + _INSIDE * d, gradient=True)
     normal = state.slope / np.maximum(length(state.slope), 1e-12)
     return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)

@@ -78,12 +78,12 @@ class GridShape(Lattice):
     def distance(self, q: Array) -> Array:
         """Distances (M,), in leaf units, at leaf coordinates (d, M)."""
         at = q.clip(-1.0, 1.0)
-        found, off = self.at(at), q - at
+        result, off = self.at(at), q - at
         beyond = (off * off).sum(0)
-        return self.xp.select(beyond > 0, self.xp.sqrt(found * found + beyond), found)
+        return self.xp.select(beyond > 0, self.xp.sqrt(result * result + beyond), result)
 
     def slopes(self) -> Slopes:
-        """How fast the distance in the plane changes; nothing is known of grids that end inside."""
+        """Bounds of how fast the distance in the plane changes; infinite for grids that end inside."""
         n, side = self.side, 2 * RADIUS / CELLS
         grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(n, n)
         rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
@@ -96,10 +96,10 @@ class GridShape(Lattice):
         spans = [(int(a), max(int(np.ceil(b)), int(a) + 1)) for a, b in zip(first, last, strict=True)]
         spans = [(min(a, n - 2), max(min(b, n - 1), min(a, n - 2) + 1)) for a, b in spans]
         across = np.stack([steep[:, a:b].max(1) for a, b in spans], 1)
-        found = np.stack([across[a:b].max(0) for a, b in spans])
-        found = np.maximum(found.T, 1.0)  # outside, one along the way there
+        result = np.stack([across[a:b].max(0) for a, b in spans])
+        result = np.maximum(result.T, 1.0)  # outside, one along the way there
         more = [
-            (around(found, int(np.ceil(radius / side))) - STEEP).clip(0.0) * np.hypot(radius, NODE)
+            (around(result, int(np.ceil(radius / side))) - STEEP).clip(0.0) * np.hypot(radius, NODE)
             for radius in RADII
         ]
         return Slopes(np.stack(more), 1.0)
@@ -141,7 +141,7 @@ MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
 class Texture:
-    """What a paint makes of leaf coordinates.
+    """Colours of a paint at leaf coordinates.
 
     Args:
         xp: the library.
@@ -171,8 +171,8 @@ class Texture:
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""
-        found = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
-        return stepped(self._xp, found, self.steps)
+        result = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
+        return stepped(self._xp, result, self.steps)
 
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides

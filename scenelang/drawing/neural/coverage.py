@@ -2,7 +2,7 @@
 
 Blocks of pixels are asked before pixels. An object is looked at by the blocks that it can reach; of each
 such pair the distance at the block's centre, and how fast it is proved to change, bound it on all of the
-block, and intervals through the cell bound what the block shows (`bounds.py`). Blocks of one colour are
+block, and intervals through the cell bound what the block shows (`meetings.py`). Blocks of one colour are
 filled; of the others, objects that are proved to change nothing there are dropped, and so is what lies behind
 one that hides it. What is left is asked again in smaller blocks, and pixel by pixel in the end.
 
@@ -35,16 +35,16 @@ from scenelang.drawing.neural.meetings import (
 from scenelang.drawing.neural.network import RADIUS
 
 QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
-"""Where the samples of a pixel lie (2, 4), pixels from its centre."""
+"""Places of a pixel's samples (2, 4), pixels from its centre."""
 CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
 NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
 LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 
 
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """Which pixels (groups, B), of a side, may have samples in a narrow blend with a texture."""
+    """A mask of pixels (groups, B), of a side, that may have samples in a narrow blend with a texture."""
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    found = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
+    result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
     worn = np.zeros(len(meetings.columns), bool)
     worn[place[field.texture[objects] != NO_TEXTURE]] = True
     width = field.widths[objects]
@@ -52,7 +52,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
     gap = xp.array((width + CORNER * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
     for part in meetings.slots():
         if narrow[part].any():
-            some = found[:, : part.stop - part.start]
+            some = result[:, : part.stop - part.start]
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
     if trace.joined and worn.any():
         most = CORNER * px * (1 + float(field.frames.stretch.max()))
@@ -60,12 +60,12 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
             width = field.group_widths[groups]
             narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
             near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
-            found[:, columns] |= near & xp.array(narrow, field.like)
-    return found
+            result[:, columns] |= near & xp.array(narrow, field.like)
+    return result
 
 
 def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """Which pixels (groups, B), of a side, may see where one object's colour gives way to another's.
+    """A mask of pixels (groups, B), of a side, that one object's colour may share with another's.
 
     In a union, outside both of them, that is not an outline, but a later blend may show it.
     """
@@ -119,8 +119,8 @@ def add_textures(
         if offsets is not None:
             spots = spots[:, None] + offsets
         q = field.frames.local(xp, objects[pair], spots)
-        found = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
-        xp.add(total, index, found.mean(1) * xp.take(share, some))
+        result = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
+        xp.add(total, index, result.mean(1) * xp.take(share, some))
     s = field.network.config.state
     memory[:, s : s + 3] += total.reshape(3, groups, columns).swapaxes(0, 1)
 
@@ -151,7 +151,7 @@ class Tile:
     met: int = 0
 
     def over(self, picture: np.ndarray) -> np.ndarray:
-        """What is shown (…, 3 or 4) of premultiplied colour and coverage (…, 4)."""
+        """The picture (…, 3 or 4) over the background, of premultiplied colour and coverage (…, 4)."""
         if self.background is None:
             return picture
         shown: np.ndarray = picture[..., :3] + (1 - picture[..., 3:]) * self.background
@@ -187,8 +187,8 @@ class Coverage:
             for columns, part, points in self._pixels(grid, side, meetings):
                 inside = grid.inside(columns, side)
                 tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
-                found = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
-                values = tile.over(np.ascontiguousarray(found.transpose(2, 0, 1))).reshape(
+                result = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
+                values = tile.over(np.ascontiguousarray(result.transpose(2, 0, 1))).reshape(
                     len(part.columns), side, side, -1
                 )
                 blocks[columns[1] // side, :, columns[0] // side] = values
@@ -242,14 +242,14 @@ class Coverage:
             centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
             for first, portion in _portions(some, 4):
                 last = first + len(portion.columns)
-                found = self._four(portion, centres[..., first:last], px, tile)[0]
-                self.xp.put(planes, flat[first:last], found)
+                result = self._four(portion, centres[..., first:last], px, tile)[0]
+                self.xp.put(planes, flat[first:last], result)
         return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
 
     def _matter(
         self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
     ) -> tuple[Meetings, tuple[Index, Index]]:
-        """What matters to the four samples of pixels, given leaf coordinates and distances in their middles.
+        """Pairs that matter to the four samples of pixels, by leaf coordinates and distances at centres.
 
         Pixels that are proved to show what their middles do are left out.
         """
@@ -268,10 +268,10 @@ class Coverage:
         """Numbers (rows, width), from 1, of the objects that paint pixels' centres, 0 where none does."""
         grid = raster(canvas, rows)
         tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
-        found = np.zeros((grid.high, grid.wide), np.int32)
+        result = np.zeros((grid.high, grid.wide), np.int32)
         with self.xp.inference():
             side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(found[..., None], side)
+            blocks = grid.blocks(result[..., None], side)
             for columns, part, points in self._pixels(grid, side, meetings):
                 own = np.zeros(points.shape[1:], np.int32)
                 trace = self.field.trace(points.shape[1], len(part.pairs))
@@ -285,12 +285,12 @@ class Coverage:
                 covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
                 values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
                 blocks[columns[1] // side, :, columns[0] // side] = values
-        return found[: len(rows), : canvas[0]]
+        return result[: len(rows), : canvas[0]]
 
     def _pixels(
         self, grid: Raster, side: int, meetings: Meetings
     ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
-        """Where blocks begin, what they meet, and their pixels' centres (2, groups, B), row by row."""
+        """Corners of blocks, their meetings, and their pixels' centres (2, groups, B), row by row."""
         for _, part in _portions(meetings, side * side):
             columns = grid.place(part.columns, side)
             yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
@@ -303,7 +303,7 @@ class Coverage:
         return picture.reshape(p.shape[1], 4, 4, p.shape[2]).mean(1)
 
     def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
-        """What single points (2, groups, B) show (groups, 4, B)."""
+        """Premultiplied colour and coverage (groups, 4, B) at single points (2, groups, B)."""
         field = self.field
         trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
         memory = self.ask(meetings, p, tile, trace)[2]
@@ -325,7 +325,7 @@ class Coverage:
     # ------------------------------------------------------------ blocks
 
     def meetings(self, grid: Raster, tile: Tile) -> tuple[int, Meetings]:
-        """What blocks, and of what side, have to be asked pixel by pixel; fills others in the tile."""
+        """Side and objects of the blocks that need an answer for each pixel; fills others in the tile."""
         count = len(self.field.tokens)
         if not self.skip:
             side = LEVELS[-1]
@@ -349,7 +349,7 @@ class Coverage:
         return grid.reached(self.field.frames, self.field.reach)
 
     def _looked(self, grid: Raster, pairs: Pairs, side: int, tile: Tile) -> Pairs:
-        """What pairs are left of some when their blocks have been looked at."""
+        """Fill the blocks that are proved to be of one colour, and return the pairs of the others."""
         field, objects = self.field, pairs.object
         across, down = grid.place(pairs.block, side)
         half = side / 2 - 0.5
@@ -378,7 +378,7 @@ class Coverage:
         return left
 
     def _proved(self, pairs: Pairs, middle: np.ndarray, rise: np.ndarray) -> tuple[Pairs, Index, np.ndarray]:
-        """What is left of pairs, and blocks of one colour (n,) with their pictures (n, 4).
+        """Pairs that are still open, and blocks of one colour (n,) with their pictures (n, 4).
 
         Args:
             pairs: sorted by block.
@@ -417,8 +417,8 @@ def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, object
         mine = objects[part][:, None] + 1
         own[level, :, columns] = np.where(painted[:, part].T, mine, own[level, :, columns])
         close(len(after))
-    found: np.ndarray = own[0]
-    return found
+    result: np.ndarray = own[0]
+    return result
 
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:

@@ -1,11 +1,11 @@
 """Programs of the plane drawn on a device by one kernel of Triton: one upload, one launch, one download.
 
-It computes `network.py`, `frames.py`, `assets.py` and four samples a pixel. Everything
-stays in registers from a sample's place to its pixel's colour, so that a frame is one launch, however many
+The kernel, `draw_blocks`, computes `network.py`, `frames.py`, `assets.py` and four samples a pixel. Values
+stay in registers from a sample's place to its pixel's colour, so that a frame is one launch, however many
 objects meet however many blocks. M are a block's samples, those of a pixel side by side.
 
-The host says which objects can reach which blocks of pixels, from the Program alone, and makes the weights of
-its leaves. Everything goes up in one piece of page-locked memory; `kernel.py` does the rest.
+The host lists the objects that can reach each block of pixels, from the Program alone, and mixes the weights
+of its leaves. Everything goes up in one piece of page-locked memory.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def _learned(x, y, weights, WIDTH: tl.constexpr):
     weights += WIDTH * WIDTH
     # in float32: TF32, the default, would be off by up to 0.002
     hidden = tl.dot(hidden, inner, input_precision="ieee") + tl.load(weights + unit)[None, :]
-    found = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
-    far = tl.load(weights + 2 * WIDTH + 1)
-    return found + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
+    result = tl.sum(tl.maximum(hidden, 0.0) * tl.load(weights + WIDTH + unit)[None, :], 1)
+    far = tl.load(weights + 2 * WIDTH + 1)  # behind the last layer's weights and its bias
+    return result + tl.load(weights + 2 * WIDTH) + tl.maximum(radius - _RIM, 0.0) * far
 
 
 @triton.jit
@@ -107,9 +107,9 @@ def _grid(x, y, nodes, side):
     place_x, place_y = (inside_x + 1.0) * half, (inside_y + 1.0) * half
     row, column = tl.minimum(place_x.to(tl.int32), side - 2), tl.minimum(place_y.to(tl.int32), side - 2)
     across, down = place_y - column.to(tl.float32), place_x - row.to(tl.float32)
-    found = _between(nodes, row * side + column, side, across, down)
+    result = _between(nodes, row * side + column, side, across, down)
     beyond = (x - inside_x) * (x - inside_x) + (y - inside_y) * (y - inside_y)
-    return tl.where(beyond > 0.0, tl.sqrt_rn(found * found + beyond), found)
+    return tl.where(beyond > 0.0, tl.sqrt_rn(result * result + beyond), result)
 
 
 @triton.jit
@@ -117,7 +117,8 @@ def _texture(x, y, numbers, steps, high, wide):
     """Colours of a picture, which repeats: numbers are a map, steps of colour, and three planes of texels."""
     u, v = _affine(x, y, numbers)
     numbers += 6
-    nodes = numbers + 4 * steps
+    nodes = numbers + 4 * steps  # a step is its kind and three numbers; texels follow the steps
+    # the planes have one more texel around the picture, from its other side: hence - 2 and + 0.5
     place_x = (u - tl.floor(u)) * (wide - 2).to(tl.float32) + 0.5
     place_y = (v - tl.floor(v)) * (high - 2).to(tl.float32) + 0.5
     column = tl.minimum(tl.maximum(place_x.to(tl.int32), 0), wide - 2)
@@ -159,6 +160,7 @@ def _turned(red, green, blue, turns):
 @triton.jit
 def _object(x, y, row, part, weights, OUTER: tl.constexpr, INNER: tl.constexpr, WIDTH: tl.constexpr):
     """Distances and colours (M,) of an object at world points."""
+    # a row: a map (6 numbers), warps (3 each), a map, warps, the scale of distances, and a colour
     x, y = _affine(x, y, row)
     row += 6
     for _ in range(OUTER):  # unrolled the code would be ten times as long
@@ -232,7 +234,7 @@ def draw_blocks(
     pixel = tl.arange(0, SIDE * SIDE * SAMPLES) // SAMPLES
     column, line = (block % across) * SIDE + pixel % SIDE, (block // across) * SIDE + pixel // SIDE
     which = tl.arange(0, SIDE * SIDE * SAMPLES) % SAMPLES
-    off = 0.25 if SAMPLES == 4 else 0.0
+    off = 0.25 if SAMPLES == 4 else 0.0  # pixels from the centre, to either side in both directions
     world_x = left + (column.to(tl.float32) + off * (2 * (which % 2) - 1).to(tl.float32)) * px
     world_y = top - (line.to(tl.float32) + off * (2 * (which // 2) - 1).to(tl.float32)) * px
 
@@ -315,7 +317,7 @@ WARPS = 8  # of 32 threads, for the 256 samples of a block
 
 @lru_cache
 def ready() -> bool:
-    """Whether Triton can start kernels: it looks for a device, and builds a library with a C compiler."""
+    """True where Triton can start kernels: it looks for a device, and builds a library with a C compiler."""
     try:
         return triton.runtime.driver.active.get_current_target() is not None
     except (ImportError, OSError, RuntimeError, SubprocessError):
@@ -333,8 +335,8 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
         ProgramError: as `scenelang.drawing.neural.draw.draw`.
     """
     if samples == "draft":
-        found = draw_on_device(network, halved(program), "one")
-        return found and replace(found, image=enlarged(found.image, program.canvas))
+        result = draw_on_device(network, halved(program), "one")
+        return result and replace(result, image=enlarged(result.image, program.canvas))
     config = network.config
     if program.stage or not config.features == config.state == 1 or config.decoder_width > WIDTHS[1]:
         return None
@@ -415,9 +417,9 @@ def launch(programs: int, *arguments: Any, **sizes: int) -> None:
 @lru_cache(maxsize=4)
 def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArrays:
     """A network's parameters as numpy arrays, fetched again when they have changed."""
-    found = FramedArrays(network.config, {k: v.cpu().numpy() for k, v in network.state_dict().items()})
-    found.layout = network.layout
-    return found
+    result = FramedArrays(network.config, {k: v.cpu().numpy() for k, v in network.state_dict().items()})
+    result.layout = network.layout
+    return result
 
 
 def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -429,18 +431,18 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
     nest, count = nesting(meetings, field.groups), len(field.tokens)
     if nest is None:
         return pairs.block, pairs.object, np.zeros(0, int), 1
-    found = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
+    result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
 
     def close(closings: list[Closing]) -> None:
         for columns, groups, level in closings:
-            found.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(found))))
+            result.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(result))))
 
     for part, level, fresh, before, after in nest.turns:
         close(before)
         rows = meetings.pairs.object[part] + count * fresh
-        found.append((np.arange(len(level)), rows, level, np.full(len(level), len(found))))
+        result.append((np.arange(len(level)), rows, level, np.full(len(level), len(result))))
         close(after)
-    columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*result, strict=True))
     block = meetings.columns[columns]
     by = np.lexsort((moments, block))
     return block[by], rows[by], levels[by], nest.levels
@@ -452,7 +454,7 @@ def _cell_at(field: Field) -> int:
 
 
 def _rows(field: Field) -> np.ndarray:
-    """What the kernel knows of each object, and behind these of those that begin a state, and of groups."""
+    """Rows of the kernel's table: objects, and with groups these as first in a state, and the groups."""
     count, layout = len(field.tokens), field.layout
     whole = np.concatenate(
         [
@@ -467,16 +469,16 @@ def _rows(field: Field) -> np.ndarray:
         groups = np.zeros((len(field.groups.joins), whole.shape[1]))
         groups[:, 0] = 1 / field.unit
         parts += [(whole, field.cells(np.arange(count), opened=True)), (groups, field.joins())]
-    found = []
+    result = []
     for row, cell in parts:
         lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
         gates = [lines.reshape(3 * len(lines), len(row)).T, cell.candidate[0].T, cell.bump.T]
-        found.append(np.concatenate([row, *gates], 1, dtype=np.float32))
-    return np.concatenate(found)
+        result.append(np.concatenate([row, *gates], 1, dtype=np.float32))
+    return np.concatenate(result)
 
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the kernel's ``parts`` are of each object (N, 6), and its ``weights``."""
+    """The kernel's ``parts``, of each object (N, 6), and its ``weights``."""
     shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]
     textures = [_texture_table(texture) for texture in field.textures]
     weights = [np.empty(0, np.float32), *shapes, *textures]

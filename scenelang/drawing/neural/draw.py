@@ -9,18 +9,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.how import Care
 from scenelang.drawing.image import Image, Outputs, enlarged, from_samples
 from scenelang.drawing.neural.coverage import Coverage, Tile
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.meetings import LEVELS
 from scenelang.drawing.neural.network import FramedNetwork
-from scenelang.drawing.solid.draw import solid_outputs
+from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.network import SolidNetwork
 
@@ -44,7 +45,7 @@ class Kept:
     picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
     def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
-        """Whether a tile of a picture with such keys shows what it did before."""
+        """True where a tile of a picture with such keys shows the same as before."""
         return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
 
     def look(self, coverage: Coverage, program: Program, tiles: Sequence[range]) -> list[bytes]:
@@ -77,6 +78,23 @@ class Kept:
         return keys
 
 
+class Run(Care, total=False):
+    """Arguments of a single drawing, which calls hand on to the renderer.
+
+    Args:
+        threads: tiles drawn at the same time; by default as `threads_for` says.
+        split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
+        kept: the picture before this one, of which tiles that show the same are taken over.
+        progress: called with the share done, in [0, 1], from any thread.
+        samples: as of `How`.
+    """
+
+    threads: int | None
+    split: int | None
+    kept: Kept | None
+    progress: Callable[[float], None] | None
+
+
 TILE = 1 << 18  # pixels that are drawn at a time
 
 
@@ -100,15 +118,7 @@ class Drawing:
 
 
 def draw_objects(
-    network: FramedNetwork | SolidNetwork,
-    program: Program,
-    *,
-    threads: int = 1,
-    split: int | None = None,
-    kept: Kept | None = None,
-    skip: bool = True,
-    samples: str = "adaptive",
-    progress: Callable[[float], None] | None = None,
+    network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
     """Draw a Program of the plane or of solids, as `draw` does.
 
@@ -119,25 +129,16 @@ def draw_objects(
     Raises:
         ProgramError: as `draw`, or the Program and the network are of different dimensions.
     """
-    if samples == "draft":
-        drawing = draw_objects(network, halved(program), threads=threads, samples="one", progress=progress)
+    if run.get("samples") == "draft":
+        run |= {"samples": "one", "split": None, "kept": None}
+        drawing = draw_objects(network, halved(program), **run)
         return replace(drawing, image=enlarged(drawing.image, program.canvas))
     if network.layout.dimension == 2:
         if program.stage is not None:
             raise ProgramError("a program of solids, which the model does not draw")
-        return draw(
-            network,  # type: ignore[arg-type]
-            program,
-            threads=threads,
-            split=split,
-            kept=kept,
-            skip=skip,
-            samples="adaptive" if samples == "quick" else samples,
-            progress=progress,
-        )
-    from scenelang.drawing.solid.draw import draw_solids
-    from scenelang.drawing.solid.field import SolidField
-
+        if run.get("samples") == "quick":
+            run["samples"] = "adaptive"
+        return draw(network, program, skip=skip, **run)  # type: ignore[arg-type]
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
     brought, paints = program.brought(), program.paints()
@@ -146,10 +147,10 @@ def draw_objects(
         field,
         program.stage,
         program.canvas,
-        threads=threads,
-        split=split,
-        samples=samples,
-        progress=progress,
+        threads=run.get("threads") or 1,
+        split=run.get("split"),
+        samples=run.get("samples", "adaptive"),
+        progress=run.get("progress"),
     )
     return Drawing(image, work.met, work.refined, image.shape[0] * image.shape[1], work)
 
@@ -158,7 +159,7 @@ def draw(
     network: FramedNetwork,
     program: Program,
     *,
-    threads: int = 1,
+    threads: int | None = None,
     split: int | None = None,
     kept: Kept | None = None,
     skip: bool = True,
@@ -170,7 +171,7 @@ def draw(
 
     Args:
         network: trained parameters; the picture is computed on their device.
-        threads: tiles drawn at the same time.
+        threads: tiles drawn at the same time; by default 1.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
         samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
@@ -181,7 +182,7 @@ def draw(
         ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
             proportion; no compiled scene has such.
     """
-    width, height = program.canvas
+    (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
     coverage = Coverage(field, skip=skip)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
@@ -198,22 +199,14 @@ def draw(
         if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
             out[band.start : band.stop] = kept.picture[band.start : band.stop]
         else:
-            found = coverage.tile(program.canvas, band, samples, background)
-            out[band.start : band.stop] = found.picture
-            drawn.append(found)
+            result = coverage.tile(program.canvas, band, samples, background)
+            out[band.start : band.stop] = result.picture
+            drawn.append(result)
         finished.append(index)
         if progress is not None:
             progress(len(finished) / len(tiles))
 
-    if threads == 1 or len(tiles) == 1:
-        for index in range(len(tiles)):
-            one(index)
-    else:
-        from concurrent.futures import ThreadPoolExecutor
-
-        # every worker computes on one core; torch would otherwise split each small product again
-        with ThreadPoolExecutor(threads, initializer=network.xp.one_core) as pool:
-            list(pool.map(one, range(len(tiles))))
+    network.xp.each(threads, one, range(len(tiles)))
     if kept is not None and seen is not None:
         kept.picture, kept.keys = out.copy(), seen
     cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
@@ -245,11 +238,11 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
     """
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
-        found = solid_outputs(solids, program.stage, program.canvas, threads=threads)
+        result = solid_outputs(solids, program.stage, program.canvas, threads=threads)
     else:
-        found = _plane(network, program)  # type: ignore[arg-type]
-    assert found.object is not None
-    return replace(found, object=np.array((0, *program.numbers), np.int32)[found.object])
+        result = _plane(network, program)  # type: ignore[arg-type]
+    assert result.object is not None
+    return replace(result, object=np.array((0, *program.numbers), np.int32)[result.object])
 
 
 def _plane(network: FramedNetwork, program: Program) -> Outputs:
@@ -257,7 +250,7 @@ def _plane(network: FramedNetwork, program: Program) -> Outputs:
     field = Field(network, program.vectors, program.tokens, program.brought())
     coverage = Coverage(field, prove=False)
     height, rows = program.canvas[1], max(1, TILE // program.canvas[0])
-    found = [
+    result = [
         coverage.owners(program.canvas, range(top, min(top + rows, height))) for top in range(0, height, rows)
     ]
-    return Outputs(object=np.concatenate(found), alpha=np.asarray(image)[..., 3])
+    return Outputs(object=np.concatenate(result), alpha=np.asarray(image)[..., 3])

@@ -29,15 +29,13 @@ FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 1
 CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
 ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
-ROUNDED = (
-    3  # from a cut to the cell of one with a width: a smooth union's, and two cuts', stand behind the four
-)
+ROUNDED = 3  # from the index of a cut to that of the same cut with a rounded edge, see `rounded`
 _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What P pairs did to points.
+    """Effect of P pairs on points.
 
     Args:
         paint: (groups, P) how far the object's colour came in.
@@ -51,17 +49,17 @@ class Trace:
     joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
     def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
-        """How much of each object's colour (groups, P) is left when all are met, 0 at points not seen."""
-        left, found = 1.0 * seen, 0.0 * self.paint
+        """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
+        left, result = 1.0 * seen, 0.0 * self.paint
         if nest is not None:
-            return self._nested(nest, left, found)
+            return self._nested(nest, left, result)
         for part in reversed(meetings.slots()):
             rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
-            found[:, part] = rest * paint
+            result[:, part] = rest * paint
             rest *= 1.0 - paint
-        return found
+        return result
 
-    def _nested(self, nest: Nesting, seen: Array, found: Array) -> Array:
+    def _nested(self, nest: Nesting, seen: Array, result: Array) -> Array:
         left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
         rounds = iter(reversed(self.joined))
 
@@ -79,10 +77,10 @@ class Trace:
             for at in np.unique(level).tolist():
                 some = np.flatnonzero(level == at)
                 rest = left[at][:, some]
-                found[:, part.start + some] = rest * paint[:, some]
+                result[:, part.start + some] = rest * paint[:, some]
                 left[at][:, some] = rest * (1.0 - paint[:, some])
             opened(before)
-        return found
+        return result
 
 
 class Field:
@@ -134,10 +132,10 @@ class Field:
         """Decoders of the leaves in use, grids of elements, and which object has which."""
         xp, network = self.xp, self.network
         every = np.ascontiguousarray(self.parts.code)
-        found, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
-        codes = np.array([np.frombuffer(code, np.float32) for code in found], np.float32)
-        self.codes = codes = codes.reshape(len(found), every.shape[1])
-        """Of the leaves in use (K, C): decoders are computed together."""
+        result, self.shape = _numbered(every.view(f"V{every[:1].nbytes}").ravel().tolist())
+        codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
+        self.codes = codes = codes.reshape(len(result), every.shape[1])
+        """Codes of the leaves in use (K, C), whose decoders are computed together."""
         self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         for element in dict.fromkeys(element for element in self.brought if element is not None):
@@ -152,9 +150,9 @@ class Field:
         xp, groups = self.xp, self.groups
         widths = widths_of(self._raw, self.parts.width.astype(np.float64))
         self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
-        """Of the blends by which objects join (N,), world units."""
+        """Widths of the blends by which objects join (N,), world units."""
         self.group_widths = widths[groups.rows]
-        """And of those by which groups do (G,), 0 for none."""
+        """Widths of the blends by which groups join (G,), 0 for none."""
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
@@ -183,10 +181,10 @@ class Field:
         xp, parts = self.xp, self.parts
         albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
         self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
-        """Of the objects (3, N); 0 where a texture is worn."""
+        """Colours of the objects (3, N); 0 for those with a texture."""
         self.textures: list[Texture] = []
         self.texture = np.full(len(self.paints), NO_TEXTURE)
-        """Which of the textures an object wears (N,)."""
+        """Index of each object's texture (N,)."""
         known: dict[tuple[Paint, bytes], int] = {}
         for i, paint in enumerate(self.paints):
             if paint is None or not self.draws[i]:  # the others leave colours as they are
@@ -198,17 +196,17 @@ class Field:
 
     @property
     def provable(self) -> bool:
-        """Whether the network is of the kind that `shown` folds intervals of."""
+        """True where `shown` can fold intervals through the network."""
         return self.network.config.state == self.network.config.features == 1
 
     @property
     def blended(self) -> bool:
-        """Whether some object joins by a blend."""
+        """True where some object joins by a blend."""
         return bool((self._raw == SMOOTH).any())
 
     @property
     def textured(self) -> bool:
-        """Whether some object wears a texture."""
+        """True where some object has a texture."""
         return bool(self.textures)
 
     @property
@@ -239,7 +237,7 @@ class Field:
         xp, shape = self.xp, self.shape[objects]
         used = np.flatnonzero(np.bincount(shape)).tolist()
         groups = q.shape[1]
-        found = None
+        result = None
         for at in used:
             index = None if len(used) == 1 else np.flatnonzero(shape == at)
             part = q if index is None else xp.take(q, xp.array(index, q))
@@ -248,16 +246,16 @@ class Field:
                 -1, groups, part.shape[2]
             )
             if index is None:
-                found = one
+                result = one
                 break
-            if found is None:
-                found = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
-            for feature, values in zip(found, one, strict=True):
+            if result is None:
+                result = xp.full((one.shape[0], groups, len(objects)), 0.0, q)
+            for feature, values in zip(result, one, strict=True):
                 xp.put(feature, xp.array(index, q), values)
-        assert found is not None
+        assert result is not None
         scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
-        found = found.swapaxes(0, 1) * scale
-        return found.clip(-FAR, FAR) if self.frames.wild[objects].any() else found
+        result = result.swapaxes(0, 1) * scale
+        return result.clip(-FAR, FAR) if self.frames.wild[objects].any() else result
 
     def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
         """Features (F, M) in leaf units."""
@@ -387,21 +385,21 @@ class Field:
         seen = np.nan_to_num(q).clip(-FAR, FAR)
         far = np.full(len(objects), bool((np.hypot(*seen) > RADIUS).any()))
         points = self.xp.array(seen.astype(np.float32)[:, None], self.like)
-        found: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
-        return found
+        result: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
+        return result
 
     def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
-        """By how much world distances (P,) at leaf coordinates differ at most from those in radii (P,)."""
-        found, shape = np.full(len(objects), np.inf), self.shape[objects]
+        """Greatest difference (P,) of world distances at leaf coordinates from those within radii (P,)."""
+        result, shape = np.full(len(objects), np.inf), self.shape[objects]
         for at, slopes in enumerate(self.slopes):
             here = np.flatnonzero(shape == at)
             if slopes is not None and len(here):
-                found[here] = slopes.rise(q.take(here, -1), radius[here])
-        most = np.fmin((found + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
+                result[here] = slopes.rise(q.take(here, -1), radius[here])
+        most = np.fmin((result + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
         return np.asarray(most, np.float32)
 
     def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
-        """What blocks are proved to show, whose pairs' distances lie within ``rise`` of ``middle``."""
+        """Prove the pictures of blocks whose pairs' distances lie within ``rise`` of ``middle``."""
         objects = meetings.pairs.object
         rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
         distance = Interval(middle - rise, middle + rise)
@@ -423,14 +421,14 @@ def rounded(cells: Cell, s: int) -> Cell:
     """
     lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
     features = lines.shape[-1] - s
-    found = [lines], [bias], [candidate], [bump]
+    result = [lines], [bias], [candidate], [bump]
     for sign in (1.0, -1.0):  # of the object's features
         turned = lines * np.array([sign] * features + [-1.0] * s, np.float32)
         shut = np.where(np.arange(len(bias)) < s, bias, -1.0).astype(np.float32)
         turned[s:] = 0.0
-        for part, more in zip(found, (turned, shut, -sign * candidate, -bump), strict=True):
+        for part, more in zip(result, (turned, shut, -sign * candidate, -bump), strict=True):
             part.append(more)
-    more = Cell(*(np.stack(part) for part in found))
+    more = Cell(*(np.stack(part) for part in result))
     return Cell(*(np.concatenate([one, two]) for one, two in zip(cells, more[:], strict=True)))
 
 

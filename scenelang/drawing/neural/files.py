@@ -1,6 +1,6 @@
 """Networks out of weights files as numpy arrays, and the proved slopes beside them.
 
-`python -m lab.slopes NAME` writes it. Weights without one are drawn without blocks being ruled out.
+`python -m lab.slopes NAME` proves slopes. Without them every block is drawn pixel by pixel.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple
         ModelError: it is damaged.
     """
     try:
-        found = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
-        arrays = found.arrays()
+        result = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
+        arrays = result.arrays()
     except OSError:
         return None
     except TensorError as error:
         raise ModelError(f"damaged file `{path.name}`: {error}") from None
-    if any(found.header.get(key) != value for key, value in header.items()):
+    if any(result.header.get(key) != value for key, value in header.items()):
         return None
     if {key: value.shape for key, value in arrays.items()} != shapes:
         raise ModelError(f"damaged file `{path.name}`: not the arrays that it should have")
@@ -87,7 +87,7 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
 
 
 MOST_SIZE: Final = 128
-"""Of a layer: so many units squared, times the code, are 9 MB."""
+"""Most units of a layer: their square, times the code, is 9 MB."""
 
 
 def solid_config(config: Any) -> SolidConfig:
@@ -97,13 +97,13 @@ def solid_config(config: Any) -> SolidConfig:
         ModelError: they are missing, unknown or out of range.
     """
     try:
-        found = SolidConfig(**config["network"])
+        result = SolidConfig(**config["network"])
     except (KeyError, TypeError) as error:
         raise ModelError(f"bad network sizes: {error}") from None
-    *sizes, segment = astuple(found)
+    *sizes, segment = astuple(result)
     if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in (*sizes, segment or 1)):
         raise ModelError("a network size is out of range")
-    return found
+    return result
 
 
 def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:

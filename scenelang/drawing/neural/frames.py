@@ -1,7 +1,7 @@
-"""From geometry vectors to frames: where a world point lies in each object's own space.
+"""Frames from geometry vectors: they carry world points into each object's own space.
 
-The inverse reading of a `scenelang.compiler.lifting`. All of it is linear algebra and turns by an
-angle; nothing here is learned. Points are one array (d, M), and d is whatever the frames are made for.
+They invert `scenelang.compiler.lifting`. All of it is linear algebra and turns by an angle; nothing here is
+learned. Points are one array (d, M).
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class Frames:
 
     @property
     def growth(self) -> Floats:
-        """How many leaf units a point of each object's leaf moves at most as it moves by a world unit."""
+        """Most leaf units (N,) by which a point moves in each object's leaf as it moves by a world unit."""
         return self.stretch / self.scale
 
     def boxes(self, radius: Floats) -> tuple[Floats, Floats]:

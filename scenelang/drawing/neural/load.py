@@ -13,8 +13,15 @@ from torch import Tensor
 
 from scenelang.compiler.lifting import WIDTH
 from scenelang.compiler.manifest import Manifest, load_manifest
-from scenelang.compiler.weights import LIFTING, Codes, check_shapes, codes_of, open_weights, shipped_weights
-from scenelang.compiler.weights import ModelError as ModelError
+from scenelang.compiler.weights import (
+    LIFTING,
+    Codes,
+    ModelError,
+    check_shapes,
+    codes_of,
+    open_weights,
+    shipped_weights,
+)
 from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_slopes, solid_config
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.neural.torch_networks import Framed, Solids
@@ -27,7 +34,7 @@ Network = Framed | Solids | Streaming | Reading
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What draws programs.
+    """A model that draws Programs.
 
     Args:
         network: the trained network, in evaluation mode, without gradients.

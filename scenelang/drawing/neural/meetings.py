@@ -1,10 +1,11 @@
-"""Blocks of pixels: where they lie, which objects they meet, and what they are proved to show.
+"""Blocks of pixels, the objects that they meet, and proofs of their colours.
 
 A pair is an object at a block. Blocks with the most objects are the first columns; then all pairs that come
 first at their block, all that come second, and so on: each of these slots is as long as there are columns
 with so many objects, and column i is its i-th pair.
 
-Everything is float32 on the host. Distances come widened by more than that may be off.
+A proof folds intervals, in float32 on the host. Its distances are widened beforehand by more than the
+rounding error of float32.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -87,12 +88,12 @@ class Meetings:
     lengths: Index
 
     def slots(self) -> list[slice]:
-        """Where the pairs of each slot lie."""
+        """Slices of the pairs of each slot."""
         ends = np.cumsum(self.lengths).tolist()
         return [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)]
 
     def counts(self) -> Index:
-        """How many objects each column meets (B,)."""
+        """Number of objects that each column meets (B,)."""
         drops = np.bincount(self.lengths, minlength=len(self.columns) + 1)
         return np.cumsum(drops[::-1])[::-1][1:]
 
@@ -261,30 +262,57 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
 
 def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> list[Closing]:
     """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
-    found = list[Closing]()
+    result = list[Closing]()
     if not len(columns):
-        return found
+        return result
     for at in range(open_groups.shape[1] - 1, -1, -1):
         some = columns[(kept <= at) & real[columns, at]]
         if len(some):
-            found.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
-    return found
+            result.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
+    return result
 
 
 Floats32 = npt.NDArray[np.float32]
-Columns = npt.NDArray[np.intp]
 
 
 class Interval(NamedTuple):
-    """Numbers from ``low`` to ``high``."""
+    """Numbers from ``low`` to ``high``, float32 or float64."""
 
-    low: Floats32
-    high: Floats32
+    low: npt.NDArray[Any]
+    high: npt.NDArray[Any]
+
+
+class State(NamedTuple):
+    """Intervals of distances (B,) and colours (3, B): of the states of a fold, or of operands."""
+
+    distance: Interval
+    colour: Interval
+
+    @classmethod
+    def empty(cls, distance: float, count: int, dtype: npt.DTypeLike = np.float32) -> Self:
+        """States before the first object, whose distance is given."""
+        return cls(Interval(*np.full((2, count), distance, dtype)), Interval(*np.zeros((2, 3, count), dtype)))
+
+    def at(self, columns: Index | slice) -> Self:
+        """Select some columns."""
+        return type(self)(*(Interval(low[..., columns], high[..., columns]) for low, high in self))
+
+    def clear(self, columns: Index | slice, distance: float) -> None:
+        """Empty some columns."""
+        for side, colour in zip(self.distance, self.colour, strict=True):
+            side[columns], colour[:, columns] = distance, 0.0
+
+    def paint(self, columns: Index | slice, colour: Interval, share: Interval) -> None:
+        """Move the colours of some columns towards others (3, n), by shares (n,) of the way."""
+        for side, own, choose in zip(self.colour, colour, (np.minimum, np.maximum), strict=True):
+            now = side[:, columns]
+            more = own - now
+            side[:, columns] = now + choose(share.low * more, share.high * more)
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is proved of blocks.
+    """Facts that are proved of blocks.
 
     Args:
         picture: premultiplied colour and coverage (4, B).
@@ -319,28 +347,25 @@ def shown(
         joins: cells of these groups, which come last.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _State.empty(empty, blocks * (1 if nest is None else nest.levels))
+    state = _Learned.empty(empty, blocks * (1 if nest is None else nest.levels))
     shut, wide = np.zeros((2, len(given)), bool)
+    operands = State(distance, colours)
     if nest is None or joins is None:
         gates = _Gates.of(cell, distance, given)
         for part in meetings.slots():
-            own = _Operand(
-                Interval(distance.low[part], distance.high[part]),
-                Interval(colours.low[:, part], colours.high[:, part]),
-            )
-            shut[part], wide[part] = state.join(slice(part.stop - part.start), own, gates.some(part))
+            columns = slice(part.stop - part.start)
+            shut[part], wide[part] = state.join(columns, operands.at(part), gates.some(part))
         wide |= given
     else:
         fresh = np.concatenate([turn.fresh for turn in nest.turns])
         gates = _Gates.of(cell, distance, given | fresh)
 
-        def pair(turn: Turn, places: Columns | slice) -> tuple[Mask, Mask]:
+        def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
             part = turn.part
-            own = _Operand(*(Interval(x.low[..., part], x.high[..., part]) for x in (distance, colours)))
-            keeps, hides = state.join(places, own, gates.some(part))
+            keeps, hides = state.join(places, operands.at(part), gates.some(part))
             return keeps, hides | given[part]
 
-        def group(top: Columns | slice, below: Columns | slice, ended: Columns) -> tuple[Mask, Mask]:
+        def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
             operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
             joined = state.join(
                 below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool))
@@ -379,7 +404,7 @@ class _Gates(NamedTuple):
         own.low[:, given] = own.high[:, given] = np.inf
         return cls(cell, own, up[:, 1], down[:, 1], given)
 
-    def some(self, which: slice | Columns) -> _Gates:
+    def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
         lines, bias, candidate, bump = self.cell
         return _Gates(
@@ -391,37 +416,10 @@ class _Gates(NamedTuple):
         )
 
 
-class _Operand(NamedTuple):
-    """Operand of a state in n columns: its distance (n,) and colour (3, n)."""
+class _Learned(State):
+    """States of the learned fold."""
 
-    distance: Interval
-    colour: Interval
-
-
-class _State(NamedTuple):
-    """Distances (B,) and colours (3, B) of a fold."""
-
-    distance: Interval
-    colour: Interval
-
-    @classmethod
-    def empty(cls, distance: float, count: int) -> _State:
-        return cls(
-            Interval(*np.full((2, count), distance, np.float32)),
-            Interval(*np.zeros((2, 3, count), np.float32)),
-        )
-
-    def at(self, columns: Columns | slice) -> _Operand:
-        """Return its distances and colours in some columns, as an operand."""
-        parts = ((low[..., columns], high[..., columns]) for low, high in self)
-        return _Operand(*(Interval(*part) for part in parts))
-
-    def clear(self, columns: Columns | slice, distance: float) -> None:
-        """Empty it in some columns."""
-        for side, colour in zip(self.distance, self.colour, strict=True):
-            side[columns], colour[:, columns] = distance, 0.0
-
-    def join(self, columns: Columns | slice, operand: _Operand, gates: _Gates) -> tuple[Mask, Mask]:
+    def join(self, columns: Index | slice, operand: State, gates: _Gates) -> tuple[Mask, Mask]:
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
@@ -442,10 +440,7 @@ class _State(NamedTuple):
         self.distance.high[columns] = np.maximum(
             np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
         ) - np.minimum(dent, 0.0)
-        for side, c, choose in zip(self.colour, own_colour, (np.minimum, np.maximum), strict=True):
-            now = side[:, columns]
-            more = c - now
-            side[:, columns] = now + choose(paint.low * more, paint.high * more)
+        self.paint(columns, own_colour, paint)
         return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
 
 
@@ -490,23 +485,23 @@ class Raster:
         return pixels.reshape(self.high // side, side, self.wide // side, side, -1)
 
     def inside(self, place: tuple[Index, Index], side: int) -> np.ndarray | None:
-        """Which pixels (side * side, B) of blocks are wanted; None if all of the raster's are."""
+        """A mask of pixels (side * side, B) of blocks that are wanted; None if all of the raster's are."""
         if self.canvas == (self.wide, self.high):
             return None
         down, across = np.divmod(np.arange(side * side)[:, None], side)
-        found: np.ndarray = (place[0] + across < self.canvas[0]) & (place[1] + down < self.canvas[1])
-        return found
+        result: np.ndarray = (place[0] + across < self.canvas[0]) & (place[1] + down < self.canvas[1])
+        return result
 
     def centres(self, place: tuple[Index, Index], side: int) -> np.ndarray:
         """World coordinates (2, side * side, B), float32, of blocks' pixels row by row.
 
         They are float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel.
         """
-        found = np.empty((2, side, side, len(place[0])), np.float32)
+        result = np.empty((2, side, side, len(place[0])), np.float32)
         steps = self.px * np.arange(side)[:, None]
-        found[0] = (self.left + self.px * place[0]) + steps
-        found[1] = ((self.top - self.px * place[1]) - steps)[:, None]
-        return found.reshape(2, side * side, -1)
+        result[0] = (self.left + self.px * place[0]) + steps
+        result[1] = ((self.top - self.px * place[1]) - steps)[:, None]
+        return result.reshape(2, side * side, -1)
 
     def reached(self, frames: Frames, reach: Floats) -> Pairs:
         """Objects at the largest blocks where they may be within their reach (N,), leaf units."""

@@ -1,4 +1,4 @@
-"""The plane's network, from top to bottom, for parameters of either library, and proved slopes of distances.
+"""The plane's network, from top to bottom, for parameters of either library, and its proved slopes.
 
 Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, F = `features`, S = `state`,
 G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
@@ -17,12 +17,13 @@ parts then draw:
 
 No point looks at another and nothing here knows a leaf, an operator's formula, a pixel or a library.
 
-For the distance f of a leaf, with leaf coordinates p of a cell and q within a radius of p,
+Blocks of pixels are proved to have one colour by `Slopes`. For the distance f of a leaf, leaf coordinates p
+in a cell, and q within a radius of p,
 
-    |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s.
+    |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s,
 
-s hangs on the cell and the radius. `lab.slopes` proves it of learned leaves, and it is shipped
-beside the weights. That of elements is read off their nodes. Of what nothing is known it is infinite.
+where s depends on the cell and the radius. `lab.slopes` proves it for learned leaves, and it is shipped
+beside the weights. For elements it is computed from their nodes. Where nothing is known it is infinite.
 """
 
 from __future__ import annotations
@@ -114,7 +115,7 @@ class FramedNetwork:
         return Decoder(layers, self.far[:, None])
 
     def decoders(self, codes: Array) -> list[Decoder]:
-        """Of each of the codes (M, C), mixed together and contiguous."""
+        """Decoders of the codes (M, C), mixed together and contiguous."""
         layers, far = self.decoder_weights(codes)
         return [Decoder([(self.xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
 
@@ -243,7 +244,7 @@ class Slopes:
         self._radii = RADII[0] * 2.0 ** np.arange(len(levels))
 
     def rise(self, q: Floats, radius: Floats) -> Floats:
-        """By how much f at leaf coordinates (2, M) differs at most (M,) from f within radii (M,)."""
+        """Greatest difference (M,) of f at leaf coordinates (2, M) from f within radii (M,)."""
         squared = radius * radius
         length = np.sqrt(q[0] * q[0] + q[1] * q[1])
         level = self._radii.searchsorted(radius) if radius.max() > RADII[0] else 0

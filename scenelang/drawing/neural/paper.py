@@ -1,27 +1,22 @@
 """The paper's renderers: a ConvLSTM over whole images, and a GRU by which each pixel reads the scene.
 
-Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 5.
-Fourier features after Tancik et al. 2020; gated recurrent unit after Cho et al. 2014.
+Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021: section 5
+for `Reading`; section 4, and Table 3 of its supplement (filters of each resolution, progressive growing), for
+`Streaming`. Fourier features after Tancik et al. 2020; gated recurrent unit after Cho et al. 2014.
 
-Letters: B scenes, N objects, P points, D = d_g + d_m numbers of an object, H = `hidden`, L = `octaves`.
+Letters: B scenes, N objects, P points, D = d_g + d_m numbers of an object, H = `hidden`, L = `octaves`,
+F filters of a level, R = resolution.
 
-A pixel has a state. In a read, a GRU looks at each object from that state; the answers are pooled over the
-objects by their maximum, so that a read does not depend on their number or order; a second GRU makes the
-next state of the pooled answer. After the last read a linear layer gives the colour. Boolean operators
-depend on the order, so each object comes with its token and its place in the stream, which the paper's
-unions do not need.
+`Reading` answers samples, four a pixel as the language defines. A pixel has a state. In a read, a GRU looks
+at each object from that state; the answers are pooled over the objects by their maximum, so that a read does
+not depend on their number or order; a second GRU makes the next state of the pooled answer. After the last
+read a linear layer gives the colour. Boolean operators depend on the order, so each object comes with its
+token and its place in the stream, which the paper's unions do not need.
 
-Source: Granskog, Schnabel, Rousselle, Novák, *Neural Scene Graph Rendering*, ACM TOG 40(4), 2021, section 4,
-and Table 3 of its supplement (filters of each resolution, progressive growing).
-
-Letters: B scenes, N objects, D = d_g + d_m numbers of an object, F filters of a level, R = resolution.
-
-An object's vectors pass through deconvolutions from 1 x 1 to R x R; the boolean token is joined to the
-feature map there; a convolutional LSTM (Shi et al. 2015) takes the maps one after the other; three 1 x 1
-convolutions turn its last hidden map into colours.
-
-`streaming` draws the whole canvas at once, at the one size it was trained for. `reading` answers samples,
-four a pixel as the language defines.
+`Streaming` draws the whole canvas at once, at the one size it was trained for. An object's vectors pass
+through deconvolutions from 1 x 1 to R x R; the boolean token is joined to the feature map there; a
+convolutional LSTM (Shi et al. 2015) takes the maps one after the other; three 1 x 1 convolutions turn its
+last hidden map into colours.
 """
 
 from __future__ import annotations
@@ -187,7 +182,7 @@ class ConvLSTM(nn.Module):
 
 
 class Level(nn.Module):
-    """What belongs to one resolution: the LSTM cell and the pixel generator."""
+    """The LSTM cell and the pixel generator of one resolution."""
 
     def __init__(self, filters: int) -> None:
         super().__init__()
@@ -214,7 +209,7 @@ class Level(nn.Module):
         """
         hidden = torch.zeros_like(maps[:, 0])
         cell = torch.zeros_like(hidden, dtype=marks.dtype)
-        found = []
+        result = []
         for i in range(maps.shape[1]):
             mark = marks[:, i, :, None, None].to(maps.dtype).expand(-1, -1, *maps.shape[3:])
             after = self.cell(torch.cat([maps[:, i], mark], 1), (hidden, cell))
@@ -223,8 +218,8 @@ class Level(nn.Module):
             else:
                 used = (i < count)[:, None, None, None]
                 hidden, cell = (torch.where(used, a, b) for a, b in zip(after, (hidden, cell), strict=True))
-            found.append(hidden)
-        return found
+            result.append(hidden)
+        return result
 
 
 class Streaming(nn.Module):
@@ -243,26 +238,6 @@ class Streaming(nn.Module):
         )
         first = SMALLEST if grown else config.resolution
         self.stages = nn.ModuleDict({str(r): Level(config.filters(r)) for r in config.levels if r >= first})
-
-    @torch.no_grad()
-    def enlarge(self, resolution: int) -> bool:
-        """Let a level of growing begin as the one below it, enlarged, instead of as noise.
-
-        The new deconvolution becomes a bilinear enlargement of each channel, and the new cell and pixel
-        generator copies of the old ones, if both levels have as many filters. Gives whether they have.
-        """
-        f, at = self.config.filters(resolution), int(math.log2(resolution)) - 1
-        if self.config.filters(resolution // 2) != f:
-            return False
-        deconvolution = self.deconvolutions[at]
-        assert isinstance(deconvolution, nn.ConvTranspose2d)
-        assert deconvolution.bias is not None
-        tent = torch.tensor([0.25, 0.75, 0.75, 0.25], device=deconvolution.weight.device)
-        same = torch.eye(f, device=tent.device)
-        deconvolution.weight.copy_(same[:, :, None, None] * torch.outer(tent, tent))
-        deconvolution.bias.zero_()
-        self.stages[str(resolution)].load_state_dict(self.stages[str(resolution // 2)].state_dict())
-        return True
 
     def forward(
         self,
@@ -331,14 +306,14 @@ def draw_whole(
         side = network.config.resolution
         if program.canvas != (side, side):
             raise ProgramError(f"this model draws {side} x {side} pixels, not {width} x {height}")
-        found = network(v, t)[0].permute(1, 2, 0)
+        result = network(v, t)[0].permute(1, 2, 0)
         pairs = len(program) * side * side
     else:
-        found = _sampled(network, v, t, width, height, progress)
+        result = _sampled(network, v, t, width, height, progress)
         pairs = len(program) * 4 * width * height
     if progress is not None:
         progress(1.0)
-    picture = found.clamp(0.0, 1.0).cpu().numpy()
+    picture = result.clamp(0.0, 1.0).cpu().numpy()
     return Drawing(from_samples(np.ascontiguousarray(picture), None), pairs, 0, width * height)
 
 

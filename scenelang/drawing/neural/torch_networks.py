@@ -1,6 +1,7 @@
 """Parameters of the networks in torch, for training and for drawing on devices.
 
-What it computes is `scenelang.drawing.neural.network`, whose letters are used here. P is its M in training.
+The formulas, and the letters, are those of `scenelang.drawing.neural.network` and of
+`scenelang.drawing.solid.network`. P is M in training.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class Framed(nn.Module, FramedNetwork):
 
 @dataclass(slots=True)
 class Trace:
-    """What `Framed.trace` returns.
+    """Distances, states and colours after each object, from `Framed.trace`.
 
     Args:
         distance: first feature of each object, world units (B, N, P).
@@ -141,17 +142,17 @@ class Solids(nn.Module, SolidNetwork):
     def __init__(self, config: SolidConfig, geometries: int, materials: int) -> None:
         super().__init__()
         self.config = config
-        made: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
+        stacks: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
         for name, shape in solid_shapes(config, geometries, materials).items():
             group, _, index = name.partition(".")
             fan = (config.code + 1) * (shape[1] if index in ("1", "2") else 1)
             value = torch.randn(shape)
             if index:
                 scale = fan**-0.5 if group.endswith("w") else 0.3
-                made.setdefault(group, []).append(nn.Parameter(value * scale))
+                stacks.setdefault(group, []).append(nn.Parameter(value * scale))
             else:
                 setattr(self, name, nn.Parameter(value))
-        for name, layers in made.items():
+        for name, layers in stacks.items():
             setattr(self, name, nn.ParameterList(layers))
         with torch.no_grad():  # gates begin in their linear range
             self.cell_lines.mul_(0.3)

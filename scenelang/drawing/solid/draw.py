@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -18,8 +17,9 @@ from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import INF
 
 TILE = 1 << 16  # samples at a time
+QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
 PACES = {"quick": Pace(0.04, 2, 0.15), "one": Pace(0.04, 2)}
-"""How carefully solids are drawn by ways to sample them; the others are `CAREFUL`."""
+"""Paces of the ways to sample solids; the others are `CAREFUL`."""
 
 
 def draw_solids(
@@ -63,12 +63,7 @@ def draw_solids(
         if progress is not None:
             progress(len(costs) / len(bands))
 
-    if threads == 1 or len(bands) == 1:
-        for band in bands:
-            one(band)
-    else:
-        with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
-            list(pool.map(one, bands))
+    field.xp.each(threads, one, bands)
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     return from_light(out, stage.transparent), sum(costs, Work())
@@ -79,8 +74,8 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
     width, height = canvas
     if samples == "one":
         every = np.array(rows)[:, None] + 0.5
-        found, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
-        return found[:4], work
+        result, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
+        return result[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
         near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
@@ -93,8 +88,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
-        quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
-        four, more = _shade(lighting, canvas, x[:, None] + quarter[0], y[:, None] + rows.start + quarter[1])
+        four, more = _shade(lighting, canvas, x[:, None] + QUARTER[0], y[:, None] + rows.start + QUARTER[1])
         picture[:, y, x] = four[:4].mean(2)
         work += more + Work(refined=len(x))
     return picture, work
@@ -110,8 +104,8 @@ def _shade(
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
-        found = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
-    return found.reshape(7, *way.shape[1:]), shade.work
+        result = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
+    return result.reshape(7, *way.shape[1:]), shade.work
 
 
 def directions(camera: Camera, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -140,7 +134,7 @@ ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
 def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1) -> Outputs:
-    """What the pixels of a field of solids show; objects are numbered as the field has them, from 1.
+    """Outputs of a field of solids; objects are numbered as the field has them, from 1.
 
     Alpha is the mean of four samples where it changes from pixel to pixel, the rest is of the centre.
 
@@ -152,30 +146,28 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
     """
     width, height = canvas
     lighting = Lighting(field, stage)
-    found = np.empty((ROWS, height, width), np.float32)
+    result = np.empty((ROWS, height, width), np.float32)
     every = max(1, min(TILE // width, -(-height // threads)))
 
     def row(top: int) -> None:
         y = np.arange(top, min(top + every, height))[:, None] + 0.5
-        found[:, top : top + every] = _shown(lighting, directions(stage.camera, canvas, x_centres, y))
+        result[:, top : top + every] = _shown(lighting, directions(stage.camera, canvas, x_centres, y))
 
     def four(start: int) -> None:
         at = slice(start, start + TILE // 4)
-        way = directions(stage.camera, canvas, across[at, None] + quarter[0], down[at, None] + quarter[1])
+        way = directions(stage.camera, canvas, across[at, None] + QUARTER[0], down[at, None] + QUARTER[1])
         alpha = _alpha(lighting, way.reshape(3, -1))[1]
-        found[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
+        result[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
 
     x_centres = np.arange(width) + 0.5
-    quarter = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])
-    with ThreadPoolExecutor(threads, initializer=field.xp.one_core) as pool:
-        list(pool.map(row, range(0, height, every)))
-        down, across = np.nonzero(rough(found[5:]))
-        list(pool.map(four, range(0, len(down), TILE // 4)))
-    return Outputs(found[0], np.moveaxis(found[1:4], 0, 2), found[4].astype(np.int32), found[5])
+    field.xp.each(threads, row, range(0, height, every))
+    down, across = np.nonzero(rough(result[5:]))
+    field.xp.each(threads, four, range(0, len(down), TILE // 4))
+    return Outputs(result[0], np.moveaxis(result[1:4], 0, 2), result[4].astype(np.int32), result[5])
 
 
 def _alpha(lighting: Lighting, way: Array) -> tuple[Trail, Array]:
-    """What rays (3, M) from the eye meet, and how much of what is behind objects hide (M,)."""
+    """The trail of rays (3, M) from the eye, and the share of the background that objects hide (M,)."""
     with lighting.xp.inference():
         trail = march(lighting.field, lighting.eye, way, lighting.limit(way))
         return trail, 1 - (trail.hit == INF) * lighting.xp.exp(-EXTINCTION * trail.length)

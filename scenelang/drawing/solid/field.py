@@ -1,12 +1,12 @@
 """The solids' field: distances, gradients and colours of objects at points, folded along the stream.
 
-Points meet a part of the objects, so of groups too; what is not met has no effect. A group that begins where
-nothing has been met of what it stands in, and that what it is joined by would show, goes on in that state.
+Each object's frame (`passes.py`) carries points into its own space. There pairs of points and objects meet
+the network together, where the point is in the object's ball; then the cell takes a point's objects in, one
+by one. Each open group of the stream has a state of its own (`States`), and a group's result is taken in as
+an object is.
 
-Each object's frame (`frames.py`) carries points into its own space. There pairs of points and objects meet
-the network together, where the point is in the object's ball (`passes.py`); then the cell takes a point's
-objects in, one by one. Where groups of the stream are open it has a state for each (`stacks.py`), and what
-a group comes to is taken in as an object is.
+A point meets some of the objects, and so some of a group; the others have no effect there. A group that draws
+goes on in the state around it where nothing has been met in that state yet.
 """
 
 from __future__ import annotations
@@ -86,17 +86,17 @@ class Objects:
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         self.draws = all(solid.draws for solid in self.solids)
-        """Whether all objects draw."""
+        """True where all objects draw."""
         self.adding = self._adding()
         self.media = bool(kinds.any())
-        """Whether some object is a medium."""
+        """True where some object is a medium."""
         self.mixed = self.media and not kinds.all()
-        """Whether not all are."""
+        """True where some objects are media and some are not."""
         self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
-        """Whether media have different colours."""
+        """True where media have different colours."""
 
     def _adding(self) -> Array | None:
-        """Which objects (N,) of groups do not draw but take nothing away, 1 or 0; None without groups."""
+        """A mask (N,), 1 or 0, of objects of groups that neither draw nor take away; None without groups."""
         groups = self.tree
         if not groups.deepest:
             return None
@@ -106,7 +106,7 @@ class Objects:
         return self.xp.array(adding.astype(np.float32), self.network.codes)
 
     def _tables(self, parts: Parts) -> None:
-        """What pairs of points and objects look up: arrays (…, N)."""
+        """Build the tables (…, N) that pairs of points and objects look up."""
         xp, network = self.xp, self.network
         frames, count = [solid.frame for solid in self.solids], len(self.solids)
 
@@ -124,7 +124,7 @@ class Objects:
         look = network.look(xp.array(parts.material.copy(), network.codes)).T
         colour = table(parts.rgb.T, 3) * look[:3]
         self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
-        """Of each object colour and medium (R, N); where some have textures, a plain colour between these."""
+        """Colour and medium (R, N) of objects; where some have textures, a plain colour between these."""
 
     def _cells(self, widths: Floats) -> None:
         """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
@@ -148,10 +148,10 @@ class Objects:
         ]
 
     def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """What objects wear in place of a colour.
+        """Build the textures of objects that have one in place of a colour.
 
-        In place of a texture's colours theirs is a plain one, unlike any other's, that tells where one
-        object ends and how the light falls.
+        They get a plain colour too, unlike any other's, that stands for the texture where pixels are compared
+        to find outlines and shadows.
         """
         xp, like = self.xp, self.network.codes
         worn = {
@@ -160,7 +160,7 @@ class Objects:
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
         self.textures = list(worn.items())
-        """Those that draw, with their numbers."""
+        """Textures of objects that draw, with the objects' numbers."""
         detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
         self.detail = xp.array(np.array(detail, np.float32), like)
         """Texels that a way of a world unit may cross; 0 without a texture."""
@@ -170,7 +170,7 @@ class Objects:
             self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
 
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
-        """What tells distances, and which of them is each object's."""
+        """Build the decoders of distances, and each object's index among them."""
         xp, network = self.xp, self.network
         keys = [
             code.tobytes() if element is None else element
@@ -202,22 +202,22 @@ class Objects:
             for element, s in zip(brought, self.solids, strict=True)
         ]
         self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
-        """1 where `segments.py` may answer."""
+        """1 where the network for whole segments may answer."""
         self.answered = bool(self.asked.sum() > 0)
-        """Whether that is so of any."""
+        """True where it may for some object."""
         known = len(network.segment_w) and self.answered
         self.segments = [network.segment(code) for code in learned] if known else []
 
     def _alone(self) -> None:
-        """What holds where an object is the first that is met, or the only one."""
+        """Prepare the answers for points that meet one object alone, or meet it first."""
         xp, like, solids = self.xp, self.network.codes, self.solids
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
         cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
         self.first = self.network.alone(xp.array(reach, like), cell)
-        """What distances (N,) of objects that are met first are multiplied with; 0: the cell has to say."""
+        """Factors of distances (N,) of objects that are met first; 0: the cell has to be asked."""
         drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
         self.open = bool(((self.first > 0) | (drawn == 0)).all())
-        """Whether that is so of no object that draws."""
+        """True where the cell need not be asked for any object that draws."""
         self.factor = self.first * self.scale
         """World units for a leaf unit of objects that are met alone."""
         self.special = [
@@ -227,12 +227,12 @@ class Objects:
         ]
         """Objects to which more than a map leads, or that are displaced."""
         self.groups = len(self.decoders) + len(self.special)
-        """Of objects that are met alone: those of each decoder, and each special one."""
+        """Number of groups of objects that are met alone: those of each decoder, and each special one."""
         group = 1 * self.decoder
         for at, i in enumerate(self.special):
             group[i] = len(self.decoders) + at
         self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
-        """Of each object that draws its group, else -1."""
+        """Group of each object that draws, else -1."""
 
     def worn(self, objects: Array, p: Array) -> Array:
         """Colours (3, P) of objects, whatever else is at points p (3, P)."""
@@ -295,8 +295,8 @@ class Objects:
             length = xp.sqrt((q * q).sum(0))
             rim = RADIUS / length.clip(RADIUS)
             place = q * rim
-        found = self._decoded(place, objects, gradient)
-        d, g = found[0], found[1:]
+        result = self._decoded(place, objects, gradient)
+        d, g = result[0], result[1:]
         if length is not None and rim is not None:
             d = d + (length - RADIUS).clip(0.0)
             if gradient:
@@ -322,7 +322,7 @@ class Objects:
         ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
         ask += [partial(self._special, i) for i in self.special]
         pieces = zip(ask, pairwise(bounds), strict=True)
-        parts = [told(at[:, a:b])[0] for told, (a, b) in pieces if a < b]
+        parts = [distances(at[:, a:b])[0] for distances, (a, b) in pieces if a < b]
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
 
     def _special(self, i: int, at: Array) -> Array:
@@ -340,16 +340,16 @@ class Objects:
         return d + frame.amount * (s[0] * s[1] * s[2])
 
     def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
-        """What decoders say at leaf coordinates (3, P): distances (1, P), or these and gradients (4, P)."""
+        """Decode leaf coordinates (3, P) to distances (1, P), or to these and gradients (4, P)."""
         xp = self.xp
         if len(self.decoders) == 1:
             return self._field(q, self.decoders[0], gradient)
-        found, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
+        result, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
         for i, layers in enumerate(self.decoders):
             index = xp.where(which == i)
             if len(index):
-                xp.put(found, index, self._field(xp.take(q, index), layers, gradient))
-        return found
+                xp.put(result, index, self._field(xp.take(q, index), layers, gradient))
+        return result
 
     def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
         if isinstance(decoder, GridShape):
@@ -408,7 +408,7 @@ class Stacks:
         xp.put(begun, rays[:met], ways[:met])
         if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
             return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
-        found: list[Array | None] = []
+        result: list[Array | None] = []
         closings: list[list[Closing]] = []
         stacks, paths = 0 * every, xp.take(self._path, 0 * every)
         start, deepest = 0, 1
@@ -428,36 +428,36 @@ class Stacks:
             states = xp.take(self._states, stack)
             deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
             closings.append(closing)
-            found.append(place if place is None and not start else points + count * states)
+            result.append(place if place is None and not start else points + count * states)
             xp.put(stacks, points, stack)
             xp.put(paths, points, path)
             start += len(points)
         closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
-        if deepest > 1 and found[0] is None:
-            found[0] = every
-        return found, closings, deepest
+        if deepest > 1 and result[0] is None:
+            result[0] = every
+        return result, closings, deepest
 
     def _closed(
         self, points: Array, stack: Array, common: Array, path: Array, count: int
     ) -> tuple[list[Closing], Array]:
         """End the groups of stacks (k,) but for what they have in common with what follows."""
-        xp, found = self._xp, list[Closing]()
+        xp, result = self._xp, list[Closing]()
         ending = stack & ~common
         for depth in reversed(range(self._groups)):
             bit = 1 << depth
             some = xp.where((ending & bit) > 0)
             if len(some):
                 inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
-                found.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                result.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
                 stack = stack - (ending & bit)
-        return found, stack
+        return result, stack
 
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
 
 
 class Meeting(NamedTuple):
-    """What the field answers at points (M,).
+    """Answers of the field at points (M,).
 
     Args:
         distance: D.
@@ -500,7 +500,7 @@ class Pairs(NamedTuple):
 
 
 class Operand(NamedTuple):
-    """What states take in (k,): an object or a group, as of `Meeting`; `look` is a register (R, k or 1)."""
+    """An object or a group for states (k,) to take in, as of `Meeting`; `look` is a register (R, k or 1)."""
 
     distance: Array
     look: Array
@@ -511,7 +511,7 @@ class Operand(NamedTuple):
 
 @dataclass(slots=True)
 class States:
-    """What states carry: distances and registers, and what else is asked for, as of `Meeting`.
+    """Distances and registers of states, and optional values, as of `Meeting`.
 
     Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
     """
@@ -583,11 +583,11 @@ class SolidField(Objects):
         objects = xp.whole(pairs[OBJECT])
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
-        found = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
+        result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
         if most < 2 or not self.tree.deepest:
-            return found
+            return result
         places, closings, depth = self._stacks.followed(places, rays, objects, every)
-        return found._replace(places=places, closings=closings, depth=depth)
+        return result._replace(places=places, closings=closings, depth=depth)
 
     def answer(
         self,
@@ -650,12 +650,12 @@ class SolidField(Objects):
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
-        found = states.at(xp, inner)
-        d, look = found.memory[0].clip(-EMPTY, NOTHING), found.memory[1:]
-        xp.put(states.memory[:1], inner, 0 * found.memory[:1] + EMPTY)
+        result = states.at(xp, inner)
+        d, look = result.memory[0].clip(-EMPTY, NOTHING), result.memory[1:]
+        xp.put(states.memory[:1], inner, 0 * result.memory[:1] + EMPTY)
         if states.bound is not None:
             xp.put(states.bound, inner, 0 * d + EMPTY)
-        operand = Operand(d, look, found.slope, found.bound, found.owner)
+        operand = Operand(d, look, result.slope, result.bound, result.owner)
         self._join(states, index, operand, which, wanted)
 
     def _join(
@@ -685,7 +685,7 @@ class SolidField(Objects):
         states.memory = _update(xp, states.memory, index, after)
 
     def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
-        """How far (k,) objects with distances d (k,) leave the kind of material as it is."""
+        """Distances (k,) within which objects at d (k,) leave the kind of material as it is."""
         xp, gap = self.xp, abs(d)
         if self.smooth is not None:
             blend = xp.minimum(gap, abs(before[0] - d) / 2)
@@ -694,7 +694,7 @@ class SolidField(Objects):
         return xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
 
     def inside(self, passes: Passes, t: Array) -> Array:
-        """Which balls (K, M) points at t (M,) are in, of objects that change something there."""
+        """A mask of balls (K, M) around the points at t (M,), of objects that change something there."""
         inside = (passes.slots[BEGIN] <= t) & (t <= passes.slots[END])
         if not self.draws:  # the others change only what is there
             touched = inside[0] & ~inside[0]
@@ -708,14 +708,14 @@ class SolidField(Objects):
         xp, inside = self.xp, self.inside(passes, t)
         alone = inside.sum(0) == 1
         one, several = xp.where(alone), xp.where(~alone)
-        found = xp.full((3, len(t)), 0.0, t)
+        result = xp.full((3, len(t)), 0.0, t)
         if len(several):
             there = passes.at(xp, several), xp.take(t, several), Wanted.ALL
-            xp.put(found, several, self.meet(*there, p=xp.take(p, several)).register[:3])
+            xp.put(result, several, self.meet(*there, p=xp.take(p, several)).register[:3])
         if len(one):
             objects = xp.whole(xp.take((passes.slots[OBJECT] * inside).sum(0), one))
-            xp.put(found, one, self.worn(objects, xp.take(p, one)))
-        return found
+            xp.put(result, one, self.worn(objects, xp.take(p, one)))
+        return result
 
     def textured(self, passes: Passes) -> Array:
         """Texels (M,) that rays may cross in a world unit, 0 where they pass no object with a texture."""

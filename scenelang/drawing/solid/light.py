@@ -1,7 +1,7 @@
 """Light on solids: surfaces, ground, sky and media as rays from the eye see them.
 
-The light is computed, as the language defines it; what is learned is where things are and what they look
-like. Colours are linear. Letters as in `network.py`.
+The light is computed, as the language defines it; places and colours of solids are learned. Colours are
+linear. Letters as in `network.py`.
 """
 
 from __future__ import annotations
@@ -76,14 +76,14 @@ class Lookups:
         off = (off - seen[:, None] * ratio) / (1 + ratio)
         p = (self._eye[:, None] + way * (t + INTO))[:, None] + off
         if objects is not None:
-            found = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
+            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
         else:
             four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
-            found = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
-        return found.reshape(3, 4, -1).mean(1)
+            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
+        return result.reshape(3, 4, -1).mean(1)
 
     def along(self, way: Array, trail: Trail, pieces: Piece, px: float) -> Iterator[tuple[Array, int, Array]]:
-        """Of pieces of rays in media with textures which they are, a node and what `_woven` gives for it.
+        """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there.
 
         Args:
             way: of the rays (3, M).
@@ -146,7 +146,7 @@ CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents o
 
 
 class Shade(NamedTuple):
-    """What M rays see.
+    """Light along M rays.
 
     Args:
         radiance: premultiplied and linear (3, M).
@@ -198,7 +198,7 @@ class Lighting:
         self.lookups = Lookups(field, stage.camera, pace.nodes)
 
     def shade(self, way: Array, px: float = 0.0) -> Shade:
-        """What rays from the eye see.
+        """Light along rays from the eye.
 
         Args:
             way: unit directions (3, M).
@@ -212,20 +212,20 @@ class Lighting:
             seen = seen * 0
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-        both, found = xp.concat([surface, floor], 0), []
+        both, result = xp.concat([surface, floor], 0), []
         work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface), lost=trail.lost)
         if len(surface):
-            found.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
+            result.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
         if len(floor):
-            found.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+            result.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
         mist = None
         if trail.pieces:
             pieces = self._cut(way, self._parted(trail))
             mist, share = self._scattering(way, trail, pieces, px)
-            found.append(mist)
-        if not found:
+            result.append(mist)
+        if not result:
             return Shade(seen[:3], seen[-3:], alpha, work)
-        points = Points(*(xp.concat(list(part), 1) for part in zip(*found, strict=True)))
+        points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
         light, free, more = self._lit(points, xp.take(trail.soft, surface), _steps(trail))
         work += more
         xp.put(seen, both, light[:, : len(both)])
@@ -274,7 +274,7 @@ class Lighting:
         return glow, work
 
     def limit(self, way: Array) -> Array:
-        """How far rays from the eye go before they meet the ground (M,), inf for ever."""
+        """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
         xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
         if ground is None or eye[1] <= ground.y:
             return never
@@ -347,27 +347,27 @@ class Lighting:
         return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met, lost=trail.lost)
 
     def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
-        """Where rays meet solids, and normals (3, K), colours, and light that joins in before (R, K)."""
+        """Points where rays meet solids, normals (3, K), colours, and light from before them (R, K)."""
         xp = self.xp
         t = xp.take(trail.hit, index)
         passes = trail.at(self.xp, index)
-        found = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
+        result = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
         sharp = xp.take(trail.soft, index) == 0
-        off = xp.where(sharp & (abs(found.distance) > 3 * INTO))
+        off = xp.where(sharp & (abs(result.distance) > 3 * INTO))
         if len(off):  # where the distances on both sides of the surface said little about it
-            t_off = xp.take(t, off) + INTO + self._ahead(found, way, off)
+            t_off = xp.take(t, off) + INTO + self._ahead(result, way, off)
             again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
             there = xp.where(_dot(again.gradient, again.gradient) > 0.01)  # not past an edge
             off = xp.take(off, there)
             xp.put(t, off, xp.take(t_off, there) - INTO)
             for name in ("distance", "register", "gradient"):
-                xp.put(getattr(found, name), off, xp.take(getattr(again, name), there))
-        g = found.gradient
+                xp.put(getattr(result, name), off, xp.take(getattr(again, name), there))
+        g = result.gradient
         towards = _dot(g, way)
-        t = t + sharp * (INTO + self._ahead(found, way, None))
+        t = t + sharp * (INTO + self._ahead(result, way, None))
         p = self.eye[:, None] + way * t
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        colour = found.register[:-1]
+        colour = result.register[:-1]
         for soft in (False, True) if px and self.field.textures else ():
             some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
             if len(some):
@@ -376,9 +376,9 @@ class Lighting:
                 xp.put(colour[:3], some, mean)
         return p, n, colour, 0 * colour
 
-    def _ahead(self, found: Meeting, way: Array, index: Array | None) -> Array:
-        """How much farther rays meet the surface than where the field was asked."""
-        xp, d, g = self.xp, found.distance, found.gradient
+    def _ahead(self, met: Meeting, way: Array, index: Array | None) -> Array:
+        """Distance along rays from the points where the field was asked to the surface."""
+        xp, d, g = self.xp, met.distance, met.gradient
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
         towards = _dot(g, way)
@@ -407,7 +407,7 @@ class Lighting:
         some = xp.where(several)
         if not field.coloured or not len(some):
             return piece
-        found = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
+        result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
         ray, begin, end, before = (xp.take(part, some) for part in piece)
         passes = trail.at(xp, ray)
         places = [begin + (end - begin) * share for share in LOOKS]
@@ -428,12 +428,12 @@ class Lighting:
         for step in steps:  # a ray changes once in each
             stop, done = low[done : done + len(step)], done + len(step)
             rays, starts, befores = (xp.take(part, step) for part in (ray, start, before))
-            found.append((rays, starts, stop, befores))
+            result.append((rays, starts, stop, befores))
             start, before = 1 * start, 1 * before
             xp.put(start, step, stop)
             xp.put(before, step, befores + stop - starts)
-        found.append((ray, start, end, before))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
+        result.append((ray, start, end, before))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
     def _cut(self, way: Array, piece: Piece) -> Piece:
         """The same pieces of rays, cut where the light falls unevenly along them."""
@@ -441,22 +441,22 @@ class Lighting:
         ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
         narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
-        found = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
+        result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
         wide = xp.where(~narrow)
         if not len(wide):
-            return found[0]
+            return result[0]
         ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
         middle = _dot(ways, to)
         aside = _length(xp, to - ways * middle).clip(NEAREST)
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
-            found.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*found, strict=True))
+            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
 
 def _steps(trail: Trail) -> int:
-    """Of rays from the light to what rays from the eye met."""
+    """Steps of the rays from the light to the points that rays from the eye met."""
     return HASTY if trail.lost else STEPS
 
 

@@ -1,11 +1,12 @@
 """Rays through the solids' field: the first surface, and the ways through media before it.
 
-The field bounds how far a surface or another kind of material is, and steps go as far (Hart 1996), plus up to
-a gap where the last two bounds let expect the next surface beyond: just behind that. What is thinner may be
-passed. Up to where it meets other objects, what a ray has to ask is prepared once; most rays meet one object
-alone and ask its decoder, with no cell between. Rays that are done leave the batch.
+The field bounds how far a surface or another kind of material is, and a step goes as far (Hart 1996). Where
+the last two bounds predict a surface farther on, a step goes just behind that, by at most `Pace.gap` more; a
+ray may miss solids thinner than the gap. A ray prepares its questions once, up to where it meets other
+objects; most rays meet one object alone and ask its decoder, with no cell between. Rays that are done leave
+the batch.
 
-A network has learned how long the half of a ray is in a leaf. It answers for rays that pass only media under
+A network has learned the length of half a ray inside a leaf. It answers for rays that pass only media under
 affine maps, joined by unions and beyond the reach of blends, whose balls are apart; the others are marched.
 """
 
@@ -28,7 +29,7 @@ NUDGE = np.float32(1 - 1e-6)  # of a point, to one just before it
 # rows of what a ray carries along: where it is and was, how far the surface was there; the objects that it
 # meets are the same up to a place, until which that falls at a pace; where it leaves the last; which group
 T, PAST, FREE, UNTIL, PACE, LAST, GROUP = range(7)
-# of rays that meet one object alone: where its map takes the ray's origin, how that changes, the scale
+# of rays that meet one object alone: the ray's origin behind its map, how that changes, the scale
 FROM, ALONG, SCALE, STATE = slice(7, 10), slice(10, 13), 13, 14
 # where there are media: whether the object is one; whether the ray is in one, since where, how long before
 DENSE, WITHIN, SINCE, LENGTH, MISTY = range(14, 19)
@@ -43,7 +44,7 @@ Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, len
 
 @dataclass(slots=True)
 class Trail:
-    """What M rays met.
+    """Surfaces and media that M rays met.
 
     Args:
         hit: (M,) how far the first opaque surface is, inf where there is none.
@@ -198,6 +199,7 @@ class Rays:
         begin, end = slots[BEGIN], slots[END]
         rows[UNTIL] = xp.least(xp.select(begin > t, begin, xp.select(end < t, self.never, end)))
         inside = xp.narrow(solids.inside(passes, t))
+        # a bound lasts for its length over the fastest change of a distance; 1e-3: outside of every ball
         rows[PACE] = 1 / xp.largest(inside * slots[RATE])[0].clip(1e-3)
         objects = xp.whole((inside * slots[OBJECT]).sum(0)).clip(0, len(solids.solids) - 1)
         group = xp.take(solids.group, objects)
@@ -229,7 +231,7 @@ class Rays:
             batch.bounds = np.searchsorted(groups, np.arange(self.solids.groups + 1)).tolist()
 
     def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
-        """Which points at t (n,) are inside media, which meet what is opaque, and how far that stays so."""
+        """Masks of points at t (n,) inside media and inside opaque solids, and how far both hold."""
         solids, rows = self.solids, batch.rows
         self.trail.steps += len(t)
         if batch.pairs is None:
@@ -237,12 +239,12 @@ class Rays:
             d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
             free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
         else:
-            found = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
-            self.trail.met += found.met
-            d, free, dense = found.distance, abs(found.distance), None
+            result = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
+            self.trail.met += result.met
+            d, free, dense = result.distance, abs(result.distance), None
             if solids.mixed:
-                dense = found.register[0] > 0.5
-                free = self.xp.select((d < 0) & dense, found.change, free)
+                dense = result.register[0] > 0.5
+                free = self.xp.select((d < 0) & dense, result.change, free)
         within = (d < 0) & batch.alive
         if not solids.media:
             return within & False, (d < TOUCH) & batch.alive, free
@@ -261,6 +263,8 @@ class Rays:
                 (xp.take(batch.place, struck), xp.take(rows[:UNTIL], struck), xp.take(free, struck))
             )
         safe = free * rows[PACE]
+        # The bounds fell from FREE at PAST to `free` at t; on that line they are 0 after another
+        # free (t - PAST) / (FREE - free). 5 % more puts the point behind the surface, so that the ray ends.
         hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
         following = t + xp.minimum(xp.maximum(hope, safe), safe + self.gap)
         alive = alive & ~done
@@ -310,19 +314,19 @@ class Rays:
         low, high = row[PAST], row[T]
         for _ in range(halvings):
             half = (low + high) / 2
-            found = self.solids.meet(passes, half, self.wanted)
-            self.trail.met += found.met
-            still = (found.distance < 0) & (found.register[0] > 0.5)
+            result = self.solids.meet(passes, half, self.wanted)
+            self.trail.met += result.met
+            still = (result.distance < 0) & (result.register[0] > 0.5)
             low, high = xp.select(still, half, low), xp.select(still, high, half)
         xp.put(self.trail.hit, ray, high)
         xp.put(self.trail.soft, ray, high * 0 + 1)
         self._close(ray, row, high)
 
     def _root(self, rows: Array, free: Array) -> Array:
-        """Where between their last two points some rays met a surface, as far as both bounds tell."""
+        """Estimate where rays met a surface between their last two points, from both bounds."""
         t, past, before = rows[T], rows[PAST], rows[FREE]
-        found = past + (t - past) * (before / (before + free).clip(1e-9))
-        return self.xp.maximum(found, t - self.gap)
+        result = past + (t - past) * (before / (before + free).clip(1e-9))
+        return self.xp.maximum(result, t - self.gap)
 
     def _close(self, ray: Array, rows: Array, end: Array) -> Array:
         """End the ways through media of rays (k,) with such rows (STATE, k); lengths (k,) in media so far."""
@@ -335,12 +339,12 @@ class Rays:
 
 
 def _enough(waiting: int, under_way: int) -> bool:
-    """Whether so many rays should join those under way."""
+    """True where so many waiting rays should join the batch."""
     return waiting > under_way / WAIT + FEW if under_way else waiting > 0
 
 
 def known(solids: SolidField, passes: Passes) -> Array:
-    """Which of M rays (M,) the network answers for."""
+    """A mask (M,) of rays that the network answers for."""
     xp, begin, end = solids.xp, passes.slots[BEGIN], passes.slots[END]
     objects = xp.whole(passes.slots[OBJECT]).clip(0)
     asked = xp.take(solids.asked, objects.reshape(-1)).reshape(objects.shape)
@@ -365,15 +369,15 @@ def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
     objects, way, end = xp.whole(pairs[OBJECT]), pairs[WAY], pairs[END]
     speed = xp.sqrt((way * way).sum(0))
     q = xp.take(passes.origins, objects) + way * end
-    found, which = 0 * end, xp.take(solids.decoder, objects)
+    result, which = 0 * end, xp.take(solids.decoder, objects)
     for i, layers in enumerate(solids.segments):
         some = xp.where(which == i)
         if len(some):
             x = folded(xp, xp.take(q, some), xp.take(way, some) / -xp.take(speed, some))
-            xp.put(found, some, solids.network.field(x, layers, False)[0])
-    found = xp.minimum(found.clip(0.0) / speed, end - pairs[BEGIN])
+            xp.put(result, some, solids.network.field(x, layers, False)[0])
+    result = xp.minimum(result.clip(0.0) / speed, end - pairs[BEGIN])
     each = 0 * slots[OBJECT].reshape(-1)
-    xp.put(each, flat, found)
+    xp.put(each, flat, result)
     return each.reshape(slots.shape[1:]).sum(0), len(flat)
 
 
@@ -381,7 +385,7 @@ HALVINGS = 16  # of the interval in which a medium gives way to a solid
 
 
 class Pace(NamedTuple):
-    """What is saved where solids are drawn, and what it costs.
+    """Trade-offs between speed and accuracy where solids are drawn.
 
     Args:
         gap: world units by which steps may go beyond what is certain; what is thinner may be passed.
@@ -399,7 +403,7 @@ CAREFUL = Pace()
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What drawing took.
+    """Counts of the work of drawing.
 
     Args:
         rays: from the eye.
@@ -442,7 +446,7 @@ def march(
         limit: how far to go (M,).
         halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
         gap: as of `Pace`.
-        whole: whether nobody asks where media begin and end, so that `segments.py` may answer.
+        whole: whether nobody asks where media begin and end, so that the network for segments may answer.
         steps: of all rays at most.
     """
     xp = solids.xp

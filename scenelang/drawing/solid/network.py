@@ -9,7 +9,7 @@ learned parts are these too:
 2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
    by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
 
-A third answers for whole segments (`segments.py`): how long the half of a ray is in a leaf.
+A third answers for whole segments: the length of half a ray inside a leaf (`march.py`).
 
 The first two say how their answers change with what they are asked, written by hand: a surface's normal is
 the gradient of the distance behind the last object.
@@ -73,12 +73,12 @@ def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     for _ in range(LEVELS):
         half /= 2
         centre = (centre[:, :, None] + half * CORNERS).reshape(3, -1)
-        found = distance(centre)
-        inside = centre[:, found <= 0]
+        result = distance(centre)
+        inside = centre[:, result <= 0]
         low = np.minimum(low, inside.min(1, keepdims=True, initial=np.inf))
         high = np.maximum(high, inside.max(1, keepdims=True, initial=-np.inf))
         wider = ((centre - half < low) | (centre + half > high)).any(0)
-        centre = centre[:, wider & (found <= STEEPEST * half * 3**0.5)]
+        centre = centre[:, wider & (result <= STEEPEST * half * 3**0.5)]
     low = np.minimum(low, (centre - half).min(1, keepdims=True, initial=np.inf))
     high = np.maximum(high, (centre + half).max(1, keepdims=True, initial=-np.inf))
     return np.concatenate([low, high], 1).T
@@ -120,7 +120,7 @@ class Cell(NamedTuple):
 
 
 class Wanted(IntEnum):
-    """What is asked of the cell."""
+    """Values that the cell is asked for."""
 
     DISTANCE = 0
     KIND = 1  # and whether it is a medium
@@ -151,7 +151,7 @@ class SolidNetwork:
         return self._layers(code, self.decoder_w, self.decoder_b)
 
     def segment(self, code: Array) -> Smooth:
-        """What answers for whole segments of a code (C,), likewise; nothing where the network has none."""
+        """Layers of a code (C,) that answer for whole segments; empty where the network has none."""
         return self._layers(code, self.segment_w, self.segment_b)
 
     def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
@@ -255,7 +255,7 @@ class SolidNetwork:
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
     def alone(self, reach: Array, cell: Cell) -> Array:
-        """What distances (N,) of up to a reach (N,) are multiplied with where nothing has been met.
+        """Factors of distances (N,) of up to a reach (N,) where nothing has been met.
 
         0 where a gate may not be open there.
 
@@ -268,7 +268,7 @@ class SolidNetwork:
         return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
-        """How the distance behind an object changes with its own (M,) and with that before it (M,)."""
+        """Derivatives of the distance behind an object by its own (M,) and by that before it (M,)."""
         candidate, bump = cell.candidate[0], cell.bump[0]
         rate = d * candidate - state - (1 - 2 * take) * bump
         rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)

@@ -3,8 +3,8 @@
 The three-dimensional companion of `frames.py`: maps, turns of space and what bounds them, none of it learned.
 Points are arrays (3, M).
 
-A ray has a slot for each ball that it passes, so that what follows costs what the balls along a ray do,
-however many objects the scene has. What cuts all that lies outside of it is met wherever that may be.
+A ray has a slot for each ball that it passes, so that its cost depends on those balls alone, however many
+objects the scene has. An object that cuts away everything outside of it is met wherever something may be.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ class Turn(NamedTuple):
         rows = [g[0], g[1], g[2]]
         rows[self.i], rows[self.j] = cos * a - sin * b, sin * a + cos * b
         rows[self.along] = rows[self.along] + self.rate * swing
-        found = xp.stack(rows, 0)
-        return found if length is None else found + (self.twirl * swing / length.clip(1e-12)) * p
+        result = xp.stack(rows, 0)
+        return result if length is None else result + (self.twirl * swing / length.clip(1e-12)) * p
 
     def placed(self, xp: Arrays, like: Array) -> Turn:
         """Itself."""
         return self
 
     def stretch(self, radius: float) -> float:
-        """How much longer it makes a small step at most, in the ball of a radius about the origin.
+        """Greatest factor by which it lengthens a small step, in the ball of a radius about the origin.
 
         The turn's derivative is a rotation times ``1 + u v^T``, u the point turned by a right angle in the
         plane of the turn and v the angle's gradient: with m = |u| |v| and c = u . v the larger singular
@@ -194,12 +194,12 @@ def inverse_of(linear: np.ndarray) -> np.ndarray:
         ProgramError: it has none in float32.
     """
     try:
-        found: np.ndarray = np.linalg.inv(linear)
+        result: np.ndarray = np.linalg.inv(linear)
     except np.linalg.LinAlgError:
         raise ProgramError("a damaged program: a frame without an inverse") from None
-    if not np.abs(found).max() < MOST:
+    if not np.abs(result).max() < MOST:
         raise ProgramError("a frame beyond float32")
-    return found
+    return result
 
 
 def _map(frame: np.ndarray) -> Map:
@@ -207,8 +207,9 @@ def _map(frame: np.ndarray) -> Map:
     return Map(rows[:, :3], rows[:, 3])
 
 
-def _single(found: Map) -> Map:
-    return Map(found.linear.astype(np.float32), found.shift.astype(np.float32))
+def _single(wide: Map) -> Map:
+    """A map in float32."""
+    return Map(wide.linear.astype(np.float32), wide.shift.astype(np.float32))
 
 
 def _turns(slots: np.ndarray) -> list[Turn]:
@@ -306,7 +307,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
 
 
 def showing(groups: Groups) -> Mask:
-    """Whether rows may show something that was empty before (1 + D, N): at all, and in their groups."""
+    """A mask (1 + D, N) of rows that may show something where it was empty: at all, and in their groups."""
     shows = np.isin(groups.tokens, (UNION, SMOOTH))
     inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
     return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
@@ -314,10 +315,10 @@ def showing(groups: Groups) -> Mask:
 
 def _under(groups: Groups, operator: int) -> Mask:
     """Find rows (N,) that an operator joins, or a group around them."""
-    found = groups.tokens == operator
+    result = groups.tokens == operator
     for path in groups.path.T:
-        found = found | ((path >= 0) & (groups.joins[path] == operator))
-    return np.asarray(found)
+        result = result | ((path >= 0) & (groups.joins[path] == operator))
+    return np.asarray(result)
 
 
 def _widened(
@@ -388,7 +389,7 @@ class Passes(NamedTuple):
     origins: Array
 
     def at(self, xp: Arrays, index: Array) -> Passes:
-        """Those of some of the rays."""
+        """Passes of some of the rays."""
         return Passes(xp.take(self.slots, index), self.origins)
 
 
@@ -401,7 +402,7 @@ def find_passes(
     limit: Array,
     tight: bool = True,
 ) -> tuple[Array, Passes]:
-    """Which of M rays (k,) may meet something that draws, and the balls that these pass.
+    """Indices (k,) of rays that may meet something that draws, and the balls that these pass.
 
     Args:
         xp: functions of the arrays' library.
@@ -412,7 +413,7 @@ def find_passes(
         limit: where the rays end (M,).
         tight: whether objects' boxes count too.
     """
-    low, high, found = 0 * way[0], limit, []
+    low, high, result = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
     around: list[tuple[Array, Array]] = []  # of the groups that a group stands in
     for i, solid in reversed(list(enumerate(solids))):
@@ -429,13 +430,13 @@ def find_passes(
         xp.put(filled, rays, slot + 1)
         if solid.draws:
             xp.put(drawn, rays, slot >= 0)
-        found.append((rays, slot, values))
+        result.append((rays, slot, values))
     some = xp.where(drawn)
     count, most = len(some), int(filled.max()) if len(some) else 0
     slots = xp.full((SLOT, most, count), 0.0, way)
     slots[BEGIN], slots[END] = INF, -INF
     if count:
-        rays, slot, values = (xp.concat(parts, -1) for parts in zip(*found, strict=True))
+        rays, slot, values = (xp.concat(parts, -1) for parts in zip(*result, strict=True))
         place = xp.take(placed(xp, some, filled), rays)
         kept = xp.where(place >= 0)
         if len(kept) < len(place):
@@ -447,10 +448,10 @@ def find_passes(
 def _crossed(
     xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array, tight: bool
 ) -> tuple[Array, Array]:
-    """Which rays (k,) pass an object's ball between low and high, and their slots (SLOT, k) for it."""
+    """Indices (k,) of rays that pass an object's ball between low and high, and their slots (SLOT, k)."""
     near, to = None, solid.centre - origin
     far = float(xp.sqrt(to @ to))
-    if far > solid.extent:  # rays within a cone around the ball
+    if far > solid.extent:  # rays within a cone around the ball, by its cosine less 1e-5 for rounding
         near = xp.where(to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
         way, low, high = xp.take(way, near), xp.take(low, near), xp.take(high, near)
     a = solid.frame.outer.linear @ way
@@ -470,7 +471,7 @@ def _crossed(
 
 
 def placed(xp: Arrays, index: Array, like: Array) -> Array:
-    """Where in an index each of M entries is, -1 for those that are not; `like` are integers (M,)."""
-    found = 0 * like - 1
-    xp.put(found, index, xp.whole(0 * index + 1).cumsum(0) - 1)
-    return found
+    """Positions (M,) of entries in an index, -1 for those that are not in it; `like` are integers (M,)."""
+    result = 0 * like - 1
+    xp.put(result, index, xp.whole(0 * index + 1).cumsum(0) - 1)
+    return result
