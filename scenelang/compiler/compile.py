@@ -40,7 +40,7 @@ def compile_scene(
         model: draw with this model instead of the one the scene names.
         codes: lift with these instead of the model's shipped ones, for weights under trial.
         after: called with ``"lower"`` and the name of each pass and the graph it left.
-        without: names of passes to leave out, of those that only save work (`scenelang.passes.OPTIONAL`).
+        without: names of passes to leave out, of those that only save work (`passes.OPTIONAL`).
         memory: of the previous frame of an animation whose frames share nodes; the Program is the same
             with or without it.
 
