@@ -1,4 +1,4 @@
-"""Animations and sweeps from the command line."""
+"""Animations from the command line, and ``scenelang sweep``."""
 
 from __future__ import annotations
 
@@ -52,21 +52,21 @@ class Film(Record):
 
     @property
     def certain(self) -> bool:
-        """Whether nothing but an animation will do."""
+        """True where an option is for animations alone."""
         return self.range is not None or self.fps is not None
 
     @property
     def frames(self) -> FrameRange:
-        """Which frames; raises `click.UsageError` where the range is not one."""
+        """The range of frames; raises `click.UsageError` where the text is not a range."""
         try:
             return FrameRange() if self.range is None else FrameRange.parse(self.range)
         except FramesError as error:
             raise click.BadParameter(str(error), param_hint="--frames") from None
 
     def target(self, name: str, out: str) -> Target | None:
-        """The file or folder of a scene's animation, if it has one; None where ``out`` is a single picture.
+        """The target of a scene's animation; None where ``out`` is a single picture.
 
-        Raises `click.UsageError` where frames are asked for all the same.
+        Raises `click.UsageError` where it is one and frames are asked for.
         """
         if not (is_animation(out) or out.endswith(("/", "\\")) or Path(out).is_dir() or self.certain):
             return None
@@ -76,16 +76,18 @@ class Film(Record):
             raise click.UsageError(f"{error}.") from None
 
 
-def moves(found: Input, target: Target, film: Film, out: str) -> bool:
-    """True where a scene is drawn as an animation and not as one picture; reports where it cannot be.
+def moves(scene_input: Input, target: Target, film: Film, out: str) -> bool:
+    """True where a scene is drawn as an animation and not as one picture, or has errors.
 
     Raises `click.UsageError` where ``out`` cannot hold a picture.
     """
-    if found.diagnostics.errors or (found.evaluation is not None and found.evaluation.animates):
+    if scene_input.diagnostics.errors or (
+        scene_input.evaluation is not None and scene_input.evaluation.animates
+    ):
         return True
     if film.certain:
         which = "--frames" if film.frames != FrameRange() else "--fps"
-        found.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
+        scene_input.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
         return True
     if target.kind == "sequence":
         return "%" in out
@@ -98,7 +100,7 @@ def moves(found: Input, target: Target, film: Film, out: str) -> bool:
 
 
 def animate(
-    found: Input,
+    scene_input: Input,
     target: Target,
     film: Film,
     how: How,
@@ -110,11 +112,11 @@ def animate(
     """Draw an animation and give the exit code.
 
     Args:
-        found: the scene.
+        scene_input: the scene.
         out: the target, as the user wrote it.
-        outputs: to write beside each picture.
+        outputs: written next to each picture.
         strict: count warnings as errors.
-        verbose: say where the time went.
+        verbose: report times.
 
     Raises:
         Trouble: a file cannot be written.
@@ -122,17 +124,17 @@ def animate(
     from scenelang.output.animate import make
     from scenelang.output.painting import Painter
 
-    started, told = time.perf_counter(), found.diagnostics
-    drawn = found.evaluation or ((found.scene,) if found.scene is not None else ())
-    if told.errors or not drawn:
-        say_diagnostics(told)
+    started, diagnostics = time.perf_counter(), scene_input.diagnostics
+    drawn = scene_input.evaluation or ((scene_input.scene,) if scene_input.scene is not None else ())
+    if diagnostics.errors or not drawn:
+        say_diagnostics(diagnostics)
         return 1
-    clip = Clip(drawn, told)
+    clip = Clip(drawn, diagnostics)
     numbers = None
-    with suppress(SceneError):  # its diagnostics are told
+    with suppress(SceneError):  # its diagnostics are the input's
         numbers = clip.numbers(film.frames)
-    if numbers is None or (told.items and strict):
-        say_diagnostics(told)
+    if numbers is None or (diagnostics.items and strict):
+        say_diagnostics(diagnostics)
         return 1
     if outputs and target.kind != "sequence":
         what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
@@ -140,7 +142,7 @@ def animate(
     check_outputs([target.file(number) for number in numbers], outputs)
     try:
         with Bar() as bar:
-            made = make(
+            result = make(
                 Painter(clip, how, outputs=outputs),
                 target,
                 numbers,
@@ -152,43 +154,43 @@ def animate(
                 progress=lambda now: bar(now.told, now.done, now.total),
             )
     except SceneError:
-        say_diagnostics(told)
+        say_diagnostics(diagnostics)
         return 1
     except KeyboardInterrupt:
         if target.work.exists():
-            kept = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
-            click.echo(kept, err=True)
+            note = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
+            click.echo(note, err=True)
         raise
     except OSError as error:
         raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
-    say_diagnostics(told)
-    click.echo(summary(made, time.perf_counter() - started), err=True)
-    if (others := strays(target, made)) is not None:
+    say_diagnostics(diagnostics)
+    click.echo(summary(result, time.perf_counter() - started), err=True)
+    if (others := strays(target, result)) is not None:
         click.echo(f"note: {others}", err=True)
-    for line in made.lines() if verbose else ():
+    for line in result.lines() if verbose else ():
         click.echo(f"  {line}", err=True)
     return 0
 
 
-def summary(made: RenderResult, seconds: float) -> str:
-    """A line about what was written."""
-    first, last = made.files[0], made.files[-1]
-    name = f"{first} … {last.name}" if len(made.files) > 1 else str(first)
-    size = decimal(sum(file.stat().st_size for file in made.files))
-    parts = [plural(made.frames, "frame"), size]
-    if made.resumed:
-        parts.append(f"{made.resumed} kept from a run before")
-    if same := made.frames - made.drawn - made.resumed:
+def summary(result: RenderResult, seconds: float) -> str:
+    """A line about the files that were written."""
+    first, last = result.files[0], result.files[-1]
+    name = f"{first} … {last.name}" if len(result.files) > 1 else str(first)
+    size = decimal(sum(file.stat().st_size for file in result.files))
+    parts = [plural(result.frames, "frame"), size]
+    if result.resumed:
+        parts.append(f"{result.resumed} kept from a run before")
+    if same := result.frames - result.drawn - result.resumed:
         parts.append(f"{same} the same as others")
     return f"{name}: {', '.join(parts)}, {seconds:.1f} s"
 
 
-def strays(target: Target, made: RenderResult) -> str | None:
+def strays(target: Target, result: RenderResult) -> str | None:
     """A line about files of a sequence that this run did not write."""
     if target.kind != "sequence":
         return None
     others = {path.name for path in target.there()}
-    others -= {file.name for file in made.files}
+    others -= {file.name for file in result.files}
     if not others:
         return None
     count, among = plural(len(others), "such file"), " among them" if len(others) > 1 else ""
@@ -200,15 +202,15 @@ BESIDE = ("depth", "normal", "object", "alpha", "scene", "program")
 
 def _grid(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
     """NAME=VALUES, or NAME alone; several times."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for text in given:
         name, _, values = (part.strip() for part in text.partition("="))
         if not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise click.BadParameter(f"`{text}` is not NAME=VALUES", ctx, param)
-        if name in found:
+        if name in result:
             raise click.BadParameter(f"`{name}` is given twice", ctx, param)
-        found[name] = values
-    return found
+        result[name] = values
+    return result
 
 
 def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
@@ -286,14 +288,12 @@ def command(
     A run that was interrupted goes on where it stopped, and one with a larger --count adds to what is there.
     """
     from scenelang.language.evaluation import ParamError
-    from scenelang.language.reports import SceneError
-    from scenelang.output.frames import TargetError
     from scenelang.output.sweep import render_many
 
     started = time.perf_counter()
     try:
         with Bar() as bar:
-            made = render_many(
+            sweep = render_many(
                 scene, out, grid=grid, random=random, count=count, seed=seed, outputs=outputs, table=table,
                 sheet=sheet, jobs=jobs, cluster=cluster, **request.named(), **how._asdict(),
                 progress=lambda now: bar(now.told, now.done, now.total),
@@ -305,14 +305,14 @@ def command(
         ctx.exit(1)
     except ValueError as error:  # of another sweep, or a format that cannot be written
         raise Trouble(str(error)) from None
-    _say(made, time.perf_counter() - started)
-    for line in made.made.lines() if verbose else ():
+    _say(sweep, time.perf_counter() - started)
+    for line in sweep.made.lines() if verbose else ():
         click.echo(f"  {line}", err=True)
-    ctx.exit(1 if made.errors else 0)
+    ctx.exit(1 if sweep.errors else 0)
 
 
 def _say(done: Sweep, seconds: float) -> None:
-    """What came of it."""
+    """Print the result of a sweep."""
     say_diagnostics(done.warnings)
     for number, errors in done.failed.items():
         values = zip(done.names, done.lines[number].values, strict=True)

@@ -1,4 +1,4 @@
-"""What `scenelang check` finds in scenes, and their texts after all fixes."""
+"""Checks of several scenes together, and their texts after all fixes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scenelang.language.session import Defines
 
 
 class Selection(Record):
-    """Which warnings count; errors always do."""
+    """A choice of warnings by code; errors always count."""
 
     # codes, or beginnings of codes, of the warnings that are wanted; empty for all
     select: tuple[str, ...] = ()
@@ -32,19 +32,19 @@ class Scenes(Record, frozen=False):
     """The scenes of a command line."""
 
     request: Request  # what holds for all of them
-    selection: Selection = field(default_factory=Selection)  # which warnings count
-    frames: Frames = "some"  # which frames are looked at
+    selection: Selection = field(default_factory=Selection)
+    frames: Frames = "some"  # those that are checked
     # their texts, by the names that the user wrote
     sources: dict[str, SourceFile] = field(default_factory=dict)
-    # what there is to say of those that are not text
+    # diagnostics of files that are not text
     unread: Diagnostics = field(default_factory=Diagnostics)
     names: dict[str, str] = field(default_factory=dict)
     """The names by the files' places on the disk."""
     unseen: int = 0
-    """How many frames that were to be looked at were not, as they exceed the limits of one scene."""
+    """The number of frames that were left out, as they exceed the limits of one scene."""
 
     def read(self, name: str) -> None:
-        """Take a scene in, once under any name; raises `OSError` where it cannot be opened."""
+        """Read a scene, once under any name; raises `OSError` where it cannot be opened."""
         place = _place(name)
         if place in self.names:
             return
@@ -54,20 +54,20 @@ class Scenes(Record, frozen=False):
             self.names[place] = name
 
     def check(self) -> Diagnostics:
-        """All that there is to say."""
+        """All diagnostics of the scenes."""
         return self._check(self.sources, {})
 
     def _check(self, sources: Mapping[str, SourceFile], texts: Mapping[Path, str]) -> Diagnostics:
-        # Values from outside remember which params they met, so each round needs its own.
+        # `Defines` record the params that they were used for, so each round needs its own.
         given = self.request.source
         own = replace(given, params=Defines(given.values), texts=texts)
         request = replace(self.request, source=own)
         parts, self.unseen = [self.unread.items], 0
         for name, source in sources.items():
-            found = read_input(name, request, text=source)
-            facts = found.tree, found.evaluation, found.scene, found.spans, found.diagnostics
+            result = read_input(name, request, text=source)
+            facts = result.tree, result.evaluation, result.scene, result.spans, result.diagnostics
             self.unseen += check_evaluated(*facts, frames=self.frames)
-            parts.append(found.diagnostics.items)
+            parts.append(result.diagnostics.items)
         parts.append(unused_defines(request))
         every = merged(parts)
         every.items[:] = [d for d in every.items if self.selection.keeps(d)]
@@ -81,7 +81,7 @@ class Scenes(Record, frozen=False):
         return self.names.get(STDIN if name == "<stdin>" else _place(name))
 
     def fix(self) -> Settled[str]:
-        """The texts after all fixes, by the names that the user wrote, and what is left.
+        """The texts after all fixes, by the names that the user wrote, and the diagnostics that are left.
 
         Of imported files only those change that were named too.
         """

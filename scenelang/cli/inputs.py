@@ -49,20 +49,20 @@ class Request(Record):
 
 
 class Input(Record, frozen=False):
-    """A scene or a compiled program that the command line names, and what is made of it."""
+    """A scene or a compiled program that the command line names, with its results so far."""
 
     name: str  # as the user wrote it
     how: How = DEFAULT  # how it is drawn
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # what was found so far
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)  # all so far
     trouble: str | None = None  # why a compiled program cannot be drawn
     tree: nodes.File | None = None  # None if it is not text
     evaluation: Evaluation | None = None  # runs its other frames; None for JSON
     scene: Scene | None = None  # None if it has errors
     spans: SpanMap = field(default_factory=SpanMap)  # where its nodes were written
-    program: Program | None = None  # what the network draws
+    program: Program | None = None  # for the network
     # the graph after `lower` and each pass, in order
     graphs: dict[str, Graph] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)  # what to say about it on `-v`
+    notes: list[str] = field(default_factory=list)  # lines for `-v`
 
     def failed(self, strict: bool = False) -> bool:
         """True where there is nothing to draw."""
@@ -70,7 +70,7 @@ class Input(Record, frozen=False):
 
 
 def stem_of(name: str) -> str:
-    """What files made of a scene are called."""
+    """The stem of names of files that are made from a scene."""
     return "stdin" if name == STDIN else Path(name).stem
 
 
@@ -95,12 +95,12 @@ def read_input(
 ) -> Input:
     """Read one scene: text is evaluated, JSON (by its suffix, or `{` first in standard input) just read.
 
-    ``text`` is what it holds, where that was read before. Raises `OSError` where it cannot be opened.
+    ``text`` is its text where that was read before. Raises `OSError` where it cannot be opened.
     """
-    clock, found, frame = clock or Clock(), Input(name, how), request.frame or 0
-    text = text or read_text(name, found.diagnostics)
+    clock, result, frame = clock or Clock(), Input(name, how), request.frame or 0
+    text = text or read_text(name, result.diagnostics)
     if text is None:
-        return found
+        return result
     path, root = (None, ".") if name == STDIN else (name, None)
     source = replace(request.source, path=path, text=text, root=request.source.root or root)
     if name.endswith(JSON) or (path is None and text.text.lstrip()[:1] == "{"):
@@ -108,42 +108,42 @@ def read_input(
 
         if frame:
             fact = f"frame {frame} of a scene from JSON, which is one frame"
-            found.diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
+            result.diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
         with clock("read"):
             folder = Path(source.root or Path(name).parent)
-            scene, spans = load_json(text, Scene, found.diagnostics, folder)
+            scene, spans = load_json(text, Scene, result.diagnostics, folder)
             if scene is not None and (source.size or source.model):
-                made = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
+                changed = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
                 if spans.span(scene) is not None:
-                    spans.copy(scene, made)
-                scene = made
+                    spans.copy(scene, changed)
+                scene = changed
     else:
         with clock("parse"):
-            source = source.parsed(found.diagnostics)
+            source = source.parsed(result.diagnostics)
         with clock("evaluate"):
-            found.evaluation = source.evaluation(found.diagnostics, frame=frame, replays=True)
-            scene, spans = found.evaluation.run(frame)
-        found.tree = source.tree
-    if scene is not None and not found.diagnostics.errors:
-        found.scene, found.spans = scene, spans
-    return found
+            result.evaluation = source.evaluation(result.diagnostics, frame=frame, replays=True)
+            scene, spans = result.evaluation.run(frame)
+        result.tree = source.tree
+    if scene is not None and not result.diagnostics.errors:
+        result.scene, result.spans = scene, spans
+    return result
 
 
 def unused_defines(request: Request) -> list[Diagnostic]:
     """An error for every ``-D`` that no scene read so far has a param for."""
-    found = Diagnostics()
+    result = Diagnostics()
     params = request.source.params
     if isinstance(params, Defines):
-        params.report_unused(found)
-    return found.items
+        params.report_unused(result)
+    return result.items
 
 
 def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
-    """All diagnostics; what several scenes import and share is said once."""
-    found = Diagnostics()
+    """All diagnostics; those of a file that several scenes import are reported once."""
+    result = Diagnostics()
     for d in (d for part in parts for d in part):
-        found.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
-    return found
+        result.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+    return result
 
 
 Color = Literal["auto", "always", "never"]
@@ -162,11 +162,11 @@ class Sectioned(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         heading = {name: title for title, names in self.sections.items() for name in names.split()}
-        found: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *self.sections)}
+        result: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *self.sections)}
         for param in self.get_params(ctx):
             if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
-                found[heading.get(max(param.opts, key=len), "Options")].append(record)
-        for title, records in found.items():
+                result[heading.get(max(param.opts, key=len), "Options")].append(record)
+        for title, records in result.items():
             with formatter.section(title):
                 formatter.write_dl(records)
 
@@ -174,29 +174,27 @@ class Sectioned(click.Command):
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
     if value is None:
         return None
-    found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
-    if found is None:
+    result = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
+    if result is None:
         raise click.BadParameter(f"`{value}` is not a size such as 320x192", ctx, param)
-    width, height = int(found[1]), int(found[2])
+    width, height = int(result[1]), int(result[2])
     if not (1 <= width <= 8192 and 1 <= height <= 8192):
         raise click.BadParameter(f"`{value}` has a side outside 1..8192", ctx, param)
     return width, height
 
 
 def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """What NAME=VALUE, given several times, says."""
-    found: dict[str, str] = {}
+    """A dictionary from an option NAME=VALUE that may be given several times."""
+    result: dict[str, str] = {}
     for value in values:
         name, equals, text = value.partition("=")
         if not equals or not re.fullmatch(r"[A-Za-z_][\w.]*", name.strip()):
             raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
-        found[name.strip()] = text.strip()
-    return found
+        result[name.strip()] = text.strip()
+    return result
 
 
 def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.language.session import Defines
-
     return Defines(assignments(ctx, param, values))
 
 
@@ -295,8 +293,6 @@ def request(command: Callable[..., Any]) -> Callable[..., Any]:
     @root
     @wraps(command)
     def with_request(*arguments: Any, **given: Any) -> Any:
-        from scenelang.language.evaluation import Source
-
         frame, params = given.pop("frame"), given.pop("defines")
         own = {name: given.pop(name) for name in ("model", "root", "size")}
         return command(*arguments, request=Request(Source(params=params, **own), frame), **given)

@@ -16,9 +16,10 @@ from scenelang.cli.main import describe
 from scenelang.cli.say import Clock, say_diagnostics, say_trouble
 from scenelang.compiler.choose import why_chosen
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.how import DEFAULT, How
-from scenelang.language.diagnostics import plural
+from scenelang.drawing.how import DEFAULT, How, threads_for
+from scenelang.language.diagnostics import Diagnostics, plural
 from scenelang.language.reports import SceneError
+from scenelang.language.words import COMBINE
 from scenelang.output.frames import is_animation
 
 if TYPE_CHECKING:
@@ -31,23 +32,23 @@ if TYPE_CHECKING:
 PROGRAM = ".safetensors"
 
 
-def compile_input(found: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
+def compile_input(job: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
     """Compile a scene, if it is one without errors that is not drawn by the reference; ``graphs`` are kept.
 
     Raises:
         OSError: a model has no weights.
     """
-    if found.scene is None or found.how.backend == "reference":
+    if job.scene is None or job.how.backend == "reference":
         return
     with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
-        found.program = compile_scene(
-            found.scene,
-            spans=found.spans,
-            diagnostics=found.diagnostics,
-            after=found.graphs.__setitem__ if graphs else None,
+        job.program = compile_scene(
+            job.scene,
+            spans=job.spans,
+            diagnostics=job.diagnostics,
+            after=job.graphs.__setitem__ if graphs else None,
         )
-        why = why_chosen(found.scene, request.source.model is not None)
-        found.notes = program_notes(found.program, why)
+        why = why_chosen(job.scene, request.source.model is not None)
+        job.notes = program_notes(job.program, why)
 
 
 def prepare_all(
@@ -78,25 +79,25 @@ def prepare_all(
     for name in files:
         try:
             if name.endswith(PROGRAM):
-                found = _stored(name, request, clock, how)
-                found.trouble = stored or found.trouble
+                result = _stored(name, request, clock, how)
+                result.trouble = stored or result.trouble
             else:
-                found = first or read_input(name, request, clock, how)
-                compile_input(found, request, clock, graphs)
+                result = first or read_input(name, request, clock, how)
+                compile_input(result, request, clock, graphs)
         except OSError as error:
             say_trouble(describe(error))
             inputs.append(None)
             code = 2
             continue
-        if found.trouble is not None:
-            say_trouble(f"{name}: {found.trouble}")
-        inputs.append(found)
-    read = [found for found in inputs if found is not None]
+        if result.trouble is not None:
+            say_trouble(f"{name}: {result.trouble}")
+        inputs.append(result)
+    read = [result for result in inputs if result is not None]
     unused = unused_defines(request) if read else []
-    say_diagnostics(merged([*(found.diagnostics.items for found in read), unused]))
+    say_diagnostics(merged([*(result.diagnostics.items for result in read), unused]))
     if unused:
         return [None] * len(inputs), max(code, 1)
-    return inputs, max(code, int(any(found.failed(strict) for found in read)))
+    return inputs, max(code, int(any(result.failed(strict) for result in read)))
 
 
 def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
@@ -109,42 +110,41 @@ def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> In
     if name.endswith(PROGRAM):
         raise click.UsageError(f"`{name}` is a compiled program already.")
     clock = clock or Clock()
-    found = read_input(name, request, clock)
-    compile_input(found, request, clock, graphs=True)
-    found.diagnostics.items.extend(unused_defines(request))
-    say_diagnostics(found.diagnostics)
-    return found
+    result = read_input(name, request, clock)
+    compile_input(result, request, clock, graphs=True)
+    result.diagnostics.items.extend(unused_defines(request))
+    say_diagnostics(result.diagnostics)
+    return result
 
 
 def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
     from scenelang.compiler.program import ProgramError, load_program
 
-    found, size, model = Input(name, how), request.source.size, request.source.model
+    result, size, model = Input(name, how), request.source.size, request.source.model
     try:
         with clock("load program"):
             program = load_program(Path(name))
     except ProgramError as error:
-        found.trouble = str(error)
-        return found
+        result.trouble = str(error)
+        return result
     if model not in (None, program.model):
-        found.trouble = f"compiled for model `{program.model}`, not `{model}`"
+        result.trouble = f"compiled for model `{program.model}`, not `{model}`"
     elif request.frame:
-        found.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
+        result.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
     elif size is not None:
         (width, height), (old_width, old_height) = size, program.canvas
         if width * old_height != height * old_width:
             old = f"the {old_width}x{old_height} it was compiled for"
             advice = "objects outside it are gone: compile the scene again"
-            found.trouble = f"{width}x{height} has another shape than {old}; {advice}"
+            result.trouble = f"{width}x{height} has another shape than {old}; {advice}"
         program = replace(program, canvas=size)
-    found.program, found.notes = program, program_notes(program, "named by the program")
-    return found
+    result.program, result.notes = program, program_notes(program, "named by the program")
+    return result
 
 
 def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
     from scenelang.compiler.groups import OPERATOR
-    from scenelang.language.words import COMBINE
 
     shapes = Counter(program.objects)
     words = Counter((program.tokens & OPERATOR).tolist())
@@ -168,14 +168,14 @@ PAGE: Final = ".html"
 def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
     """The file that each scene is written to: ``out`` itself for one scene, else one in the folder ``out``.
 
-    The folder is made if need be; for one scene it is one that is there, or ends in a slash.
+    The folder is created if need be; for one scene ``out`` is a folder that exists or ends in a slash.
 
     Args:
         suffix: of files in a folder: of a picture or of a page.
 
     Raises:
         click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
-        OSError: the folder cannot be made.
+        OSError: the folder cannot be created.
     """
     path = Path(out)
     what, fits = ("a page", page_format) if suffix == PAGE else ("a picture", _picture_format)
@@ -238,8 +238,7 @@ def composed(file: Path) -> Path:
 
 
 def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
-    """Draw a job as it says, and note what it took; ``progress`` is called with the share done, in [0, 1]."""
-    from scenelang.drawing.how import threads_for
+    """Draw a job with its options and add its notes; ``progress`` gets the share done, in [0, 1]."""
     from scenelang.drawing.render import draw, draw_exact
 
     how, program = job.how, job.program
@@ -278,7 +277,7 @@ def draw_job(job: Input, clock: Clock, progress: Callable[[float], None]) -> Ima
 
 
 def blank(job: Input, image: Image) -> str | None:
-    """The reason why a picture has nothing to see, where no warning has said so."""
+    """The reason why a picture shows nothing, unless a warning has given it."""
     if any(d.code == "W0402" for d in job.diagnostics):
         return None
     if job.program is not None and not len(job.program.tokens):
@@ -294,7 +293,7 @@ def blank(job: Input, image: Image) -> str | None:
 
 
 def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Clock) -> list[Input]:
-    """Have the frontier choose how to draw; return the jobs that it draws as asked and report the others.
+    """Choose by the frontier how to draw; return the jobs that fit the limits and report the others.
 
     Args:
         model: the only one to choose, where it is given.
@@ -321,7 +320,7 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None, clock: Cloc
 
 
 def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
-    """Choose how to draw a job, and compile it for the model that does; raises `NothingFits`."""
+    """Choose how to draw a job and compile it for the chosen model; raises `NothingFits`."""
     from scenelang.output.frontier import NothingFits, load_frontier, machine_scale
 
     assert job.program is not None
@@ -339,12 +338,12 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
     device: Device = "cpu" if job.program.stage is None and point.backend == "neural" else "auto"
     samples = point.samples if point.backend == "neural" else "adaptive"
     job.how = How(point.backend, device, job.how.threads, samples)
-    told = f"this machine takes {scale:.2f} times as long as the one that was measured"
+    speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
     like = f"errors are promised for scenes like those of the set `{frontier.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""
     refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
     notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
-    job.notes = [*choice.notes, f"times are for one thread; {told}", like, *refused, *notes]
+    job.notes = [*choice.notes, f"times are for one thread; {speed}", like, *refused, *notes]
 
 
 def _chosen(
@@ -362,30 +361,27 @@ def _chosen(
             able.append(point)
         elif point.offered:  # the others are for charts only
             refused[point.name] = why
-    found = offers(able, load_of(program), program.canvas, scale)
+    result = offers(able, load_of(program), program.canvas, scale)
     while True:
-        choice = choose(found, limits, refused)
+        choice = choose(result, limits, refused)
         point = choice.offer.point
         compiled = _compiled(job, program, point)
         if not isinstance(compiled, str):
             return choice, compiled
-        refused |= {o.point.name: compiled for o in found if o.point.model == point.model}
-        found = [offer for offer in found if offer.point.model != point.model]
+        refused |= {o.point.name: compiled for o in result if o.point.model == point.model}
+        result = [offer for offer in result if offer.point.model != point.model]
 
 
 def _compiled(job: Input, program: Program, point: Point) -> Program | str:
     """The Program for a point's model; the reason where it cannot draw the scene as promised."""
     if point.model in (None, program.model):
         return program
-    from scenelang.compiler.compile import compile_scene
-    from scenelang.language.diagnostics import Diagnostics
-
     assert job.scene is not None
-    found = Diagnostics()
+    result = Diagnostics()
     try:
-        made = compile_scene(job.scene, spans=job.spans, diagnostics=found, model=point.model)
+        compiled = compile_scene(job.scene, spans=job.spans, diagnostics=result, model=point.model)
     except SceneError:
-        return found.errors[0].message
-    told = {d.code for d in job.diagnostics}
+        return result.errors[0].message
+    known = {d.code for d in job.diagnostics}
     # a warning that the scene's own model does not give: this one is outside what it was trained on
-    return next((d.message for d in found.items if d.code not in told), made)
+    return next((d.message for d in result.items if d.code not in known), compiled)

@@ -56,7 +56,7 @@ INTERRUPTED: Final = 130  # as shells report it
 
 
 class Trouble(click.ClickException):
-    """What is neither a scene's mistake nor a bug: files that cannot be read or written, a missing device."""
+    """An error that is neither a scene's mistake nor a bug: an unreadable file, a missing device."""
 
     exit_code = 2
 
@@ -109,7 +109,7 @@ class Commands(click.Group):
 
 
 class Reporting(click.Group):
-    """Commands that report in one line what goes wrong without being a bug."""
+    """Commands that report errors in one line, unless they are bugs."""
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
@@ -124,7 +124,7 @@ class Reporting(click.Group):
 
 @contextmanager
 def _reporting() -> Iterator[None]:
-    """Report in one line what goes wrong without being a bug."""
+    """Report errors in one line, unless they are bugs."""
     try:
         yield
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""What commands print and write, and how far long work is."""
+"""Output of commands: diagnostics, files, differences, times and progress."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
 
 def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
-    """Whether to colour what goes to a stream: ``always``, ``never``, or ``auto``.
+    """True where output to a stream is coloured: ``always``, ``never``, or ``auto``.
 
-    That is on a terminal that can, whose user has not switched colours off (https://no-color.org).
+    ``auto`` colours on terminals that can, unless the user has switched colours off (https://no-color.org).
     """
     if choice != "auto":
         return choice == "always"
@@ -54,18 +54,18 @@ def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
 
 
 def say_trouble(message: str) -> None:
-    """Print one error that belongs to no place in a scene to standard error."""
+    """Print an error without a place in a scene to standard error."""
     click.echo(f"Error: {message}", err=True)
 
 
-def put_out(made: str | bytes, out: str | None) -> None:
-    """Write what a command made to a file, whole or not at all; ``-`` or none is standard output."""
+def put_out(result: str | bytes, out: str | None) -> None:
+    """Write a command's result to a file, whole or not at all; ``-`` or None is standard output."""
     if out is None or out == "-":
-        click.echo(made, nl=False)
+        click.echo(result, nl=False)
         return
     from scenelang.assets.files import write_output
 
-    write_output(out, made.encode() if isinstance(made, str) else made)
+    write_output(out, result.encode() if isinstance(result, str) else result)
 
 
 def need_metrics() -> None:
@@ -86,7 +86,7 @@ def difference(name: str, before: str, after: str) -> str:
 
 
 def _lines(text: str) -> list[str]:
-    """Lines with their ends; what follows the last line feed is a line only if it holds something."""
+    """Lines with their ends; text after the last line feed is a line unless it is empty."""
     lines = [f"{line}\n" for line in text.split("\n")]
     last = lines.pop()[:-1]
     return [*lines, last] if last else lines
@@ -127,7 +127,7 @@ class Clock:
 
 
 class Bar:
-    """How far something is and how long it will take, shown on a terminal once it took `PATIENCE_S`."""
+    """A progress bar on a terminal, shown once the work has taken `PATIENCE_S`."""
 
     def __init__(self) -> None:
         self._wanted = sys.stderr.isatty()
@@ -144,7 +144,7 @@ class Bar:
             self._shown.stop()
 
     def __call__(self, what: str, done: float, total: float) -> None:
-        """Say how much of the total is done, from any thread; less than before begins the next stage."""
+        """Report how much of the total is done, from any thread; less than before begins the next stage."""
         if not self._wanted:
             return
         with self._lock:

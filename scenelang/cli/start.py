@@ -1,4 +1,4 @@
-"""Where the process begins: an interruption is quiet from here to the end, whatever is being imported."""
+"""The start of the process: from here on an interruption is quiet, also during imports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import FrameType
 
 _INTERRUPTED = 130  # 128 and the signal's number, as shells report it
 _TERMINATED = 143
-# Objects: what is imported lives on, and looking for cycles in it costs a twentieth of a check.
+# Objects: imported ones live on, and looking for cycles in them costs a twentieth of a check.
 _COLLECTED_AFTER = 50_000
 _UNLESS_SET = {
     "OPENBLAS_NUM_THREADS": "1",  # numpy's products are too small to split, and threads are slow to start

@@ -1,4 +1,4 @@
-"""Everything that can be said of a scene before it is lifted, of some frames or all; imports no numpy.
+"""The compiler's checks of a scene or of its frames, before anything is lifted; imports no numpy.
 
 `check`, `check_text` and `fix_text` are for callers in Python.
 """
@@ -23,7 +23,7 @@ from scenelang.language.resolve import find_unused
 from scenelang.language.scene import Scene, same_nodes
 
 Frames = Literal["one", "some", "all"]
-"""Which frames of an animation are looked at: the one asked for; the first, second, middle and last; all."""
+"""Frames of an animation that are checked: the one asked for; the first, second, middle and last; all."""
 
 After = Callable[[str, Graph], None]
 
@@ -56,17 +56,19 @@ def check_frames(
     every: bool = False,
     after: After | None = None,
 ) -> tuple[int, int]:
-    """Look at further frames of an animation whose first frame has been run.
+    """Check further frames of an animation whose first frame has been run.
 
-    They share the limits of one frame: where these are met, the rest is left out. Gives how many frames have
-    been looked at, and how many were to be.
+    They share the limits of one frame: where these are met, the rest is left out.
 
     Args:
         evaluation: has run frame 0.
         diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
         first: the scene of frame 0, None if it has errors.
         after: as for `check_compiles`.
-        every: look at all frames, instead of the second, the middle and the last one.
+        every: check all frames, instead of the second, the middle and the last one.
+
+    Returns:
+        The number of frames that have been checked, and of those that were to be.
     """
     count, looked, last, memory = evaluation.frames, 1, first, Memory()
     chosen = range(1, count) if every else sorted({1, count // 2, count - 1} - {0, count})
@@ -77,11 +79,11 @@ def check_frames(
         scene, spans = evaluation.run(frame)
         if scene is None or (last is not None and same_nodes(scene, last)):
             continue
-        last, found = scene, Diagnostics()
-        check_compiles(scene, spans, found, after=after, memory=memory)
+        last, result = scene, Diagnostics()
+        check_compiles(scene, spans, result, after=after, memory=memory)
         known = {d.code for d in diagnostics}
-        name_frame(found, 0, frame)
-        for d in found:
+        name_frame(result, 0, frame)
+        for d in result:
             if d.severity == "error" or d.code not in known:
                 diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
     evaluation.warn_of_zeros()
@@ -97,16 +99,16 @@ def check_evaluated(
     *,
     frames: Frames = "some",
 ) -> int:
-    """What there is to say of a scene beyond its evaluation.
+    """Run all checks that follow evaluation.
 
     Args:
-        tree: its text's; None for JSON.
+        tree: the syntax tree of its text; None for JSON.
         evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
-        scene: what came of it, None if it has errors.
+        scene: the result of the evaluation, None if it has errors.
         diagnostics: those of the evaluation; receives the others.
 
     Returns:
-        How many frames were to be looked at and were not, as they exceed the limits of one scene.
+        The number of frames that were left out, as they exceed the limits of one scene.
     """
     left = 0
     if scene is not None:
@@ -127,14 +129,14 @@ def check(
     root: str | os.PathLike[str] | None = None,
     all_frames: bool = False,
 ) -> Diagnostics:
-    """Everything there is to say of a scene file, as ``scenelang check`` says it.
+    """All diagnostics of a scene file, as ``scenelang check`` reports them.
 
     Args:
         path: the file.
         params: values for params, as for `scenelang.load`.
         model: check for this model instead of the one that the file names.
         root: folder that imports cannot leave; by default the file's.
-        all_frames: look at all frames of an animation, not only at the first, second, middle and last one.
+        all_frames: check all frames of an animation, not only the first, second, middle and last one.
 
     Returns:
         Errors and warnings by their place; empty where there are none.
@@ -154,11 +156,11 @@ def check_text(
     all_frames: bool = False,
     name: str = "<text>",
 ) -> Diagnostics:
-    """Everything there is to say of scene text; as `check`. Imports are found only in ``root``.
+    """All diagnostics of scene text, as `check`. Imports are looked for in ``root`` alone.
 
     Args:
         text: the scene.
-        name: what diagnostics call it.
+        name: its name in diagnostics.
     """
     source = Source(text=SourceFile(name, text), params=params, model=model, root=root)
     return _look(source, all_frames)
@@ -180,8 +182,8 @@ def fix_text(
 
     def look(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
         text = SourceFile(name, texts[name])
-        found = _look(Source(text=text, params=params, model=model, root=root), False)
-        return [(name if d.span is not None and d.span.source.name == name else None, d) for d in found]
+        result = _look(Source(text=text, params=params, model=model, root=root), False)
+        return [(name if d.span is not None and d.span.source.name == name else None, d) for d in result]
 
     settled = settle({name: text}, look)
     left = Diagnostics()
@@ -190,13 +192,13 @@ def fix_text(
 
 
 def _look(source: Source, all_frames: bool) -> Diagnostics:
-    found = Diagnostics()
+    result = Diagnostics()
     with suppress(SceneError):  # it is not text
-        source = source.parsed(found)
-        evaluation = source.evaluation(found, replays=True)
+        source = source.parsed(result)
+        evaluation = source.evaluation(result, replays=True)
         scene, spans = evaluation.run(0)
         frames: Frames = "all" if all_frames else "some"
-        scene = None if found.errors else scene
-        check_evaluated(source.tree, evaluation, scene, spans, found, frames=frames)
-    found.items[:] = in_file_order(found.items)
-    return found
+        scene = None if result.errors else scene
+        check_evaluated(source.tree, evaluation, scene, spans, result, frames=frames)
+    result.items[:] = in_file_order(result.items)
+    return result

@@ -41,8 +41,8 @@ def compile_scene(
         codes: lift with these instead of the model's shipped ones, for weights under trial.
         after: called with ``"lower"`` and the name of each pass and the graph it left.
         without: names of passes to leave out, of those that only save work (`passes.OPTIONAL`).
-        memory: what the frame before left, of an animation whose frames share nodes; the same Program comes
-            out with or without it.
+        memory: of the previous frame of an animation whose frames share nodes; the Program is the same
+            with or without it.
 
     Returns:
         The Program; the same scene always gives the same one, byte for byte.
@@ -53,16 +53,16 @@ def compile_scene(
         OSError: the file cannot be opened.
         TypeError: neither a Scene nor a path.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    result = diagnostics if diagnostics is not None else Diagnostics()
     if not isinstance(scene, Scene):
         from scenelang.language.evaluation import opened
 
-        scene, spans = opened(scene, found)
-    manifest = find_model(scene, found, model=model, spans=spans)
+        scene, spans = opened(scene, result)
+    manifest = find_model(scene, result, model=model, spans=spans)
     if manifest is not None:
-        graph = check_scene(scene, spans, found, manifest, after, without, memory)
-    if manifest is None or found.errors:
-        raise SceneError(found)
+        graph = check_scene(scene, spans, result, manifest, after, without, memory)
+    if manifest is None or result.errors:
+        raise SceneError(result)
     # Lifting is what needs numpy; scenes that are only checked or have errors never come this far.
     from scenelang.compiler.emit import emit
     from scenelang.compiler.weights import load_codes
@@ -73,9 +73,9 @@ def compile_scene(
 def find_model(
     scene: Scene, diagnostics: Diagnostics, *, model: str | None = None, spans: Spans | None = None
 ) -> Manifest | None:
-    """The manifest a scene is compiled for: the one asked for, that it names, or its dimension's usual one.
+    """The manifest of the model asked for, else of the one the scene names, else of the usual one.
 
-    Where there is none of that name, ``diagnostics`` receives E0514.
+    Where no model has that name, ``diagnostics`` receives E0514.
     """
     name = model or scene.model or USUAL[scene_dimension(scene)]
     try:

@@ -60,15 +60,15 @@ def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
 
 
 def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int32]]:
-    """The paints that rows wear, each once in the order of its first row, and which of them each wears."""
-    found: dict[Paint, int] = {}
+    """The paints of rows, in the order of first rows, and the index of each row's paint, -1 for none."""
+    result: dict[Paint, int] = {}
     known: dict[int, int] = {}
     for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
         known[id(look)] = -1
         if look.element is not None:
             steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
-            known[id(look)] = found.setdefault(Paint(look.element, tuple(steps)), len(found))
-    return tuple(found), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
+            known[id(look)] = result.setdefault(Paint(look.element, tuple(steps)), len(result))
+    return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
 
 
 def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
@@ -76,20 +76,20 @@ def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArra
     note = "vector", codes.digest
     known = {id(leaf): leaf.notes[note] for leaf in leaves if leaf.notes and note in leaf.notes}
     fresh = [leaf for leaf in leaves if id(leaf) not in known]
-    made = _lifted(fresh, manifest, codes)
-    for leaf, vector in zip(fresh, made, strict=True):
+    lifted = _lifted(fresh, manifest, codes)
+    for leaf, vector in zip(fresh, lifted, strict=True):
         if leaf.notes is not None:
             leaf.notes[note] = vector.copy()
     if not known:
-        return made
-    known |= {id(leaf): vector for leaf, vector in zip(fresh, made, strict=True)}
+        return lifted
+    known |= {id(leaf): vector for leaf, vector in zip(fresh, lifted, strict=True)}
     return np.stack([known[id(leaf)] for leaf in leaves])
 
 
 def _blended(
     vectors: npt.NDArray[np.float32], rows: list[Row], manifest: Manifest
 ) -> npt.NDArray[np.float32]:
-    """The same with the widths of blends that are not the usual one; these are of rows, not of leaves."""
+    """The vectors with widths of blends that are not the usual one, which belong to rows, not to leaves."""
     for at, row in enumerate(rows):
         if row.k and row.op != "union":
             vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
@@ -109,11 +109,11 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
     else:
         layout, space = LAYOUTS[manifest.dimension], SPACES[manifest.dimension]
         levels = [split_levels(chain, manifest.limits, space) for chain in chains]
-        nothing = (0.0,) * 4  # an element is told by its row
+        nothing = (0.0,) * 4  # a row of an element names it by `forms`
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
         painted = [codes.material[leaf.look.material] for leaf in leaves]
         vectors = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
-        vectors += lift_many(levels, shapes, layout)  # other places
+        vectors += lift_many(levels, shapes, layout)  # these fill other places of the vectors
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")
     # one zero only, so that equal scenes give equal bytes
@@ -121,8 +121,8 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
 
 
 def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
-    """Boxes (N, 4) of the plane, or balls of space; outside a row makes no difference."""
-    found: list[Bound | None] = []
+    """Boxes (N, 4) of the plane, or balls of space, outside which a row makes no difference."""
+    result: list[Bound | None] = []
 
     def bound(fold: Fold, later: Later, joins: bool) -> None:
         for index in range(len(fold.links) - 1, -1, -1):
@@ -132,15 +132,15 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
                 bound(link.node, own, link.op == "intersect")
             else:
                 everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
-                found.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+                result.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
             later = later.before(link.op, link.width)
 
     bound(graph.root, Later(), False)
     whole = graph.window()[:4]
     if graph.stage is not None:
-        reach = max((hypot(*b[:3]) + b[3] for b in found if b is not None), default=0.0)
-        whole = 0.0, 0.0, 0.0, reach * (1.0 + 2.0**-20)
-    exact = np.array([b or whole for b in found[::-1]], dtype=np.float64).reshape(len(found), 4)
+        reach = max((hypot(*b[:3]) + b[3] for b in result if b is not None), default=0.0)
+        whole = 0.0, 0.0, 0.0, reach * (1.0 + 2.0**-20)  # around all others, with room for rounding
+    exact = np.array([b or whole for b in result[::-1]], dtype=np.float64).reshape(len(result), 4)
     most = np.finfo(np.float32).max
     rounded = np.clip(exact, -most, most).astype(np.float32)
     if graph.stage is not None:
@@ -160,7 +160,7 @@ def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
 
 
 def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:
-    """Where spans lie in their files."""
+    """The places of spans in their files."""
     known: dict[tuple[str, int, int] | None, Place | None] = {None: None}
     keys = [None if span is None else (span.source.name, span.start, span.end) for span in spans]
     for key, span in zip(keys, spans, strict=True):

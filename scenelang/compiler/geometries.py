@@ -1,4 +1,4 @@
-"""The geometries of the language, a row each: all that is known of a leaf apart from its name and weights.
+"""The table of geometries: a row for each leaf, with all but its name and weights.
 
 Formulas work on numpy arrays, torch tensors and floats alike, and import neither: points are one array
 (d, …), or a sequence of its d coordinates.
@@ -23,11 +23,11 @@ class Geometry(Record):
 
     Args:
         distance: exact signed distance, negative inside, of points (d, …).
-        inner: radius of a disc or ball about the origin that it fills; 0 where there is none.
+        inner: radius of a disc or ball about the origin that lies within it; 0 where there is none.
         slopes: in space: the distance and its gradient (4, …) at points (3, …).
         surface: in space: points (3, …) of its surface from two coordinates (2, …) in [0, 1).
-        half: in space: half the sides of a box about the origin that it lies in.
-        thickness: in space: how thick it is where it is thinnest.
+        half: in space: half the sides of a box about the origin that contains it.
+        thickness: in space: its least thickness.
         sectors: in the plane, of a shape of dihedral symmetry: order n, direction of a vertex, outer radius,
             and the radius at half a sector, where the edge from the vertex ends (an edge midpoint, for the
             star an inner vertex).
@@ -45,13 +45,13 @@ class Geometry(Record):
 
 
 class _Floats:
-    """The names that formulas take from numpy or torch, for floats."""
+    """Functions for floats, under the names that numpy and torch have for them."""
 
     sqrt, cos, sin, maximum, minimum = math.sqrt, math.cos, math.sin, max, min
 
 
 def namespace(x: Array) -> Any:
-    """numpy, torch where ``x`` is a tensor, or the like for a float; imports neither."""
+    """The module with functions for ``x``: torch for a tensor, `_Floats` for a float, else numpy."""
     if isinstance(x, float):
         return _Floats
     torch = sys.modules.get("torch")
@@ -90,7 +90,7 @@ def _sectored(
 
     Args:
         n, phase, edge: `Geometry.sectors` without the outer radius.
-        inner, corners: where they are not, to the last digit, ``edge`` and those of a vertex at +y.
+        inner, corners: instead of ``edge`` and the corners of a vertex at +y, where these round otherwise.
     """
     turns = [math.tau * k / n for k in range(n)]
     return Geometry(
@@ -118,7 +118,7 @@ def _sphere_slopes(p: Points) -> tuple[Array, ...]:
 
 
 def _sphere_surface(at: Points) -> tuple[Array, ...]:
-    """Evenly spread."""
+    """Points that are evenly spread, as equal bands of a sphere along y have equal areas."""
     u, v = at
     xp, y = namespace(u), 2.0 * v - 1.0
     around = xp.sqrt(1.0 - y * y)

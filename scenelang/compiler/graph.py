@@ -42,14 +42,14 @@ ColourStep = tuple[str, *tuple[float, ...]]
 
 
 class Look(Record):
-    """A material as an object wears it.
+    """The material of an object.
 
     Args:
-        material: how it is lit: flat, diffuse or volumetric.
+        material: the way it is lit: flat, diffuse or volumetric.
         colours: operations on its colour, the first written first.
-        rgb: what the operations start from, in [0, 1], as written (sRGB in 2D): white, or what they came to
-            where the look has been folded.
-        element: of a texture, whose colours the operations start from instead.
+        rgb: the colour that the operations start from, in [0, 1], as written (sRGB in 2D): white, or their
+            result where the look has been folded.
+        element: the texture whose colours the operations start from instead.
         texture: moves of the texture over the leaf's x and y, the first written first.
     """
 
@@ -75,38 +75,38 @@ class Look(Record):
 
     @property
     def moved(self) -> Rows:
-        """The map that its texture is moved by."""
+        """The map that moves its texture."""
         return composed(self.texture)
 
 
 def colour_steps(ops: Iterable[MaterialOp]) -> tuple[ColourStep, ...]:
     """The operations on a colour among those of a material."""
-    found: list[ColourStep] = []
+    result: list[ColourStep] = []
     for op in ops:
         if isinstance(op, Color):
-            found.append(("color", *op.rgb))
+            result.append(("color", *op.rgb))
         elif isinstance(op, Grayscale):
-            found.append(("grayscale", op.amount))
+            result.append(("grayscale", op.amount))
         elif isinstance(op, Hue):
-            found.append(("hue", op.angle / tau))
-    return tuple(found)
+            result.append(("hue", op.angle / tau))
+    return tuple(result)
 
 
 def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
-    """The same operations, fewer: neighbours of a kind join where nothing is clamped between them.
+    """Join neighbouring operations of a kind where nothing is clamped between them.
 
-    What multiplies by shares, or mixes with the luma by a share, stays in [0, 1]; a hue has a period of 1.
+    A product with shares, or a mix with the luma by a share, stays in [0, 1]; a hue has a period of 1.
     """
-    found: list[ColourStep] = []
+    result: list[ColourStep] = []
     for step in steps:
         joined: ColourStep | None = step
-        if found and found[-1][0] == step[0] and (step[0] == "hue" or _shares(found[-1])):
-            joined = _joined(found.pop(), step)
+        if result and result[-1][0] == step[0] and (step[0] == "hue" or _shares(result[-1])):
+            joined = _joined(result.pop(), step)
         elif step[0] == "hue":
             joined = _joined(("hue", 0.0), step)
         if joined is not None and joined not in _IDLE:
-            found.append(joined)
-    return tuple(found)
+            result.append(joined)
+    return tuple(result)
 
 
 _IDLE: frozenset[ColourStep] = frozenset((("color", 1.0, 1.0, 1.0), ("grayscale", 0.0), ("hue", 0.0)))
@@ -127,7 +127,7 @@ def _joined(one: ColourStep, other: ColourStep) -> ColourStep:
 
 
 def coloured(steps: Iterable[ColourStep], rgb: Triple = WHITE) -> Triple:
-    """What a colour (r, g, b) in [0, 1] becomes, each operation clamped."""
+    """The colour (r, g, b) in [0, 1] after all operations, clamped after each."""
     for kind, *numbers in steps:
         r, g, b = rgb
         if kind == "color":
@@ -163,8 +163,8 @@ class Leaf(Record):
     Args:
         moves: steps into the parent's space, nearest the leaf first.
         number: of the object in the scene as written, from 1; not part of the value.
-        notes: what was worked out about a leaf that stays from frame to frame of an animation, by what it
-            is; None for a leaf that is used once. It is not part of the value.
+        notes: a cache for a leaf that stays from frame to frame of an animation; None for a leaf that is
+            used once. It is not part of the value.
     """
 
     geometry: str
@@ -181,7 +181,7 @@ class Leaf(Record):
         return Leaf(self.geometry, look, moves, self.span, self.number, None if self.notes is None else {})
 
     def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
-        """What ``make`` gives for this leaf, noted under ``key`` where the leaf takes notes."""
+        """The result of ``make`` for this leaf, cached under ``key`` where the leaf takes notes."""
         if self.notes is None:
             return make(self)
         if key not in self.notes:
@@ -234,8 +234,8 @@ class Row(NamedTuple):
         op: joins it to what stands before it in its group; of the first leaf of a group it joins that.
         k: the width of that as written, 0 where none was.
         begins: whether it is the first leaf of a group.
-        ends: how many groups end behind it.
-        cuts: whether something takes it away, or a group around it.
+        ends: number of groups that end behind it.
+        cuts: whether it, or a group around it, is cut out of something.
     """
 
     op: Combine
@@ -269,7 +269,7 @@ class Graph(Record):
 
     def rows(self) -> list[Row]:
         """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""
-        found: list[Row] = []
+        result: list[Row] = []
         open_folds = [(iter(self.root.links), False)]
         first: Link | None = None  # of a group, before its first leaf
         while open_folds:
@@ -278,7 +278,7 @@ class Graph(Record):
             if link is None:
                 open_folds.pop()
                 if open_folds:
-                    found[-1] = found[-1]._replace(ends=found[-1].ends + 1)
+                    result[-1] = result[-1]._replace(ends=result[-1].ends + 1)
                 continue
             cuts = cut or link.op == "subtract"
             if isinstance(link.node, Fold):
@@ -286,9 +286,9 @@ class Graph(Record):
                 open_folds.append((iter(link.node.links), cuts))
                 continue
             op, k = (link.op, link.k) if first is None else (first.op, first.k)
-            found.append(Row(op, link.node, k, first is not None, 0, cuts))
+            result.append(Row(op, link.node, k, first is not None, 0, cuts))
             first = None
-        return found
+        return result
 
     def window(self) -> Box:
         """The part of the world that decides the picture.
@@ -351,7 +351,7 @@ def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph
 
     Args:
         change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
-        name: of the change, under which leaves that stay from frame to frame note what became of them.
+        name: of the change, under which leaves that stay from frame to frame cache its result.
     """
 
     def leaf(node: Leaf) -> Node:
@@ -375,7 +375,7 @@ def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:
 
 
 class Later(Record):
-    """The blends that see a row from behind it, and so how near its leaf has to come for the row to matter.
+    """The blends behind a row that use its distance; they decide how far from its leaf the row matters.
 
     Two folds whose distances at a point are equal, or both at a level or above, are after a `smooth` equal,
     or both at that level less its width or above; a union, a cut and an intersection keep the level. What is
@@ -384,7 +384,7 @@ class Later(Record):
     Args:
         total: the sum of their widths, as a multiple of `BLEND`.
         widest: the widest of them, world units; 0 for none.
-        count: how many they are.
+        count: the number of them.
         inside: whether one of them sees distances inside what it blends.
         everywhere: whether a row matters wherever its leaf is.
     """
@@ -398,8 +398,8 @@ class Later(Record):
     def of(self, op: Combine, width: float) -> Later:
         """Blends that see the operand of an operator, itself included.
 
-        Of an intersection that is what sees all that stands before it, and with a width how deep inside its
-        operand points are. A subtraction with a width changes what lies within that of its operand.
+        The operand of an intersection is seen by all that see what stands before it; one with a width sees
+        how deep inside points are. A subtraction with a width also changes points that near to its operand.
         """
         everywhere = self.everywhere or (op == "subtract" and self.inside)
         if not width or op == "intersect":
@@ -425,7 +425,7 @@ class Later(Record):
 
 
 def overlap(a: Box, b: Box) -> bool:
-    """Whether two boxes share a point."""
+    """True where two boxes share a point."""
     flat = a[0] <= b[2] and b[0] <= a[2] and a[1] <= b[3] and b[1] <= a[3]
     return flat and a[4] <= b[5] and b[4] <= a[5]
 
@@ -450,7 +450,7 @@ class Invariant(Enum):
 
 
 Checked = tuple[Space, bool, bool, bool]
-"""What must hold of each leaf: its maps are the space's; NO_IDENTITIES, MERGED and LOOKS or not."""
+"""The checks of a leaf: its space, and whether NO_IDENTITIES, MERGED and LOOKS must hold."""
 
 Sound = dict[Checked, dict[int, Leaf]]  # leaves by identity, by what was checked of them
 
@@ -464,7 +464,7 @@ def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: S
 
     Args:
         holds: what this stage and those before it established.
-        sound: leaves that an earlier stage left sound and this one may have kept; takes those of this graph.
+        sound: leaves that were checked after an earlier stage; receives those of this graph.
 
     Raises:
         InternalError: an invariant is broken.

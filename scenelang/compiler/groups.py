@@ -31,7 +31,7 @@ class Groups(NamedTuple):
         tokens: (N,) operators by which rows join the state of their own group; UNION for the first of one.
         first: (N,) whether the row begins a group.
         path: (N, D) groups that are open at each row, outermost first, -1 behind the last; D is the depth.
-        ends: (N,) how many groups end behind each row.
+        ends: (N,) number of groups that end behind each row.
         joins: (G,) operators by which groups join the state they stand in.
         rows: (G,) their first rows.
     """
@@ -116,7 +116,7 @@ class Felt(NamedTuple):
     Args:
         total: (N,) world units: widths of the blends that see the row, its own and those of its groups too.
         widest: (N,) the widest of these, 0 for none.
-        blends: (N,) how many these are.
+        blends: (N,) the number of these.
         everywhere: (N,) whether it matters wherever its leaf is: what it intersects ends outside of it, or
             it is cut out of what a later blend sees.
         inside: (N,) whether a later blend sees how deep inside what it cuts points are.
@@ -138,7 +138,7 @@ def anchored(groups: Groups) -> Mask:
 def felt(groups: Groups, widths: Floats) -> Felt:
     """Find how far rows matter; `widths` are those of their blends (N,), as `widths_of` their operators.
 
-    Of a row that begins a group its width is the group's.
+    The width of a row that begins a group is the group's.
     """
     if not groups.deepest:
         return _felt_flat(groups.tokens, widths)

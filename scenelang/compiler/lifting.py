@@ -1,6 +1,6 @@
 """Lifting: the vector of an object and its parts, and transformations that act on it, exact or learned.
 
-The parts of the way from the world back to the leaf are first:
+A vector of the exact lifting begins with the way from the world back to the leaf:
 
     code | the constant 1 | frame of the last affine map | outer warps | middle frame | inner warps
 
@@ -11,13 +11,11 @@ and frequency of a displacement (in space), the width of a blend (0 where it is 
 frame of the texture, the colour and the code of the material. The colour is the diagonal of a 3 x 4 matrix,
 row by row, whose other nine places, `OTHERS`, are free.
 
-Every part is a function of the scene alone, and each transformation acts on the vector linearly
-(`scenelang.compiler.lifting`). A vector of a learned lifting has none of these parts.
+Every part is a function of the scene alone, and each transformation acts on the vector linearly: an affine
+map multiplies its frame by its inverse; a warp shifts the warps of its group by one place and writes itself
+in front, times the constant. A product of such matrices is exact for chains of any length.
 
-A vector holds the way from the world back to the leaf (`scenelang.compiler.lifting`), and each
-transformation acts on it linearly: an affine map multiplies its frame by its inverse; a warp shifts the warps
-of its group by one place and writes itself in front, times the constant. A product of such matrices is exact
-for chains of any length.
+A vector of a learned lifting has none of these parts: a network gives each transformation's matrix.
 
 Source: the paper's supplement lifts every transformation by a learned MLP; here the part that is known is
 not learned (docs/architecture.md says why).
@@ -65,12 +63,12 @@ class Layout:
 
     Args:
         dimension: d.
-        sizes: of all parts, in their order; those of ``colour`` are of its matrix, ``free`` is none.
+        sizes: of all parts, in their order; ``colour`` counts its whole matrix, ``free`` is no part.
 
     Attributes:
         places: of each part, a slice or an index.
-        geometry: how many numbers, from the first, say the way to the leaf and the displacement.
-        outer, inner: how many warps the two groups have room for.
+        geometry: count of the numbers, from the first, of the way to the leaf and the displacement.
+        outer, inner: the most warps of the two groups.
         identity: the frame of no map.
     """
 
@@ -81,7 +79,7 @@ class Layout:
         colour = at.pop("colour").start
         at.pop("free", None)
         one, width = at.pop("one").start, at.pop("width").start
-        self.places = Parts(**at, one=one, width=width, rgb=slice(colour, colour + 12, 5))
+        self.places = Parts(**at, one=one, width=width, rgb=slice(colour, colour + 12, 5))  # the diagonal
         self.dimension, self.geometry = dimension, int(self.places.bulge.stop)
         self.outer, self.inner = sizes["outer"] // STRENGTHS, sizes["inner"] // STRENGTHS
         rows = range(dimension)
@@ -149,7 +147,7 @@ def affine_matrix(rows: Rows, slot: slice | None = None, layout: Layout = PLANE_
 
 
 def warp_matrix(turn: Turn, group: slice, layout: Layout = PLANE_LAYOUT) -> np.ndarray:
-    """The matrix (64, 64) of a turn that enters a slot of its own in a group from outside."""
+    """The matrix (64, 64) of a turn that is written to the first slot of a group, before the others."""
     matrix = np.eye(WIDTH)
     matrix[group, group] = np.eye(group.stop - group.start, k=-STRENGTHS)
     matrix[group.start : group.start + STRENGTHS, layout.places.one] = slots([turn], layout.dimension)[0]
@@ -190,8 +188,8 @@ def lift_colours(
     """Vectors (N, 64) in float64 of materials.
 
     Args:
-        colours: what multiplies the albedo, (r, g, b) in [0, 1].
-        moved: what each one's texture is moved by, as maps of the plane; by default nothing.
+        colours: factors of the albedo, (r, g, b) in [0, 1].
+        moved: maps of the plane that move their textures; by default none.
     """
     count = len(colours)
     texture = [PLANE_LAYOUT.identity] * count  # textures lie in a plane
@@ -203,9 +201,9 @@ def lift_colours(
 
 
 Doubles = npt.NDArray[np.float64]
-MOST = 1e4  # of an entry: far outside all that was trained, and what float32 networks still take in
+MOST = 1e4  # largest entry: far outside all that was trained, and within the range of float32 networks
 
-# Numbers that a transformation hands to its encoder.
+# Numbers of a transformation that its encoder takes.
 GEOMETRY_INPUTS = {"affine": 16, "twirl": 1, "bend": 1}
 MATERIAL_INPUTS = {"color": 3}
 
@@ -273,7 +271,7 @@ def _check(kind: str, layers: tuple[tuple[Doubles, Doubles], ...], width: int, s
 
 
 def step_numbers(step: Step) -> tuple[str, list[float]]:
-    """Which encoder a step goes through, and with what numbers."""
+    """The encoder of a step and its input."""
     if isinstance(step, Affine):
         a, b, c, d, e, f, g, h, i, j, k, l = step.rows  # noqa: E741
         return "affine", [a, b, c, d, e, f, g, h, i, j, k, l, 0.0, 0.0, 0.0, 1.0]
@@ -296,8 +294,8 @@ def lift_geometry(lifting: Lifting, chains: Sequence[Sequence[Step]], leaves: Se
         for kind, members in groups.items():
             rows = [row for row, _ in members]
             given = np.clip([numbers for _, numbers in members], -MOST, MOST)
-            made = lifting.matrices(kind, given)
-            out[rows] = np.clip(np.einsum("mij,mj->mi", made, out[rows]), -MOST, MOST)
+            matrices = lifting.matrices(kind, given)
+            out[rows] = np.clip(np.einsum("mij,mj->mi", matrices, out[rows]), -MOST, MOST)
     return out
 
 

@@ -31,7 +31,7 @@ from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, di
 
 
 def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
-    """The step that a transform stands for, or why there is none.
+    """The step of a transform, or the reason why there is none.
 
     In the plane nothing may leave it, and scales along z drop out.
     """
@@ -80,14 +80,14 @@ MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene 
 
 
 class Spans(Protocol):
-    """What knows where a Scene's nodes were written; the evaluator's SpanMap does."""
+    """Places of a Scene's nodes in text, such as the evaluator's SpanMap."""
 
     def span(self, node: object) -> Span | None:
         """The place of ``node``, None where it is unknown."""
 
 
 Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
-"""Objects, by identity, with the material around them and what they were lowered to."""
+"""Objects, by identity, with the material around them and their leaves."""
 
 
 class Memory:
@@ -113,7 +113,7 @@ def lower(
     Args:
         spans: where nodes were written; None for a scene that did not come from text.
         diagnostics: receives E03xx and E05xx.
-        memory: of the frame before; holds this one afterwards.
+        memory: of the previous frame; holds this one afterwards.
     """
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
     for word in STAGE if manifest.dimension == 2 else ():
@@ -126,8 +126,8 @@ def lower(
     brought = Brought.of(scene.elements)
     lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
     root = lowering.run(scene)
-    if memory is not None and lowering.kept is not None:
-        memory.leaves, memory.model = lowering.kept, manifest.name
+    if memory is not None and lowering.created is not None:
+        memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = WHITE if scene.background == "default" else scene.background
     return Graph(root, scene.canvas, background, space, stage, brought.geometries)
@@ -187,11 +187,11 @@ class _Lowering:
     space: Space
     spans: Spans | None
     diagnostics: Diagnostics
-    old: Leaves
-    kept: Leaves | None
+    old: Leaves  # of the previous frame
+    created: Leaves | None  # leaves of this frame; None without a memory
     brought: Brought
     objects: int = 0
-    origin: object = None  # what says that the scene is flat or solid: its model, else its first object
+    origin: object = None  # decides between flat and solid: a scene with a model, else the first object
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
@@ -245,14 +245,14 @@ class _Lowering:
                 if dimension_of(node.geometry) not in (None, self.space.dimension):
                     material = None  # which is of the other kind of scene, too
             look = Look(self.manifest.materials[0]) if material is None else self.look(material)
-            notes: dict[Any, Any] | None = None if self.kept is None else {}
+            notes: dict[Any, Any] | None = None if self.created is None else {}
             leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)
-        if self.kept is not None:
-            self.kept[id(node)] = node, material, leaf
+        if self.created is not None:
+            self.created[id(node)] = node, material, leaf
         return leaf
 
     def element(self, name: str, known: Mapping[str, Element], node: object, code: str) -> Element | None:
-        """What a file of elements has; says where the model does not draw it, or nothing is known of it."""
+        """The element of a name in a file; reports one that the model does not draw, or that is not there."""
         element, model = known.get(name), f"model `{self.manifest.name}`"
         if element is not None and element.kind not in self.manifest.elements:
             kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
@@ -266,7 +266,7 @@ class _Lowering:
         return element
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
-        found = []
+        result = []
         for at, transform in enumerate(node.transforms):
             if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
                 fact = "`displace` does not stand first in the block of an object"
@@ -281,8 +281,8 @@ class _Lowering:
             if isinstance(step, Refusal):
                 self.say(step.code, step.message, transform, step.help)
             else:
-                found.append(Move(step, self.place(transform)))
-        return tuple(found)
+                result.append(Move(step, self.place(transform)))
+        return tuple(result)
 
     def look(self, material: schema.Material) -> Look:
         known = self.looks.get(id(material))
@@ -309,7 +309,7 @@ class _Lowering:
         return look
 
     def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
-        """The moves of a texture, which a constant material has as well and colours of space have not."""
+        """The moves of a texture; a constant material's are checked too, colours of space have none."""
         rows = IDENTITY
         for op in material.ops:
             if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
@@ -328,7 +328,7 @@ class _Lowering:
             self.say("E0406", fact, material, "scale less along one direction, or less often")
 
     def refuse(self, code: str, what: str, name: str, known: Sequence[str], node: object) -> None:
-        """Say that the model has no geometry or material of a name, or that this is of other scenes."""
+        """Report a geometry or material that the model does not have, or that is of the other dimension."""
         from difflib import get_close_matches
 
         here, other = self.space.dimension, dimension_of(name)

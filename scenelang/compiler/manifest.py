@@ -1,4 +1,4 @@
-"""What a model states about itself: what it can draw, what it was trained on, what it measured."""
+"""Manifests of models: their vocabulary and limits, the ranges of their training, their measurements."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _DRAWN: Final = {
     "framed": ("element of the plane", "texture"),
     "solid": ("element of space", "texture", "colouring of space"),
 }
-"""What renderers draw of what users bring, of an exact lifting."""
+"""Kinds of users' elements that renderers draw, for models of the exact lifting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class Manifest:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """What it draws of what users bring."""
+        """Kinds of users' elements that it draws."""
         return _DRAWN.get(self.renderer, ()) if self.lifting == "exact" else ()
 
     def flip(self) -> float:
@@ -148,12 +148,12 @@ def _is_size(value: Any) -> bool:
 
 
 def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
-    """Whether a value is an object of whose entries all are as they should be."""
+    """A check that a value is an object and that each entry passes ``holds``."""
     return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
 def _is_figure(key: str, value: Any) -> bool:
-    """Sets are objects of figures; the stability suite says a line of text of each quantity."""
+    """Check a measurement: sets are objects of figures, the stability suite has a line for each quantity."""
     if key == "sets":
         return _are(lambda _, v: isinstance(v, dict) and _is_range([0, v.get("flip", 1)]))(value)
     return key != "stability" or _are(lambda _, v: _is_text(v))(value)
@@ -175,16 +175,16 @@ _KINDS: Final[dict[str, Callable[[Any], bool]]] = {
     "white": lambda value: type(value) is bool,
     "any_blend": lambda value: type(value) is bool,
 }
-"""What each field may hold."""
+"""The check of each field."""
 
 
 _FILE: Final = "manifest.json"
 _READ: Final[dict[Path, tuple[tuple[int, int, int], Manifest]]] = {}
-"""Manifests that were read, and their files' times, sizes and identities then."""
+"""A cache: manifests with their files' times, sizes and identities when they were read."""
 
 
 def model_folder(name: str) -> Path:
-    """The folder of a shipped model's files, also by an earlier name of its."""
+    """The folder of a shipped model's files; earlier names of models work too."""
     return ROOT / ALIASES.get(name, name)
 
 
@@ -195,7 +195,7 @@ def available() -> list[str]:
 
 
 def load_manifest(name: str) -> Manifest:
-    """The manifest of a shipped model, also by an earlier name of its.
+    """The manifest of a shipped model; earlier names of models work too.
 
     Raises:
         KeyError: there is no such model.
@@ -209,9 +209,9 @@ def load_manifest(name: str) -> Manifest:
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
     known = _READ.get(path)
     if known is None or known[0] != stamp:
-        found = Manifest.from_json(read_regular(path, _MOST_BYTES))
-        if found.name != name:
-            raise ValueError(f"the manifest of `{name}` calls itself `{found.name[:40]}`")
-        known = _READ[path] = stamp, found
+        result = Manifest.from_json(read_regular(path, _MOST_BYTES))
+        if result.name != name:
+            raise ValueError(f"the manifest of `{name}` calls itself `{result.name[:40]}`")
+        known = _READ[path] = stamp, result
     note_input(os.fspath(path))
     return known[1]

@@ -1,4 +1,4 @@
-"""Graph to Graph: `PASSES` is the order, and the passes that only report.
+"""The order of the passes, `PASSES`, and those that report mistakes and leave the graph unchanged.
 
 Sharing equal subgraphs is left out on purpose: every row of a stream is lifted in one vectorised call,
 which costs less than finding the equal ones would.
@@ -102,14 +102,14 @@ def _mild(step: Step) -> bool:
 
 
 def _places(leaf: Leaf) -> list[Label]:
-    found: list[Label] = []
+    result: list[Label] = []
     seen: set[Span] = {leaf.span} if leaf.span else set()
     for move in leaf.moves:
         if move.span is not None and move.span not in seen:
             seen.add(move.span)
             what = "affine from here on" if isinstance(move.step, Affine) else "deforms here"
-            found.append(Label(move.span, what))
-    return found[:8]
+            result.append(Label(move.span, what))
+    return result[:8]
 
 
 Measures = list[tuple[str, float]]
@@ -140,7 +140,7 @@ _SUBJECTS = {
     "thickness": "{name}, {value} thick,",
     "texels": "a texture of {value} texels to a pixel on {name}",
 }
-"""What is said of an object, in the order of the warnings."""
+"""Subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
 _TOLERANCE = 1e-9
@@ -168,9 +168,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
     for quantity, subject in _SUBJECTS.items():
-        if found := outside.get(quantity):
-            _, value, leaf = max(found, key=itemgetter(0))
-            more = len({id(leaf) for *_, leaf in found}) - 1
+        if result := outside.get(quantity):
+            _, value, leaf = max(result, key=itemgetter(0))
+            more = len({id(leaf) for *_, leaf in result}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
@@ -193,8 +193,8 @@ def check_trained(graph: Graph, context: Context) -> Graph:
 def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
     """Warn at the `smooth` whose colours lie furthest apart for its size.
 
-    Where a blend's distances are off, by a share of the objects' scale, its colour is off by that share of
-    what the colours differ by: the product of both tells the error.
+    An error of a blend's distances, as a share of the objects' scale, is an error of its colour by that share
+    of the difference of the colours: the product of both estimates it.
     """
     low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
     worst: tuple[float, float, float, Leaf] | None = None
@@ -217,27 +217,27 @@ def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context
 
 def _measures(leaf: Leaf, space: Space) -> Measures:
     smallest, largest = space.stretches(steps.composed(leaf.steps))
-    found = [("scale", smallest), ("scale", largest)]
+    result = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
-        found.append(("thin", largest / smallest))
+        result.append(("thin", largest / smallest))
     if leaf.look.material == "diffuse":
         row = GEOMETRIES.get(leaf.geometry)
-        found.append(("thickness", smallest * (row.thickness if row else inf)))
+        result.append(("thickness", smallest * (row.thickness if row else inf)))
     for step in leaf.steps:
         if isinstance(step, Warp):
             if step.twirl:
-                found.append(("twirl", step.twirl))
+                result.append(("twirl", step.twirl))
             if step.bend != (0.0, 0.0):
-                found.append(("bend", hypot(*step.bend)))
+                result.append(("bend", hypot(*step.bend)))
         elif isinstance(step, Twist):
-            found.append(("twist", step.twist))
+            result.append(("twist", step.twist))
         elif isinstance(step, Displace):
-            found += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
-    return found
+            result += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
+    return result
 
 
 def _texels(leaf: Leaf, graph: Graph) -> Measures:
-    """Texels of a picture to a pixel."""
+    """Texels to a pixel of the picture that an object wears, where they are densest."""
     element, affines = leaf.look.element, steps.composed(leaf.steps)
     if element is None or element.dimension == 3:
         return []
@@ -265,14 +265,14 @@ def _warn(context: Context, quantity: str, message: str, leaf: Leaf, value: floa
 Point = tuple[float, float, float]
 
 _DIM: Final = 0.1
-"""A medium around the eye that lets less of the light through, in any direction, hides the scene."""
+"""Share of the light; a medium around the eye that lets less through, in any direction, hides the scene."""
 
 
 def check_eye(graph: Graph, context: Context) -> Graph:
     """Report an eye inside an opaque object, and warn of one deep in a medium.
 
-    The exact fold at that one point, by its definition. Geometries that are not known by a formula are taken
-    as far away, and as leaving nothing where they cut.
+    The exact fold is computed at that one point. Geometries without a formula count as far away, and as
+    leaving nothing where they cut.
 
     Before: STREAM. After: unchanged.
     """
@@ -293,7 +293,7 @@ def check_eye(graph: Graph, context: Context) -> Graph:
 
 
 def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
-    """The distance of a fold at a point, and the leaf whose material holds there."""
+    """The distance of a fold at a point, and the leaf whose material is seen there."""
     depth, holder = inf, None
     for link in fold.links:
         node, k = link.node, link.width
@@ -317,7 +317,7 @@ def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
 
 
 def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
-    """The distance of a blend, and the share of what joins."""
+    """The distance of a blend and the share, in [0, 1], of the operand ``d``."""
     if inf in (abs(depth), abs(d)):
         return min(depth, d), float(d < depth)
     h = min(max(0.5 + 0.5 * (depth - d) / k, 0.0), 1.0)
@@ -346,9 +346,9 @@ def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
 
 
 _FAR: Final = 8.0
-"""Coordinates and sizes beyond so many units were most likely meant as pixels."""
+"""World units; larger coordinates and sizes were most likely meant as pixels."""
 _TESTS: Final = 20_000
-"""Boxes that are compared before nothing is said, so that no scene takes long."""
+"""The most comparisons of boxes, beyond which nothing is reported, so that no scene takes long."""
 
 
 def check_seen(graph: Graph, context: Context) -> Graph:
@@ -384,9 +384,9 @@ def _say(context: Context, fact: str, span: Span | None, help: str) -> None:
 
 
 def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
-    """Boxes that hold all that the fold leaves, None where that is not known, and what left none of them."""
+    """Boxes around all that the fold leaves, None where they are not known, and the cut that left nothing."""
     widths = [link.width for link in links_within(graph.root) if link.op == "smooth"]
-    felt, tests = sum(widths) / 4, 0  # blends add so much at most
+    felt, tests = sum(widths) / 4, 0  # a blend widens its operands by a quarter of its width at most
 
     def left(fold: Fold) -> tuple[list[Box] | None, Span | None]:
         nonlocal tests
@@ -411,7 +411,7 @@ def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
 
 
 def _in_sight(box: Box, graph: Graph) -> bool:
-    """Whether something in a box may be seen."""
+    """True where something in a box may be seen."""
     if (stage := graph.stage) is None:
         return overlap(box, graph.window())
     eye, (forward, right, up) = stage.camera.eye, stage.camera.axes()
@@ -430,7 +430,7 @@ def _in_sight(box: Box, graph: Graph) -> bool:
 
 
 def _plus(forward: Sequence[float], axis: Sequence[float], half: float, sign: float) -> tuple[float, ...]:
-    """The inward normal of a side of what the camera sees."""
+    """The inward normal of a side of the camera's frustum."""
     return tuple(half * f + sign * a for f, a in zip(forward, axis, strict=True))
 
 
@@ -502,7 +502,7 @@ def check_scene(
     without: Collection[str] = (),
     memory: Memory | None = None,
 ) -> Graph:
-    """Everything that can be said of a scene before it is lifted: lower it and run all passes in order.
+    """Lower a scene and run all passes in order.
 
     The graph is verified after each. No numpy is imported.
 
@@ -537,7 +537,7 @@ def check_scene(
             after(step.name, graph)
             if diagnostics.errors:
                 if step.run is flatten:
-                    break  # every mistake is found, and what is left is not the scene
+                    break  # all mistakes are reported, and the graph is not the scene's
                 # Without sound chains no bound means anything: look for refusals only.
                 context = Context(manifest, diagnostics, whole=False)
     return graph

@@ -1,6 +1,6 @@
-"""The Program: a compiled scene as renderers and embedders take it, and its files, read as a stranger's.
+"""The Program: a compiled scene for renderers and embedders, and its files.
 
-Its file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
+A file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
 ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
 unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
@@ -37,11 +37,11 @@ from scenelang.language.diagnostics import plural
 from scenelang.language.words import TOKENS
 
 STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
-"""Operations on a colour and how many numbers each has; in files they are told by their place here."""
+"""Operations on a colour and how many numbers each has; files have their index here."""
 
 
 class Paint(NamedTuple):
-    """The colours of an element, and what is done to each, in order, clamped to [0, 1] after each.
+    """An element and operations on its colours, in order, clamped to [0, 1] after each.
 
     Args:
         element: a picture, which repeats, or colours of space.
@@ -54,8 +54,10 @@ class Paint(NamedTuple):
 
 
 def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:
-    """Tensors of a table of paints: ``paints`` I32 (K, 2), the index of each one's element and how many of
-    ``steps`` F32 (S, 4) are its, one after the other: a place in `STEPS` and numbers.
+    """Tensors of a table of paints.
+
+    ``paints`` I32 (K, 2) has the index of each one's element and the number of its steps, ``steps``
+    F32 (S, 4) the steps of all paints in order: an index in `STEPS` and up to three numbers.
     """
     kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
     table = [(index[paint.element], len(paint.steps)) for paint in paints]
@@ -73,12 +75,12 @@ def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> d
 def read_paints(
     table: npt.NDArray[Any], steps: npt.NDArray[Any], elements: tuple[Element, ...]
 ) -> tuple[Paint, ...]:
-    """The paints that such tensors tell of.
+    """The paints of a table, as `paint_tensors` writes it.
 
     Raises:
         TensorError: they do not agree, or name what is not listed.
     """
-    kinds, rows, found, first = list(STEPS), steps.tolist(), [], 0
+    kinds, rows, result, first = list(STEPS), steps.tolist(), [], 0
     if not all(kind in range(len(kinds)) for kind, *_ in rows):
         raise TensorError("a paint with a step that this version does not know")
     for at, count in table.tolist():
@@ -86,15 +88,15 @@ def read_paints(
             raise TensorError("a paint of an element or of steps that are not listed")
         own = rows[first : first + count]
         named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
-        found.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
+        result.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
         first += count
     if first != len(rows):
         raise TensorError("steps that no paint has")
-    return tuple(found)
+    return tuple(result)
 
 
 def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimension: int) -> str | None:
-    """What is wrong with the paints of a Program of a dimension."""
+    """Say what is wrong with the paints of a Program of a dimension, None where nothing is."""
     known = set(elements)
     for element, steps in paints:
         if not element.material or element not in known:
@@ -118,7 +120,7 @@ class ProgramError(ValueError):
 
 
 class Place(NamedTuple):
-    """Where an object was written: lines and columns from 1, in code points, the end exclusive."""
+    """The place of an object in text: lines and columns from 1, in code points, the end exclusive."""
 
     file: str
     line: int
@@ -129,11 +131,11 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """Objects in stream order. Arrays are copied, checked and made read-only.
+    """Objects in stream order. Arrays are copied, checked and set read-only.
 
     Args:
         vectors: float32 (N, 64), geometry vector (32) then material vector (32) of each object.
-        tokens: int8 (N,), how each joins what came before, and the groups that begin and end with it: see
+        tokens: int8 (N,), the operator that joins each, and the groups that begin and end with it: see
             `scenelang.compiler.groups`; the first joins nothing.
         bounds: float32 (N, 4), world xmin, ymin, xmax, ymax: outside it the row makes no difference to
             the picture. An intersection, which reaches everything, has the whole canvas. Of solids it is a
@@ -146,10 +148,10 @@ class Program:
         places: where each row was written; None where that is unknown.
         stage: camera, light, ground and sky of a scene of solids; None in the plane.
         numbers: of each row's object in the scene as written, from 1; by default the rows'.
-        elements: what users brought.
-        forms: int32 (N,), which of these a row shows; -1 for a geometry of the model. None stands for all -1.
-        palette: their materials as rows wear them.
-        worn: int32 (N,), which of these a row wears; -1 for the colour of its vector. None stands for all -1.
+        elements: geometries and materials of users' files.
+        forms: int32 (N,), index of a row's element, -1 for a geometry of the model. None stands for all -1.
+        palette: paints of the rows.
+        worn: int32 (N,), index of a row's paint, -1 for the colour of its vector. None stands for all -1.
 
     Raises:
         ProgramError: anything is not as above.
@@ -202,7 +204,7 @@ class Program:
         return bundle(self, self.canvas, said)
 
     def digest(self) -> str:
-        """SHA-256, hex, of all that decides the picture: not of names or places in source text."""
+        """SHA-256, hex, of all that decides the picture: names and places in source text do not."""
         colour = self.background and tuple(float(v) for v in self.background)
         settings: tuple[object, ...] = (tuple(self.canvas), colour, self.model, self.weights, len(self))
         if self.stage is not None:
@@ -220,18 +222,18 @@ class Program:
         return total.hexdigest()
 
     def brought(self) -> list[Element | None]:
-        """Each row's element, None for a geometry of the model."""
+        """The element of each row, None for a geometry of the model."""
         assert self.forms is not None
         return [self.elements[at] if at >= 0 else None for at in self.forms.tolist()]
 
     def paints(self) -> list[Paint | None]:
-        """Each row's material that a user brought, None where its vector has the colour."""
+        """The paint of each row, None where its vector has the colour."""
         assert self.worn is not None
         return [self.palette[at] if at >= 0 else None for at in self.worn.tolist()]
 
     @property
     def extended(self) -> bool:
-        """Whether it has groups, or cuts that have a width: a chain of sharp cuts and blends has neither."""
+        """True where it has groups, or cuts with a width, as chains of sharp cuts and blends do not."""
         if (self.tokens > OPERATOR).any():
             return True
         known = ALIASES.get(self.model, self.model)
@@ -461,12 +463,12 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
         isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed
     ):
         raise TensorError("its list of elements is damaged")
-    found = []
+    result = []
     for at, (name, entry) in enumerate(listed):
         if (tensor := file.tensors.pop(f"element.{at}", None)) is None:
             raise TensorError(f"element {at} has no bytes")
-        found.append((name, entry, tensor))
-    return read_elements(found, file.body)
+        result.append((name, entry, tensor))
+    return read_elements(result, file.body)
 
 
 def _count(file: TensorFile) -> int:
@@ -494,8 +496,7 @@ def _count(file: TensorFile) -> int:
 
 
 def _shipped(program: Program) -> str:
-    """Digest of the weights that ship for a Program: replaced ones where it was compiled for them."""
-    from scenelang.compiler.manifest import ALIASES
+    """Digest of the shipped weights for a Program: replaced ones where it was compiled for them."""
     from scenelang.compiler.weights import ModelError, load_codes, replaced
 
     model, old = program.model, replaced(program.weights)

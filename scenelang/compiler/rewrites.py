@@ -8,7 +8,7 @@
 otherwise             a group: a renderer folds it by itself and joins it as one object
 ====================  =========================================================================
 
-What follows in the operand is taken off its end: ``S u (x n y u z)`` is ``S u (x n y) u z``.
+Later links of the operand that may stand apart do: ``S u (x n y u z)`` is ``S u (x n y) u z``.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Context(Record):
 
 
 def drop_empty(graph: Graph, context: Context) -> Graph:
-    """Drop what is empty, and make transparent what has one child.
+    """Drop empty folds, and replace folds with one child by that child.
 
     A fold without links is the empty set, at distance +infinity from everywhere. So a union, `smooth` or
     subtraction with it changes nothing, subtracting from it or intersecting it leaves it empty, and what
@@ -106,7 +106,7 @@ def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[L
 
 
 def drop_unseen(graph: Graph, context: Context) -> Graph:
-    """Drop rows that provably stay out of what decides the picture, and whatever they leave without effect.
+    """Drop rows that provably have no effect on the picture, and rows that have none without them.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
@@ -136,23 +136,23 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
 
 
 def begun(links: Sequence[Link | None]) -> tuple[Link, ...]:
-    """The rows that are kept; where the first one goes, so do those that only cut what is left.
+    """The links that are left; behind a dropped first one, cuts are dropped up to the next union.
 
-    A row that goes had no effect, or was the first.
+    A dropped link, None, had no effect, or was the first.
     """
-    kept: list[Link] = []
+    result: list[Link] = []
     for index, link in enumerate(links):
         if link is None:
             continue
-        if kept or index == 0:
-            kept.append(link)
+        if result or index == 0:
+            result.append(link)
         elif link.op in ("union", "smooth"):
             first = link.node.links if isinstance(link.node, Fold) else (Link("union", link.node),)
-            kept.extend(first)
-    return tuple(kept)
+            result.extend(first)
+    return tuple(result)
 
 
-_MOST = 8  # covers that are tried for each row: the largest ones seen, so that time stays linear
+_MOST = 8  # covers that each row is compared with: the largest so far, so that time stays linear
 
 _INSIDE = 1.0 - 1e-9  # share of a cover's inner disc that counts, to cover the rounding of float64
 
@@ -163,9 +163,9 @@ Cover = tuple[float, Rows, float]
 def drop_hidden(graph: Graph, context: Context) -> Graph:
     """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
 
-    What a row does to the picture stays within its leaf, and there the later union decides distance sign
-    and colour alone. A blend looks at distances, so rows before the last one are kept. A leaf that is
-    drawn twice in the very same place is covered too. What a group without blends draws or cuts lies within
+    The effect of a row on the picture stays within its leaf, and there the later union alone decides the
+    sign of the distance and the colour. A blend uses distances, so rows before the last blend stay. A leaf
+    that is drawn twice in the very same place is covered too. A group without blends has its effect within
     its leaves.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
@@ -201,7 +201,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
 
 
 def cover_of(leaf: Leaf, space: Space) -> Cover | None:
-    """The disc or ball that a leaf certainly fills, where one is known."""
+    """A disc or ball that lies within a leaf, where one is known."""
     disc = space.disc(leaf.geometry, leaf.steps)
     if disc is None:
         return None
@@ -210,7 +210,7 @@ def cover_of(leaf: Leaf, space: Space) -> Cover | None:
 
 
 def covered(box: Box, covers: list[Cover]) -> bool:
-    """Whether a box lies inside one of some covers."""
+    """True where a box lies inside one of some covers."""
     left, bottom, right, top, near, far = box
     depths = (near,) if near == far else (near, far)
     corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]
@@ -228,7 +228,7 @@ def covered(box: Box, covers: list[Cover]) -> bool:
 
 
 def flatten(graph: Graph, context: Context) -> Graph:
-    """Take composite operands apart where that changes nothing.
+    """Take composite operands apart where that does not change the result.
 
     Before: COMPOSITE, AT_LEAVES. After: STREAM, with the same distances and colours. Groups within more than
     15 others are reported as E0409, and any where the model has no stack as E0513, with cuts of a width.
@@ -296,7 +296,7 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
 
     Moves that do nothing vanish and neighbouring affine maps compose, in float64, so that the chain which
     each group hands down stays short however deep it stands. A leaf's world distance is defined by its
-    whole chain, so nothing changes but where the chain is kept.
+    whole chain, so only the place of the chain changes.
 
     Before: any graph. After: AT_LEAVES, MERGED.
     """

@@ -1,4 +1,4 @@
-"""Spaces that models draw in: the plane and the solid world, their stage, bounds and moves.
+"""The plane and the solid world: maps and deformations that stay in them, bounds of leaves, the stage.
 
 A model's manifest states its dimension; `SPACES` has the space, which is handed down from there. Nothing
 else in the compiler asks whether a scene is flat.
@@ -18,7 +18,7 @@ Balls. A leaf lies in the unit ball and its distance grows no faster than 1, so 
 in a ball of radius 1 + level / stretch, and a displacement by at most its amount widens that by as much. A
 turn keeps lengths, so that it carries a ball into the one about the origin that encloses it.
 
-Soundness of the boxes: a leaf lies within the unit disc and its distance grows no faster than 1, so the
+Boxes of the plane. A leaf lies within the unit disc and its distance grows no faster than 1, so the
 points below a level lie within a disc of radius 1 + level / stretch. An affine map sends a disc into an
 ellipse; a warp keeps lengths and turns each point by an angle that is bounded over any sector about the
 origin.
@@ -50,7 +50,7 @@ HORIZON: Triple = (0.80, 0.86, 0.92)
 ZENITH: Triple = (0.30, 0.50, 0.85)
 
 AMBIENT = (0.12, 0.06)
-"""What a surface of normal n receives without the light: ``AMBIENT[0] + AMBIENT[1] n.y``; media the first."""
+"""Ambient light on a surface of normal n: ``AMBIENT[0] + AMBIENT[1] n.y``; on media the first alone."""
 
 EXTINCTION = 3.0  # of media, per world unit
 FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
@@ -71,7 +71,7 @@ def encoded(linear: Triple) -> Triple:
 
 
 class Camera(Record):
-    """Where the picture is taken from.
+    """The camera.
 
     Args:
         eye, target: world points.
@@ -83,7 +83,7 @@ class Camera(Record):
     fov_rad: float = 2.0 * atan(1.0 / 3.0)
 
     def fault(self) -> str | None:
-        """Why there is no picture from here, if there is none."""
+        """Say why there is no picture from here, None where there is one."""
         fault = camera_fault(self.eye, self.target, self.fov_rad)
         return None if fault is None else fault[1]
 
@@ -103,7 +103,7 @@ class Light(Record):
     rgb: Triple = (1.0, 1.0, 1.0)
 
     def fault(self) -> str | None:
-        """Why there is no such light, if there is none."""
+        """Say why there is no such light, None where there is one."""
         return light_fault(self.power)
 
 
@@ -118,7 +118,6 @@ class Stage(Record):
     """All of a 3D scene that is not an object.
 
     Args:
-        camera, light: as they say.
         ground: None for a scene without one.
         horizon, zenith: colours of the sky; the ground fades into the first. A plain background is both.
         transparent: the sky is not drawn and the picture has alpha.
@@ -142,10 +141,10 @@ def stage_data(stage: Stage) -> dict[str, Any]:
 
 
 def read_stage(data: object) -> Stage:
-    """The stage that JSON data holds; the inverse of `stage_data`.
+    """Read a stage from JSON data; the inverse of `stage_data`.
 
     Raises:
-        ValueError: it holds none.
+        ValueError: the data is not a stage.
     """
     if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
         raise ValueError("fields missing or unknown")
@@ -178,7 +177,7 @@ def _read(name: str, value: object) -> Any:
 
 
 def stage_of(scene: Scene) -> Stage:
-    """The stage that a scene states, over the defaults; written colours are decoded."""
+    """The stage of a scene, with defaults for what it does not state; written colours are decoded."""
     camera, light, ground, sky = Camera(), Light(), scene.ground, scene.background
     if scene.camera != "default":
         camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov)
@@ -218,7 +217,7 @@ REACH: Final = 1e30
 
 
 class Refusal(NamedTuple):
-    """Why a transform has no step: a code, the fact and advice."""
+    """The reason why a transform has no step: a code, the fact and advice."""
 
     code: str
     message: str
@@ -230,16 +229,16 @@ class Space(ABC):
 
     dimension: ClassVar[int]
     shown: ClassVar[tuple[tuple[int, ...], ...]]
-    """Entries of `Rows` that say all of a map of this space, row by row."""
+    """Entries of `Rows` that determine a map of this space, row by row."""
     thinner: ClassVar[str]
-    """What a singular map flattens everything to."""
+    """The image of everything under a singular map, in words."""
 
     @abstractmethod
     def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
-        """The map as this space has it, or why the transform leaves the space."""
+        """The map within this space, or the reason why the transform leaves the space."""
 
     def idle(self, transform: scene.Transform) -> str | None:
-        """The part of a transform that was asked for and has no effect here, if there is one."""
+        """The part of a transform that has no effect in this space, if there is one."""
         return None
 
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
@@ -247,12 +246,12 @@ class Space(ABC):
         return op
 
     def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
-        """A colour of that space as it is written."""
+        """The inverse of `inked` for a colour: as it is written."""
         return rgb
 
     @abstractmethod
     def holds(self, rows: Rows) -> bool:
-        """Whether a map is one that `fitted` gives."""
+        """True for maps that `fitted` may give."""
 
     @abstractmethod
     def stretches(self, rows: Rows) -> tuple[float, float]:
@@ -260,10 +259,10 @@ class Space(ABC):
 
     @abstractmethod
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """The turn that does before the map ``rows`` what ``turn`` does after it; None where none does."""
+        """The turn before the map ``rows`` that has the effect of ``turn`` after it, if there is one."""
 
     def after(self, rows: Rows, turn: Turn) -> Turn | None:
-        """The turn that does after the map ``rows`` what ``turn`` does before it; None where none does."""
+        """The turn after the map ``rows`` that has the effect of ``turn`` before it, if there is one."""
         return self.before(inverted(rows), turn)
 
     @abstractmethod
@@ -277,26 +276,27 @@ class Space(ABC):
         """
 
     def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
-        """The same as Programs keep it: the flat box, in space a ball, as centre and radius."""
+        """The bound of a leaf in a Program: the flat box, in space a ball, as centre and radius."""
         return self.box(geometry, steps, level)[:4]
 
     @abstractmethod
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A disc, or ball, about a leaf's own origin that it certainly fills, where one is known.
+        """A disc, or ball, about a leaf's own origin that lies within it, where one is known.
 
-        It is given by its radius and the map from the world to there.
+        Returns:
+            Its radius and the map from the world to the leaf.
         """
 
     def usable(self, rows: Rows) -> bool:
-        """Whether the map can be inverted in float64 and its inverse kept in float32."""
+        """True where the map has an inverse in float64 that float32 can hold."""
         smallest, largest = self.stretches(rows)
         offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
         # Written so that NaN and infinity fail.
         return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
 
 
-_ALIKE = 1e-12
-"""Relative tolerance below which entries of a map count as equal."""
+ALIKE = 1e-12
+"""Relative tolerance below which entries of a map, stretches or a right angle count as equal."""
 
 _ROUNDING = 1e-9
 """Balls and boxes grow by this much, relative, to cover the rounding of float64."""
@@ -313,7 +313,7 @@ class Solid(Space):
         return rows
 
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
-        """Light adds up, so that colours are linear."""
+        """The operation in linear colours, as light adds up."""
         return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
 
     def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -353,12 +353,14 @@ class Solid(Space):
         return min(smallest, middle), largest
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """See the module for a proof."""
-        j, k = (2, 1) if isinstance(turn, Twist) else (1, 2)  # the plane is that of x and j
+        """A turn in the plane of x and j; the module's docstring has the proof."""
+        # P is the plane of x and j, k the axis a; entry (r, c) of the map is rows[4 r + c].
+        j, k = (2, 1) if isinstance(turn, Twist) else (1, 2)
         a, b, c, d, along = rows[0], rows[j], rows[4 * j], rows[5 * j], rows[5 * k]
         scale = sqrt(abs(a * d - b * c))
-        near = _ALIKE * scale
+        near = ALIKE * scale
         sign = 1.0 if a * d > b * c else -1.0
+        # no shift in P, and nothing that mixes P and a
         apart = (rows[3], rows[4 * j + 3], rows[k], rows[4 * k], rows[4 * j + k], rows[4 * k + j])
         if max(abs(a - sign * d), abs(b + sign * c), *map(abs, apart)) > near:
             return None
@@ -392,7 +394,7 @@ class Solid(Space):
         return x, y, z, radius + _ROUNDING * (1.0 + hypot(x, y, z) + radius)
 
     def _ball(self, steps: Sequence[Step], level: float) -> tuple[tuple[float, float, float], float, Rows]:
-        """Centre and radius of a ball that holds all points below a level, and the map behind it."""
+        """Centre and radius of a ball around all points below a level, and the affine map behind it."""
         radius, pending = 1.0, IDENTITY
         if level > 0.0:
             stretch = self.stretches(affine.composed(steps))[0]
@@ -411,7 +413,7 @@ class Solid(Space):
         return centre, radius, pending
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """Turns before the first affine map leave a ball about the origin in place."""
+        """A ball; turns before the first affine map leave one about the origin in place."""
         maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
@@ -423,11 +425,6 @@ def _mapped(rows: Rows, p: tuple[float, float, float]) -> tuple[float, float, fl
     x, y, z = p
     a, b, c, u, d, e, f, v, g, h, i, w = rows
     return a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
-
-
-ALIKE = 1e-12  # relative tolerance below which two stretches, or a right angle, count as equal
-
-_PLANE_ROUNDING = 1e-9  # boxes grow by this much, relative, to cover the rounding of float64
 
 
 class Plane(Space):
@@ -466,7 +463,7 @@ class Plane(Space):
         return stretches(rows[0], rows[1], rows[4], rows[5])
 
     def usable(self, rows: Rows) -> bool:
-        """Also whether the inverse, kept in float32, still has one itself: thin and slanted it may not."""
+        """As for any space; nor may the inverse be singular in float32, as a thin, slanted one can be."""
         if not super().usable(rows):
             return False
         a, b, _, _, c, d = rows[:6]
@@ -475,7 +472,7 @@ class Plane(Space):
         return bool(p * s != q * r)
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """Similarities about the origin trade places with warps: `chain.normal` proves it."""
+        """A warp for similarities about the origin; `scenelang.compiler.chain.normal` has the proof."""
         alike = _similarity(rows)
         if alike is None or not isinstance(turn, Warp):
             return None
@@ -497,7 +494,7 @@ class Plane(Space):
         return _grown(_straight(row.corners if row else (), rows, reach))
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """Warps before the first affine map leave a disc about the origin in place."""
+        """A disc; warps before the first affine map leave one about the origin in place."""
         row = GEOMETRIES.get(geometry)
         if row is None or not row.inner or not all(isinstance(step, Affine) for step in steps[-1:]):
             return None
@@ -537,7 +534,7 @@ def _similarity(rows: Rows) -> tuple[float, float] | None:
 
 def _grown(box: tuple[float, float, float, float]) -> Box:
     left, bottom, right, top = box
-    more = _PLANE_ROUNDING * (1.0 + max(abs(left), abs(bottom), abs(right), abs(top)))
+    more = _ROUNDING * (1.0 + max(abs(left), abs(bottom), abs(right), abs(top)))
     grown = (left - more, bottom - more, right + more, top + more, 0.0, 0.0)
     # NaN compares false: what overflowed may be anywhere.
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE

@@ -29,7 +29,7 @@ class Affine(Record):
 
     @property
     def idle(self) -> bool:
-        """Whether it leaves everything as it is, exactly; the other steps have the like."""
+        """True where the step changes nothing, exactly; so for the other steps."""
         return self.rows == IDENTITY
 
 

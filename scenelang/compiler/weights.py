@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 64 << 20
 REPLACED: Final = ROOT / "replaced"
-"""Folders of weights that others took the place of, by digest: what was saved draws with them as ever."""
+"""Folders of weights that others have replaced, by digest: saved Programs still draw with them."""
 LIFTING = "lifting."
-"""In front of the names of a lifting's tensors, where a file holds it beside a renderer's."""
+"""Prefix of the names of a lifting's tensors, where a file also holds a renderer's."""
 
 
 class ModelError(Exception):
-    """A model's files are missing, damaged or not what its manifest says."""
+    """A model's files are missing, damaged or do not fit its manifest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Codes:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a weights file says about itself.
+    """Facts about a weights file.
 
     Args:
         digest: SHA-256 of the file, hex.
@@ -69,12 +69,12 @@ def replaced(digest: str) -> str:
 
 
 def weights_folder(name: str, digest: str = "") -> Path:
-    """Folder of a model's weights and of what is proved of them: today's, or those `replaced`, by digest."""
+    """Folder of a model's weights and their proofs: the current ones, or those `replaced`, by digest."""
     return REPLACED / digest if replaced(digest) else model_folder(name)
 
 
 def weights_path(name: str, digest: str = "") -> Path:
-    """File of a shipped model's weights, those of today or those `replaced`."""
+    """File of a shipped model's weights, the current ones or those `replaced`."""
     return weights_folder(name, digest) / "weights.safetensors"
 
 
@@ -92,7 +92,7 @@ def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> by
 
 
 class Weights(NamedTuple):
-    """What a weights file holds: its header and its tensors by name, all finite."""
+    """Content of a weights file: its header and its tensors by name, all finite."""
 
     header: dict[str, Any]
     arrays: dict[str, npt.NDArray[Any]]
@@ -105,8 +105,8 @@ def open_weights(data: bytes) -> Weights:
         ModelError: it is damaged, foreign or hostile, or holds numbers that are not finite.
     """
     try:
-        found = read_tensors(data, MOST_BYTES)
-        return Weights(found.header, found.arrays())
+        result = read_tensors(data, MOST_BYTES)
+        return Weights(result.header, result.arrays())
     except TensorError as error:
         raise ModelError(f"damaged weights: {error}") from None
 
@@ -114,15 +114,15 @@ def open_weights(data: bytes) -> Weights:
 def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
     """Raise ModelError where tensors are not those of a network, float32 and of its shapes."""
     for name in sorted(shapes.keys() | arrays.keys()):
-        found = arrays.get(name)
-        if name not in shapes or found is None or found.shape != shapes[name] or found.dtype != "float32":
-            held = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
+        result = arrays.get(name)
+        if name not in shapes or result is None or result.shape != shapes[name] or result.dtype != "float32":
+            held = "is missing" if result is None else f"is {result.dtype} {list(result.shape)}"
             wanted = f"float32 {list(shapes[name])} is needed" if name in shapes else "none is known"
             raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
 
 
 def read_facts(name: str) -> Facts:
-    """What the weights file of a shipped model says about itself.
+    """Facts about the weights file of a shipped model.
 
     Raises:
         OSError: it cannot be read.
@@ -136,7 +136,7 @@ def read_facts(name: str) -> Facts:
 
 @lru_cache(maxsize=8)
 def load_codes(name: str, digest: str = "") -> Codes:
-    """Read the codes of a shipped model, of its weights of today or of those `replaced`.
+    """Read the codes of a shipped model, of its current weights or of those `replaced`.
 
     Raises:
         KeyError: there is no such model.
@@ -147,7 +147,7 @@ def load_codes(name: str, digest: str = "") -> Codes:
 
 
 def codes_of(manifest: Manifest, data: bytes) -> Codes:
-    """The codes that a weights file holds.
+    """The codes of a weights file.
 
     Raises:
         ModelError: it is damaged, or not of this model.
@@ -178,8 +178,8 @@ def _rows(
 ) -> dict[str, tuple[float, ...]]:
     table = tensors.get(key)
     if table is None or table.dtype not in ("float32", "float16") or table.shape != (len(names), side):
-        found = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
+        held = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
         raise ModelError(
-            f"damaged weights: tensor `{key}` {found}; {len(names)} rows of {side} floats are needed"
+            f"damaged weights: tensor `{key}` {held}; {len(names)} rows of {side} floats are needed"
         )
     return {name: tuple(row) for name, row in zip(names, table.tolist(), strict=True)}

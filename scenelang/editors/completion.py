@@ -1,7 +1,4 @@
-"""Completion, semantic tokens, and the words of a document's model.
-
-colours that it writes, with what a picker may write instead.
-"""
+"""Completion, semantic tokens and colours of a document, and its values and transforms in words."""
 
 from __future__ import annotations
 
@@ -36,7 +33,7 @@ from scenelang.language.values import POISON, Angle, MaterialValue, RangeValue, 
 from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, TRANSFORMS, UNITS
 
 COLOURED: Final = ("color", "background", "light", "ground")
-"""What has an argument `c` or `color`."""
+"""Words with an argument `c` or `color`."""
 
 TYPES: Final = (
     *("comment", "keyword", "number", "string", "operator"),
@@ -75,10 +72,10 @@ def semantic_tokens(docs: Workspace, document: Document, place: types.Range | No
     low, high = 0, len(document.text)
     if place is not None:
         low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    found = [item for item in _tokens(docs, document, low, high) if item[1] > low and item[0] < high]
+    result = [item for item in _tokens(docs, document, low, high) if item[1] > low and item[0] < high]
     data: list[int] = []
     line = column = 0
-    for start, end, kind, modifiers in sorted(found):
+    for start, end, kind, modifiers in sorted(result):
         at = document.lines.position(start)
         length = width(document.text[start:end], document.encoding)
         data += (at.line - line, at.character - column if at.line == line else at.character)
@@ -91,40 +88,40 @@ def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tu
     text, tokens = document.text, document.tokens
     names = tables().kinds
     uses = {use.start: use for use in document.names.uses}
-    found: list[tuple[int, int, str, int]] = []
+    result: list[tuple[int, int, str, int]] = []
     before = 0
     for kind, start, end in zip(tokens.kinds, tokens.starts, tokens.ends, strict=True):
         if before < start and before < high and start > low:
-            found += _comments(text, before, start)
+            result += _comments(text, before, start)
         before = end
         if start == end or end <= low or start >= high:
             continue
         use = uses.get(start)
         name = names[kind]
         if use is not None and use.end <= end and use.role not in ("path", "model"):
-            found.append((start, end, *_named(docs, document, use)))
+            result.append((start, end, *_named(docs, document, use)))
         elif name == "NUMBER" or name == "COLOR":
-            found.append((start, end, "number", 0))
+            result.append((start, end, "number", 0))
         elif name == "STRING":
-            found.append((start, end, "string", 0))
+            result.append((start, end, "string", 0))
         elif name[0].isalpha() and name != "NAME":
-            found.append((start, end, "keyword", 0))
+            result.append((start, end, "keyword", 0))
         elif name not in ("NAME", "(", ")", "[", "]", "{", "}", ",", ";", "."):
-            found.append((start, end, "operator", 0))
-    return [item for item in found if "\n" not in text[item[0] : item[1]]]
+            result.append((start, end, "operator", 0))
+    return [item for item in result if "\n" not in text[item[0] : item[1]]]
 
 
 def _comments(text: str, start: int, end: int) -> list[tuple[int, int, str, int]]:
     """Comments between two tokens, line by line, as a token must not span lines."""
-    found = []
+    result = []
     for match in _COMMENTS.finditer(text, start, end):
         at = match.start()
         for part in match[0].splitlines(keepends=True):
             bare = part.rstrip("\r\n")
             if bare:
-                found.append((at, at + len(bare), "comment", 0))
+                result.append((at, at + len(bare), "comment", 0))
             at += len(part)
-    return found
+    return result
 
 
 def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
@@ -140,7 +137,7 @@ def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
 
 def colours(document: Document) -> list[types.ColorInformation]:
     """Colours that are written out: `#hex`, `rgb(…)`, `hsv(…)` and vectors where a colour is wanted."""
-    found = []
+    result = []
     for stmt in document.file.statements:
         wanted: set[int] = set()
         for node in walk(stmt):
@@ -152,9 +149,9 @@ def colours(document: Document) -> list[types.ColorInformation]:
             rgb = _colour(node, id(node) in wanted)
             if rgb is not None:
                 place = document.lines.span(node.span)
-                found.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
-    found.sort(key=lambda c: (c.range.start.line, c.range.start.character))
-    return found
+                result.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
+    result.sort(key=lambda c: (c.range.start.line, c.range.start.character))
+    return result
 
 
 def _colour(node: object, wanted: bool) -> tuple[float, float, float] | None:
@@ -199,7 +196,7 @@ def _clamped(parts: list[float | None], first_free: bool = False) -> tuple[float
 def presentations(
     document: Document, color: types.Color, place: types.Range
 ) -> list[types.ColorPresentation]:
-    """How a picked colour may be written, the way it is written now first."""
+    """The notations of a picked colour, the current one first."""
     red, green, blue = color.red, color.green, color.blue
     bytes_ = [min(max(round(255 * x), 0), 255) for x in (red, green, blue)]
     long = "#" + "".join(f"{b:02x}" for b in bytes_)
@@ -241,7 +238,7 @@ def space_of(document: Document) -> Space:
 
 
 def show_value(value: Any) -> str | None:
-    """A value as one would write it; None for one that a mistake has made unknown."""
+    """A value in the notation of the language; None for one that a mistake has made unknown."""
     cls = value.__class__
     if value is POISON:
         return None
@@ -279,7 +276,7 @@ def show_matrix(rows: Rows, space: Space) -> str:
 
 
 def show_warp(warp: Warp) -> str:
-    """How a point goes back through a warp, in a formula."""
+    """The formula of a warp's inverse at a point."""
     terms = []
     if warp.twirl:
         terms.append(f"{show(warp.twirl)} |p|")
@@ -303,15 +300,15 @@ def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
 
 
 def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
-    """How much the affine maps of a chain scale, at least and at most."""
+    """The least and the greatest scale of a chain's affine maps."""
     low, high = space.stretches(affine.composed(_steps(transforms, space)))
     return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
 
 
 def _steps(transforms: Iterable[Any], space: Space) -> list[Step]:
     """The steps of transforms, without those that have none."""
-    found = [step_of(transform, space) for transform in transforms]
-    return [step for step in found if not isinstance(step, Refusal)]
+    result = [step_of(transform, space) for transform in transforms]
+    return [step for step in result if not isinstance(step, Refusal)]
 
 
 def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
@@ -331,8 +328,8 @@ class Item(Record):
     """A proposal.
 
     Args:
-        text: what is inserted; the label without it.
-        rank: one letter; what is likelier comes first.
+        text: inserted in place of the label.
+        rank: one letter by which proposals are sorted, the likeliest first.
         about: Markdown.
         snippet: whether ``text`` has placeholders.
     """
@@ -358,7 +355,7 @@ def units(typed: str) -> Iterator[Item]:
 
 
 def strings(docs: Workspace, document: Document, before: tuple[str, ...]) -> Iterator[Item]:
-    """What a string may say: a model's name, a file to import."""
+    """Contents of a string: names of models, files to import."""
     if before == ("model",):
         for manifest in map(load_manifest, available()):
             yield Item(manifest.name, Kind.Module, about=manifest.summary)
@@ -383,7 +380,7 @@ _SYMBOLS: Final = {
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
-    """What may stand at an offset."""
+    """Proposals at an offset."""
     names = document.names
     holders = ("let", "argument", "loop", "param")
     values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
@@ -418,7 +415,7 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
 
 
 class _Maker:
-    """Collects what fits at one cursor."""
+    """Proposals for one cursor."""
 
     def __init__(self, docs: Workspace, document: Document, cursor: Cursor, names: Names) -> None:
         self.docs, self.document, self.cursor, self.names = docs, document, cursor, names
@@ -567,7 +564,7 @@ class _Maker:
         yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
 
     def _arguments(self, callee: words.Word) -> Iterator[Item]:
-        """Names of arguments that are left, and values that the one at hand takes."""
+        """Names of arguments that are not given yet, and values for the current one."""
         call = self.cursor.call
         assert call is not None
         positional = callee is not words.TRANSFORMS["shear"]
@@ -612,11 +609,10 @@ class _Maker:
         zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
         for name, group in zoo.groups.items() if zoo is not None and not worn else ():
             yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
-        for found in zoo.elements if zoo is not None else ():
-            if found.material == worn:
-                yield Item(
-                    found.name, Kind.Class, f"{found.name} {{ $0 }}", "a", found.kind, found.told(), True
-                )
+        for element in zoo.elements if zoo is not None else ():
+            if element.material == worn:
+                name, about = element.name, element.told()
+                yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
@@ -631,7 +627,7 @@ def _item(word: words.Word, kind: Kind, rank: str) -> Item:
 
 
 def _ends_operand(text: str) -> bool:
-    """Whether an expression can end with a token, so that an operator and not an operand comes next."""
+    """True for tokens that an expression can end with, so that an operator and not an operand comes next."""
     return text in (")", "]", "}", "true", "false") or (
         (text[:1].isalnum() or text[:1] in '_#"') and text not in words.KEYWORDS
     )

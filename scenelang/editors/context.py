@@ -1,6 +1,6 @@
-"""Where a place is, which names are in sight of it, and what a call there calls.
+"""The context of a place: nodes around it, tokens before it, the call and the block that it is in.
 
-A `Cursor` is of tokens alone, which are there however broken the text is.
+A `Cursor` is made from tokens alone, which are there however broken the text is.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def path_to(file: tree.File, offset: int) -> list[Any]:
         inner = [n for n in children(path[-1]) if n.span.start <= offset <= n.span.end]
         if not inner:
             return path
-        # Where two touch at the offset, the one that begins there is meant.
+        # Of two that touch at the offset, the one that begins there counts.
         path.append(max(inner, key=lambda n: (n.span.start, -n.span.end)))
 
 
@@ -44,9 +44,9 @@ class Call(Record):
     """A call whose parentheses the cursor is in.
 
     Args:
-        name: what is called, perhaps dotted.
-        start: where the name begins.
-        index: which positional argument the cursor is in, from 0.
+        name: the name of the callee, perhaps dotted.
+        start: offset of the name.
+        index: index of the positional argument that the cursor is in.
         named: the name of the argument it is in, if that has one.
         given: names of arguments given so far, the cursor's own left out.
     """
@@ -62,9 +62,9 @@ class Block(Record):
     """A block around the cursor.
 
     Args:
-        kind: what it may hold.
-        head: the word that heads its statement.
-        nested: whether a `for` or `if` stands in between.
+        kind: the statements that it may hold.
+        head: the first word of its statement.
+        nested: whether a `for` or `if` lies between it and the cursor.
     """
 
     kind: BlockKind
@@ -73,7 +73,7 @@ class Block(Record):
 
 
 class Cursor(Record):
-    """What is around an offset.
+    """The tokens around an offset, and the call and the block that it is in.
 
     Args:
         start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
@@ -126,7 +126,7 @@ class _Reader:
 
 
 def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
-    """What is around an offset; ``values`` are names in sight that may be materials."""
+    """The cursor at an offset; ``values`` are visible names that may be materials."""
     read = _Reader(tokens)
     count = len(read.kinds) - 1
     index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor
@@ -153,10 +153,10 @@ def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset())
 
 def _in_comment(read: _Reader, index: int, offset: int) -> bool:
     gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
-    found = list(_COMMENTS.finditer(gap))
-    if not found or found[-1].end() < len(gap):
+    result = list(_COMMENTS.finditer(gap))
+    if not result or result[-1].end() < len(gap):
         return False
-    comment = found[-1][0]
+    comment = result[-1][0]
     return not (comment.endswith("\n") if comment[1] == "/" else comment[2:].endswith("*/"))
 
 
@@ -235,16 +235,18 @@ _MAX_SHOWN: Final = 200
 
 
 def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | None:
-    """What the call around the cursor calls; None where there is none or it is unknown."""
+    """The callee of the call around the cursor; None where there is none or it is unknown."""
     call = cursor.call
     if call is None:
         return None
-    found = find_symbol(docs, document, document.names, call.name, call.start)
-    return word_of(found) if found is not None else word_for_call(call.name, cursor.block.kind == "material")
+    result = find_symbol(docs, document, document.names, call.name, call.start)
+    return (
+        word_of(result) if result is not None else word_for_call(call.name, cursor.block.kind == "material")
+    )
 
 
 def find_symbol(docs: Workspace, document: Document, names: Names, name: str, offset: int) -> Symbol | None:
-    """The fn or module that a plain or dotted name stands for at an offset; ``names`` are in sight there."""
+    """The fn or module of a plain or dotted name at an offset; ``names`` are those of its file."""
     alias, _, rest = name.partition(".")
     symbol = names.scope_at(offset).find(alias)
     if symbol is None:
@@ -258,7 +260,7 @@ def find_symbol(docs: Workspace, document: Document, names: Names, name: str, of
 
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
-    """How what is being called is called, and which argument the cursor is in."""
+    """The signature of the call around an offset, with the argument that the offset is in."""
     cursor = cursor_at(document.tokens, offset)
     callee = find_callee(docs, document, cursor)
     if callee is None or cursor.call is None or cursor.inside == "comment":
@@ -321,17 +323,17 @@ def comment_above(symbol: Symbol) -> str:
     # The node's own text: it may be of an older version than the document's.
     span = symbol.node.span
     text = span.source.text
-    found: list[str] = []
+    result: list[str] = []
     start = text.rfind("\n", 0, span.start) + 1
     while start:
         above = text.rfind("\n", 0, start - 1) + 1
         match = _LINE.match(text[above : start - 1].rstrip("\r"))
         if match is None:
             break
-        found.insert(0, match[1].strip())
+        result.insert(0, match[1].strip())
         start = above
     end = text.find("\n", span.end)
     behind = _LINE.match(text[span.end : end if end >= 0 else len(text)].rstrip("\r"))
     if behind and not isinstance(symbol.node, tree.Module):
-        found.append(behind[1].strip())
-    return "\n".join(found)
+        result.append(behind[1].strip())
+    return "\n".join(result)

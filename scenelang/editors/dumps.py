@@ -1,8 +1,8 @@
-"""Trees, graphs and Programs as data, as text, as boxes and arrows; JSON Schemas of what is read and written.
+"""Trees, graphs and Programs as data, text or drawings, and the JSON Schemas of scenelang's files.
 
-Large ones are cut: nodes nearest the top come first, and a box says how many more there are.
+Large drawings are cut: nodes nearest the top come first, and a box says how many more there are.
 
-The Scene's is made from the pydantic model. What only code can check is not in it: that a matrix is not
+The Scene's schema is made from the pydantic model. It leaves out checks that need code: that a matrix is not
 singular, that numbers fit into float64, and how deep nodes may nest.
 """
 
@@ -65,7 +65,7 @@ def _position(place: tuple[int, int]) -> dict[str, int]:
 
 
 def tree_text(file: tree.File) -> str:
-    """One line for each node: the field that holds it, its kind, what is not a node in it, its place."""
+    """One line for each node: the field that holds it, its kind, its fields that are not nodes, its place."""
     with deep_stack():
         return "".join(_lines(file, "", ""))
 
@@ -138,7 +138,7 @@ def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
 
 
 def look_text(look: Look, space: Space) -> str:
-    """A colour; or a texture with the moves of it and what is done to its colours."""
+    """A colour; or a texture with its moves and the operations on its colours."""
     if look.element is None:
         return hex_text(space.written(look.colour()))
     moves = [move_text(Move(step), PLANE) for step in look.texture]
@@ -223,17 +223,14 @@ def _node(node: Node) -> dict[str, Any]:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
         return {"kind": "leaf", **look, "moves": moves}
-    links = [{"op": link.op, **_width(link), "node": _node(link.node)} for link in node.links]
+    links = [
+        {"op": link.op, **({"k": link.k} if link.k else {}), "node": _node(link.node)} for link in node.links
+    ]
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
 def _texture(element: Element) -> dict[str, Any]:
     return {"name": element.name, "digest": element.digest}
-
-
-def _width(link: Link) -> dict[str, Any]:
-    """The width of a blend that is not the usual one."""
-    return {"k": link.k} if link.k else {}
 
 
 def _move(move: Move) -> dict[str, Any]:
@@ -286,14 +283,14 @@ def program_table(program: Program) -> str:
 
 
 def token_names(program: Program) -> list[str]:
-    """How each row joins what came before it, in words."""
+    """The tokens of rows in words."""
     from scenelang.compiler.groups import token_name
 
     return [token_name(token) for token in program.tokens.tolist()]
 
 
-def _alike(left: list[str], right: list[str]) -> int:
-    """Number of lines with which both lists begin."""
+def common_start(left: Sequence[str], right: Sequence[str]) -> int:
+    """Number of items with which both sequences begin."""
     pairs = enumerate(zip(left, right, strict=False))
     return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
@@ -301,13 +298,13 @@ def _alike(left: list[str], right: list[str]) -> int:
 def changes(before: str, after: str, old: str, new: str) -> str:
     """The diff of two dumps; empty where nothing changed.
 
-    Comparing line by line takes quadratic time, so of very large changes only the size is told.
+    Comparing line by line takes quadratic time, so only the size of very large changes is given.
     """
     if before == after:
         return ""
     a, b = before.splitlines(), after.splitlines()
-    start = _alike(a, b)
-    end = _alike(a[start:][::-1], b[start:][::-1])
+    start = common_start(a, b)
+    end = common_start(a[start:][::-1], b[start:][::-1])
     gone, come = len(a) - start - end, len(b) - start - end
     if max(gone, come) > 3000:
         counts = f"{plural(gone, 'line')} became {come:,}"
@@ -324,7 +321,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A node: its lines of text, the colour it is filled with, and whether it is a leaf."""
+    """A node: its lines of text, its fill colour, and whether it is a leaf."""
 
     lines: tuple[str, ...]
     fill: str | None = None
@@ -333,7 +330,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """From box to box by their numbers, with a word on it."""
+    """An arrow from box to box, by their numbers, with a word on it."""
 
     start: int
     end: int
@@ -349,7 +346,7 @@ class Drawing:
     sideways: bool = False
 
     def add(self, box: Box, parent: int | None = None, word: str = "") -> int:
-        """Put a box in, below another one; returns its number."""
+        """Add a box below another one; return its number."""
         self.boxes.append(box)
         if parent is not None:
             self.arrows.append(Arrow(parent, len(self.boxes) - 1, word))
@@ -395,7 +392,7 @@ def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Spa
 
 def _rounded(statement: str) -> str:
     """A statement as a box shows it, its numbers to five digits."""
-    return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda found: f"{float(found[0]):.5g}", statement.rstrip(";"))
+    return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda match: f"{float(match[0]):.5g}", statement.rstrip(";"))
 
 
 def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
@@ -441,7 +438,7 @@ def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
 
 
 def _some(drawn: Drawing, parent: int, children: Sequence[T], most: int) -> Sequence[T]:
-    """The children that are drawn; the others become one box that counts them."""
+    """The children to draw; one box counts the others."""
     room = max(0, min(_MOST_CHILDREN, most - len(drawn.boxes)))
     left = len(children) - room
     if left <= 0:
@@ -472,7 +469,7 @@ def to_mermaid(drawn: Drawing) -> str:
 
 
 def _for_mermaid(text: str) -> str:
-    """Text without characters that mean something to Mermaid: they are written by their number."""
+    """Text for Mermaid, its special characters written by their numbers."""
     return "".join(c if c.isalnum() or c in " .,:+-_=()[]" else f"#{ord(c)};" for c in text)
 
 
@@ -507,14 +504,14 @@ _DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
 def scene_schema() -> dict[str, Any]:
-    """Of a Scene: what `Scene.from_json` reads and `Scene.to_json` writes."""
-    made = Scene.model_json_schema()
-    described = {"title": "Scene", "description": made.pop("description", ""), **made}
+    """The schema of a Scene, as `Scene.from_json` reads and `Scene.to_json` writes it."""
+    model = Scene.model_json_schema()
+    described = {"title": "Scene", "description": model.pop("description", ""), **model}
     return _plain(_headed("scene", described))  # type: ignore[no-any-return]
 
 
 def diagnostics_schema() -> dict[str, Any]:
-    """Of what ``scenelang check --format json`` prints."""
+    """The schema of the output of ``scenelang check --format json``."""
     number = {"type": "integer", "minimum": 1}
     position = {
         "description": "from 1, in code points",
@@ -558,7 +555,7 @@ def diagnostics_schema() -> dict[str, Any]:
 
 
 def manifest_schema() -> dict[str, Any]:
-    """Of a model's ``manifest.json``."""
+    """The schema of a model's ``manifest.json``."""
     word = {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
     words = {"type": "array", "items": word, "uniqueItems": True}
     pair = {"type": "array", "prefixItems": [{"type": "number"}] * 2, "minItems": 2, "maxItems": 2}

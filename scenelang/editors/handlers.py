@@ -1,4 +1,4 @@
-"""Which function answers which request."""
+"""The functions that answer requests."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from pygls.exceptions import JsonRpcException
 
 from scenelang.assets.element import Element
 from scenelang.editors import completion, context, hover, navigation
-from scenelang.editors import completion as tokens
-from scenelang.editors import server as actions
-from scenelang.editors.server import Server, Settings
+from scenelang.editors.server import FIX_ALL, Server, Settings, code_actions, formatted
 from scenelang.editors.workspace import Document, path_of
 from scenelang.language.reports import SceneError
 
@@ -29,7 +27,7 @@ def _shut_down(server: Server, params: None) -> None:
 
 
 def _watch_files(server: Server, params: types.InitializedParams) -> None:
-    """Ask to be told of scene files that change on the disk."""
+    """Ask the client to report scene files that change on the disk."""
     workspace = server.client_capabilities.workspace
     watched = workspace.did_change_watched_files if workspace is not None else None
     if watched is None or not watched.dynamic_registration:
@@ -92,8 +90,8 @@ def _configured(server: Server, params: types.DidChangeConfigurationParams) -> N
 def _folders_changed(server: Server, params: types.DidChangeWorkspaceFoldersParams) -> None:
     gone = {path_of(folder.uri) for folder in params.event.removed}
     new = [path_of(folder.uri) for folder in params.event.added]
-    kept = [folder for folder in server.docs.folders if folder not in gone]
-    server.docs.folders = [*kept, *(path.resolve() for path in new if path is not None)]
+    left = [folder for folder in server.docs.folders if folder not in gone]
+    server.docs.folders = [*left, *(path.resolve() for path in new if path is not None)]
 
 
 # ---------------------------------------------------------------- requests
@@ -115,7 +113,7 @@ def _rename(server: Server, document: Document, params: types.RenameParams) -> t
 
 def _formatted(server: Server, document: Document, place: types.Range | None) -> list[types.TextEdit] | None:
     try:
-        return actions.formatted(document, place)
+        return formatted(document, place)
     except SceneError:
         message = "not formatted: the file has syntax errors"
         server.window_log_message(types.LogMessageParams(types.MessageType.Info, message))
@@ -123,7 +121,7 @@ def _formatted(server: Server, document: Document, place: types.Range | None) ->
 
 
 def _tokens(server: Server, document: Document, place: types.Range | None) -> types.SemanticTokens:
-    return types.SemanticTokens(tokens.semantic_tokens(server.docs, document, place))
+    return types.SemanticTokens(completion.semantic_tokens(server.docs, document, place))
 
 
 _SESSION: Final[dict[str, Callable[..., Any]]] = {
@@ -165,9 +163,9 @@ _LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
     ],
     types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: navigation.document_symbols(d),
     types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: navigation.folding(d),
-    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: tokens.colours(d),
-    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: tokens.presentations(d, p.color, p.range),
-    types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: actions.code_actions(d, p.range, p.context.only),
+    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: completion.colours(d),
+    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: completion.presentations(d, p.color, p.range),
+    types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: code_actions(d, p.range, p.context.only),
     types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hover.inlay_hints(s.docs, d, p.range, s.settings),
     types.TEXT_DOCUMENT_DOCUMENT_LINK: lambda s, d, p: navigation.links(s.docs, d),
 }
@@ -177,11 +175,9 @@ _OPTIONS: Final = {
     types.TEXT_DOCUMENT_SIGNATURE_HELP: types.SignatureHelpOptions(
         trigger_characters=["(", ","], retrigger_characters=["=", ")"]
     ),
-    types.TEXT_DOCUMENT_CODE_ACTION: types.CodeActionOptions(
-        [types.CodeActionKind.QuickFix, actions.FIX_ALL]
-    ),
-    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: tokens.LEGEND,
-    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE: tokens.LEGEND,
+    types.TEXT_DOCUMENT_CODE_ACTION: types.CodeActionOptions([types.CodeActionKind.QuickFix, FIX_ALL]),
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: completion.LEGEND,
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE: completion.LEGEND,
     types.TEXT_DOCUMENT_INLAY_HINT: types.InlayHintOptions(resolve_provider=False),
 }
 
@@ -198,7 +194,7 @@ def _answer(server: Server, method: str, params: Any) -> Any:
 
 
 def _handler(method: str) -> Callable[[Server, Any], Any]:
-    """What pygls calls. Where it fails an editor goes on without an answer; the log says why."""
+    """The handler of a method for pygls; a failure leaves the editor without an answer and is logged."""
 
     def handle(ls: Server, params: Any) -> Any:
         try:

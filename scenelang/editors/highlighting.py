@@ -1,9 +1,8 @@
 """Colours for scene text: a Pygments lexer, and the TextMate grammar that editors use.
 
-Registered under the entry point ``pygments.lexers``.
-
-``python -m lab docs words`` writes `grammar/scenelang.tmLanguage.json`. A language server's semantic tokens
-say more where one runs: what a name stands for is beyond regular expressions.
+The lexer is registered under the entry point ``pygments.lexers``. ``python -m lab docs words`` writes the
+grammar to `grammar/scenelang.tmLanguage.json`. Where a language server runs, its semantic tokens say more:
+the meaning of a name is beyond regular expressions.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ WORDS = (
     (nsg.TRANSFORMS | nsg.OPERATIONS, r"(?=\s*\()", Name.Builtin, "support.function.transform"),
     (nsg.FUNCTIONS, r"(?=\s*\()", Name.Builtin.Pseudo, "support.function"),
 )
-"""Words, what follows them, how Pygments calls them, and TextMate."""
+"""Words, a pattern of the text after them, and their kinds for Pygments and for TextMate."""
 _FREE = rf"(?!(?:{'|'.join(nsg.KEYWORDS)})\b){_NAME}"
 
 
@@ -71,9 +70,6 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
     }
 
 
-SCOPE: Final = "source.nsg"
-NAME: Final = tables().patterns["NAME"]
-
 _CAPTURES: Final = "punctuation.definition.{}.nsg"
 
 
@@ -81,7 +77,7 @@ def textmate() -> dict[str, Any]:
     """The grammar as data."""
     return {
         "name": "scenelang",
-        "scopeName": SCOPE,
+        "scopeName": "source.nsg",
         "fileTypes": ["nsg"],
         "patterns": [{"include": f"#{name}"} for name in _REPOSITORY],
         "repository": {name: {"patterns": patterns} for name, patterns in _REPOSITORY.items()},
@@ -96,7 +92,7 @@ def _words(texts: Iterable[str], scope: str, after: str = "") -> dict[str, Any]:
     return {"match": rf"\b(?:{_any(texts)})\b{after}", "name": f"{scope}.nsg"}
 
 
-def _named(word: str, scope: str, what: str = NAME) -> dict[str, Any]:
+def _named(word: str, scope: str, what: str = _NAME) -> dict[str, Any]:
     """A keyword and the name after it."""
     captures = {"1": {"name": f"keyword.declaration.{word}.nsg"}, "2": {"name": f"{scope}.nsg"}}
     return {"match": rf"\b({word})\s+({what})", "captures": captures}
@@ -139,10 +135,10 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     ],
     "keywords": [_words(texts, scope, after) for texts, after, _, scope in WORDS],
     "names": [
-        {"match": rf"{NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
-        {"match": rf"{NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
-        {"match": rf"{NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
-        {"match": NAME, "name": "variable.other.nsg"},
+        {"match": rf"{_NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
+        {"match": rf"{_NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},
+        {"match": rf"{_NAME}(?=\s*=(?!=))", "name": "variable.parameter.nsg"},
+        {"match": _NAME, "name": "variable.other.nsg"},
     ],
     "numbers": [
         {

@@ -1,4 +1,4 @@
-"""Hover and inlay hints: what a word means, and what it came to when the scene was evaluated."""
+"""Hover and inlay hints: the meaning of a word, and its value when the scene was evaluated."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _TABLES: Final = {
 def hover(
     docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
 ) -> types.Hover | None:
-    """What there is to say about an offset.
+    """The hover at an offset.
 
     Args:
-        picture: of an element, in Markdown.
+        picture: gives an element's picture in Markdown.
     """
     use = document.names.at(offset)
     if use is not None:
@@ -78,9 +78,9 @@ def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
 
 
 def _use(docs: Workspace, document: Document, use: Use) -> str | None:
-    found = docs.definition(document, use)
-    if found is not None:
-        return _definition(document, *found)
+    result = docs.definition(document, use)
+    if result is not None:
+        return _definition(document, *result)
     text = use.text
     match use.role:
         case "function" | "constant" | "animated" | "setting":
@@ -110,15 +110,15 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
 
 
 def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
-    """The geometry or the material of an imported file that has a name, as it is shown and told of."""
+    """The geometry or material of an imported file that a name means, in Markdown."""
     worn, symbol = use.role == "material", use.symbol
     if not (worn or use.role == "member") or symbol is None or not isinstance(symbol.node, tree.Import):
         return None
     zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
     if zoo is None:
         return ""
-    found = [element for element in zoo.elements if element.name == name and element.material == worn]
-    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in found]
+    result = [element for element in zoo.elements if element.name == name and element.material == worn]
+    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
         told.append(f"```text\n{name}(): {groups.told(zoo.groups[name])}\n```")
     return "\n\n".join(told)
@@ -147,7 +147,7 @@ def _definition(document: Document, where: Document, symbol: Symbol) -> str:
 
 
 def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
-    """What a place had in a document's last check; None where it has been edited since."""
+    """Values of a place in a document's last check; None where it has been edited since."""
     checked = document.checked
     if checked is None:
         return None
@@ -174,7 +174,7 @@ def describe_values(seen: Seen | None) -> str:
 
 
 def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
-    """A geometry or a material, and what it is."""
+    """A geometry or a material with its description."""
     if text not in about:
         return None
     dimension = words.dimension_of(text)
@@ -205,29 +205,29 @@ def _calls(document: Document, use: Use) -> Iterator[tree.Call]:
 
 
 def _transform_facts(document: Document, use: Use) -> str:
-    """The matrix or the formula that a transform came to."""
+    """The matrix or the formula of a transform."""
     node = next(_calls(document, use), None)
     seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
-    made = seen.values if seen is not None else []
+    values = seen.values if seen is not None else []
     parts = []
-    for item in made[:2]:
+    for item in values[:2]:
         shown = completion.show_transform(item, space_of(document))
         if shown is not None:
             parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
-    more = "\n\n…" if len(made) > 2 else ""
+    more = "\n\n…" if len(values) > 2 else ""
     return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
 
 
 def _node_facts(document: Document, node: Any) -> str:
-    """The composed chain of an object or a group, and how often it was made."""
+    """The composed chain of an object or a group, and the number of times that it was created."""
     if not isinstance(node, tree.Call | tree.Node):
         return ""
     seen = seen_at(document, document, node.span.start, node.span.end)
-    made = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
-    if seen is None or not made:
+    created = [item for item in (seen.values if seen else ()) if getattr(item, "transforms", None)]
+    if seen is None or not created:
         return ""
     space = space_of(document)
-    item = made[0]
+    item = created[0]
     steps = completion.show_chain(item.transforms, space)
     chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
     times = f" (the first of {seen.count})" if seen.count > 1 else ""
@@ -248,7 +248,7 @@ def inlay_hints(
 ) -> list[types.InlayHint]:
     """The hints of a range."""
     low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    found: list[types.InlayHint] = []
+    result: list[types.InlayHint] = []
     for stmt in document.file.statements:
         if stmt.span.end < low or stmt.span.start > high:
             continue
@@ -258,15 +258,15 @@ def inlay_hints(
             if isinstance(node, tree.Let) and settings.value_hints:
                 hint = _value(document, node)
                 if hint is not None:
-                    found.append(hint)
+                    result.append(hint)
             elif isinstance(node, tree.Call | tree.CallExpr) and settings.argument_hints:
-                found += _arguments(docs, document, node)
-    found.sort(key=lambda hint: (hint.position.line, hint.position.character))
-    return found
+                result += _arguments(docs, document, node)
+    result.sort(key=lambda hint: (hint.position.line, hint.position.character))
+    return result
 
 
 def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
-    """What a let came to, unless it is written there or differs from pass to pass."""
+    """The value of a let, unless it is written there or differs from pass to pass."""
     if _is_plain(let.value):
         return None
     seen = seen_at(document, document, let.name.span.start, let.name.span.end)
@@ -297,8 +297,8 @@ def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallE
     args = call.args or ()
     if name in _CLEAR or not args:
         return []
-    found = find_symbol(docs, document, document.names, name, call.name.span.start)
-    callee = word_of(found) if found is not None else word_for_call(name, False)
+    result = find_symbol(docs, document, document.names, name, call.name.span.start)
+    callee = word_of(result) if result is not None else word_for_call(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []
     hints = []
@@ -307,7 +307,7 @@ def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallE
         alike = isinstance(value, tree.NameRef) and value.name.text == param
         if arg.name is not None or alike or isinstance(value, tree.BadExpr):
             continue
-        if found is None and len(param) == 1:
+        if result is None and len(param) == 1:
             continue  # x, y, t: shorter than any help
         place = document.lines.position(arg.span.start)
         hints.append(types.InlayHint(place, f"{param}:", types.InlayHintKind.Parameter, padding_right=True))

@@ -1,4 +1,4 @@
-"""Going about: definition, references, highlights, rename, links; symbols, folding, growing selections."""
+"""Navigation: definition, references, highlights, rename, links, symbols, folding, growing selections."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Refused(Exception):
-    """Why a name cannot be changed."""
+    """Raised where a name cannot be changed, with the reason."""
 
 
 def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
-    """Where the name at an offset is defined; for an import's path the file."""
+    """The definition of the name at an offset; for an import's path the file."""
     use = document.names.at(offset)
     if use is None:
         return None
     if use.role == "path":
         library = docs.imported(document, use.text)
         return types.Location(library.uri, library.lines.range(0, 0)) if library is not None else None
-    found = docs.definition(document, use)
-    if found is None and use.symbol is not None and use.symbol.kind == "import":
-        found = document, use.symbol  # a file of elements
-    if found is None:
+    result = docs.definition(document, use)
+    if result is None and use.symbol is not None and use.symbol.kind == "import":
+        result = document, use.symbol  # a file of elements
+    if result is None:
         return None
-    where, symbol = found
+    where, symbol = result
     return types.Location(where.uri, where.lines.span(symbol.span))
 
 
 def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Document, Use]]:
     use = document.names.at(offset)
-    found = docs.definition(document, use) if use is not None else None
-    return list(docs.uses(*found)) if found is not None else []
+    result = docs.definition(document, use) if use is not None else None
+    return list(docs.uses(*result)) if result is not None else []
 
 
 def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
-    """Every place that means the same as the name at an offset."""
+    """All uses of the definition that the name at an offset means."""
     return [
         types.Location(where.uri, where.lines.range(use.start, use.end))
         for where, use in _uses(docs, document, offset)
@@ -56,17 +56,17 @@ def references(docs: Workspace, document: Document, offset: int, declaration: bo
 
 
 def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
-    """The places of this file that mean the same as the name at an offset."""
+    """The uses in this file of the definition that the name at an offset means."""
     use = document.names.at(offset)
     if use is None:
         return []
-    found = docs.definition(document, use)
+    result = docs.definition(document, use)
 
     def alike(other: Use) -> bool:
-        if found is None:  # a word of the language: the same word elsewhere
+        if result is None:  # a word of the language: the same word elsewhere
             return other.role == use.role
         meant = docs.definition(document, other)
-        return meant is not None and meant[1] is found[1]
+        return meant is not None and meant[1] is result[1]
 
     same = [other for other in document.names.uses if other.text == use.text and alike(other)]
     read, write = types.DocumentHighlightKind.Read, types.DocumentHighlightKind.Write
@@ -86,29 +86,29 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
     use = document.names.at(offset)
     if use is None:
         return None
-    found = docs.definition(document, use)
-    if found is None:
+    result = docs.definition(document, use)
+    if result is None:
         raise Refused(f"`{use.text}` is not defined in a scene file")
-    _check_owner(found[0], use)
+    _check_owner(result[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
 
 def rename(
     docs: Workspace, document: Document, offset: int, new: str, versioned: bool
 ) -> types.WorkspaceEdit | None:
-    """Change a name wherever it is meant, in all files.
+    """Rename a definition and all its uses, in all files.
 
     Args:
-        versioned: whether the client knows edits of a version of a document.
+        versioned: whether the client supports edits of a version of a document.
 
     Raises:
-        Refused: the new name is none, or would mean something else somewhere.
+        Refused: the new name is not a name, or would mean something else somewhere.
     """
     use = document.names.at(offset)
-    found = docs.definition(document, use) if use is not None else None
-    if found is None or use is None:
+    result = docs.definition(document, use) if use is not None else None
+    if result is None or use is None:
         return None
-    where, symbol = found
+    where, symbol = result
     _check_owner(where, use)
     if new == symbol.name:
         return None
@@ -143,7 +143,7 @@ def _check_name(new: str, symbol: Symbol) -> None:
 
 
 def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
-    """Whether at a place that is renamed the new name stands for something else already."""
+    """Raise `Refused` where the new name already means something else at a place to rename."""
     if place.role in ("member", "argument"):
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
@@ -157,7 +157,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
 
 
 def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
-    """Whether the renamed definition would be meant where the new name means something else now."""
+    """Raise `Refused` where the new name, now of something else, would come to mean the definition."""
     scope = symbol.scope
     if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
         raise Refused(f"`{symbol.owner.name}` has a parameter `{new}` already")
@@ -177,15 +177,15 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
 
 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
-    """Imports that can be followed."""
-    found = []
+    """Links of imports whose files there are."""
+    result = []
     for stmt in document.file.statements:
         if isinstance(stmt, tree.Import):
             library = docs.imported(document, stmt.path.value)
             if library is not None and library.path is not None:
                 place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
-                found.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
-    return found
+                result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    return result
 
 
 Kind = types.SymbolKind
@@ -260,7 +260,7 @@ def _entry(stmt: tree.Stmt) -> tuple[str, types.SymbolKind, Any, tuple[tree.Stmt
 
 def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol]:
     """Definitions at the top of all files whose names have the letters of a query, in order."""
-    query, found = query.lower(), []
+    query, result = query.lower(), []
     for document in docs.known():
         for stmt in document.file.statements:
             if isinstance(stmt, tree.Param | tree.Let | tree.Fn | tree.Module):
@@ -269,10 +269,12 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
                     continue
                 place = types.Location(document.uri, document.lines.span(stmt.name.span))
                 kind = _DEFINES[type(stmt)]
-                found.append(types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name))
-                if len(found) >= 500:
-                    return found
-    return found
+                result.append(
+                    types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name)
+                )
+                if len(result) >= 500:
+                    return result
+    return result
 
 
 # ---------------------------------------------------------------- folding
@@ -280,13 +282,13 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
 
 def folding(document: Document) -> list[types.FoldingRange]:
     """Blocks, brackets, comments and runs of imports that take more than a line."""
-    found: dict[int, types.FoldingRange] = {}
+    result: dict[int, types.FoldingRange] = {}
     lines = document.lines
 
     def add(start: int, end: int, kind: types.FoldingRangeKind | None = None, tail: int = 0) -> None:
         first, last = lines.position(start).line, lines.position(end).line - tail
         if last > first:
-            found.setdefault(first, types.FoldingRange(first, last, kind=kind))
+            result.setdefault(first, types.FoldingRange(first, last, kind=kind))
 
     for stmt in document.file.statements:
         for node in walk(stmt):
@@ -300,7 +302,7 @@ def folding(document: Document) -> list[types.FoldingRange]:
     for match in _COMMENT.finditer(document.text):
         if not match[0].startswith('"'):
             add(match.start(), match.end() - match[0].endswith("\n"), types.FoldingRangeKind.Comment)
-    return [found[line] for line in sorted(found)]
+    return [result[line] for line in sorted(result)]
 
 
 def selection(document: Document, offset: int) -> types.SelectionRange:
@@ -309,11 +311,11 @@ def selection(document: Document, offset: int) -> types.SelectionRange:
     use = document.names.at(offset)
     if use is not None:
         spans.append((use.start, use.end))
-    found: types.SelectionRange | None = None
+    result: types.SelectionRange | None = None
     last = (-1, -1)
     for start, end in spans:
         if (start, end) != last and (last == (-1, -1) or (last[0] <= start and end <= last[1])):
-            found = types.SelectionRange(document.lines.range(start, end), found)
+            result = types.SelectionRange(document.lines.range(start, end), result)
             last = (start, end)
-    assert found is not None
-    return found
+    assert result is not None
+    return result

@@ -1,7 +1,7 @@
-"""The server: requests of the client to the functions of this package, diagnostics and fixes back.
+"""The language server: one client's session, its checks, diagnostics, fixes and formatting.
 
-Syntax answers at once, in the loop that reads messages. Evaluation waits until the typing pauses and runs on
-a thread of its own; what it finds is dropped where the text has changed meanwhile.
+Syntax is checked at once, in the loop that reads messages. Evaluation waits until the typing pauses and runs
+on a thread of its own; its result is dropped where the text has changed meanwhile.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from scenelang.editors.workspace import (
     path_of,
     uri_of,
 )
-from scenelang.language import pages
+from scenelang.language import pages, tree
 from scenelang.language.diagnostics import Diagnostic, Span, apply_fixes
 from scenelang.language.pages import CODES
 
@@ -54,7 +54,7 @@ def to_location(span: Span, document: Document) -> types.Location:
 
 
 def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic | None:
-    """A diagnostic for the client; one of an imported file stands at what led there, if this file did."""
+    """A diagnostic for the client; one of an imported file is placed at the import, None without one."""
     d, name = diagnostic, document.source.name
     message = d.message if d.help is None else f"{d.message}\nhelp: {d.help}"
     related = [
@@ -90,8 +90,6 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
 
 def _import_of(name: str, document: Document) -> Span | None:
     """The import statement that brings a file, or the first one where it is brought by another."""
-    from scenelang.language import tree
-
     imports = [stmt for stmt in document.file.statements if isinstance(stmt, tree.Import)]
     for stmt in imports:
         if name.endswith(Path(stmt.path.value).name):
@@ -109,19 +107,19 @@ def _description(code: str) -> types.CodeDescription | None:
 
 
 FIX_ALL: Final = "source.fixAll.scenelang"
-_MOST_LINES: Final = 4000  # of a difference that is looked at line by line
+_MOST_LINES: Final = 4000  # of a difference that is compared line by line
 
 
 def code_actions(
     document: Document, place: types.Range, only: Sequence[str] | None
 ) -> list[types.CodeAction]:
-    """What may be done about the mistakes in a range: of the kinds asked for, or of all."""
+    """Code actions for the mistakes in a range: of the kinds asked for, or of all."""
     lines = document.lines
     start, end = lines.offset(place.start), lines.offset(place.end)
-    found = [*document.syntax, *document.semantic]
+    result = [*document.syntax, *document.semantic]
     here = [
         d
-        for d in found
+        for d in result
         if d.span is not None
         and d.span.source.name == document.source.name
         and lines.position(d.span.start).line <= lines.position(end).line
@@ -132,12 +130,12 @@ def code_actions(
         near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
         actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
     if _wants(only, FIX_ALL):
-        actions += _fix_all(document, found)
+        actions += _fix_all(document, result)
     return actions
 
 
 def _wants(only: Sequence[str] | None, kind: str) -> bool:
-    """Whether a kind is asked for; `source` asks for `source.fixAll` too."""
+    """True where a kind is asked for; `source` asks for `source.fixAll` too."""
     if not only:
         return True
     return any(kind == asked or kind.startswith(f"{getattr(asked, 'value', asked)}.") for asked in only)
@@ -160,8 +158,8 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
     )
 
 
-def _fix_all(document: Document, found: Sequence[Diagnostic]) -> list[types.CodeAction]:
-    text, done = apply_fixes(document.text, [d for d in found if _is_ours(document, d)])
+def _fix_all(document: Document, diagnostics: Sequence[Diagnostic]) -> list[types.CodeAction]:
+    text, done = apply_fixes(document.text, [d for d in diagnostics if _is_ours(document, d)])
     if not done or text == document.text:
         return []
     title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
@@ -173,7 +171,7 @@ def _fix_all(document: Document, found: Sequence[Diagnostic]) -> list[types.Code
 
 
 def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
-    """The edits that lay a text out in the canonical way, or the statements that a range touches.
+    """Edits that format a text, or the statements that a range touches.
 
     Raises:
         SceneError: the text has syntax errors.
@@ -211,7 +209,7 @@ def text_edits(document: Document, text: str) -> list[types.TextEdit]:
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
 MAX_PAUSE_MS: Final = 60_000
-MAX_DRAWN: Final = 100  # thumbnails that are kept
+MAX_DRAWN: Final = 100  # thumbnails that are cached
 _LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
 _MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
 _CHUNK: Final = 1 << 16
@@ -219,10 +217,10 @@ _LONGEST: Final = 64  # bytes of a header that counts
 
 
 class Settings(Record):
-    """What the client may set, as ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
 
     Args:
-        debounce_ms: how long typing has to pause before a scene is evaluated.
+        debounce_ms: pause in typing after which a scene is evaluated.
         model: draw with this model instead of the scene's.
         root: the folder that imports cannot leave, instead of the scene's.
     """
@@ -235,7 +233,7 @@ class Settings(Record):
 
     @classmethod
     def read(cls, options: Any) -> Settings:
-        """What a client sent; what is missing, of another type or out of range has its default."""
+        """Read a client's settings; one that is missing, of another type or out of range has its default."""
         given = options.get("scenelang", options) if isinstance(options, dict) else None
         if not isinstance(given, dict):
             return cls()
@@ -254,10 +252,10 @@ class Settings(Record):
 
 
 class Incoming:
-    """A stream whose messages of 100 MB and more are passed over, up to the next one's header.
+    """A stream that skips messages of 100 MB and more, up to the next one's header.
 
-    No JSON holds a line that ends like a header, as newlines in strings are escaped. For each message that is
-    passed over, ``refuse`` is called from the thread that reads.
+    No JSON holds a line that ends like a header, as newlines in strings are escaped. ``refuse`` is called for
+    each skipped message, from the thread that reads.
     """
 
     def __init__(self, stream: BinaryIO, refuse: Callable[[], None]) -> None:
@@ -295,7 +293,7 @@ class Protocol(LanguageServerProtocol):
     """pygls's protocol without its own copies of documents, which split lines by other rules."""
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """A message from its JSON; a request that is none of the protocol's is answered as such."""
+        """A message from its JSON; a request that the protocol does not have is answered by an error."""
         try:
             return super().structure_message(data)
         except JsonRpcException as error:
@@ -321,7 +319,7 @@ class Server(LanguageServer):
         super().__init__("scenelang", version("scenelang"), protocol_cls=Protocol)
         self.docs = Workspace()
         self._draw = draw
-        self._drawn: dict[str, str] = {}  # what `thumbnail` says, by digest
+        self._drawn: dict[str, str] = {}  # results of `thumbnail`, by digest
         self.settings = Settings()
         self.was_shut_down = False
         self._timers: dict[str, asyncio.TimerHandle] = {}
@@ -329,7 +327,7 @@ class Server(LanguageServer):
         self._pool = ThreadPoolExecutor(1, "check")
 
     def begin(self, params: types.InitializeParams) -> None:
-        """Take over what the client says about itself."""
+        """Take over the client's encoding, folders and settings."""
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _DEEP))
         encoding = str(getattr(self.workspace.position_encoding, "value", self.workspace.position_encoding))
         folders = [path_of(folder.uri) for folder in params.workspace_folders or ()]
@@ -366,9 +364,9 @@ class Server(LanguageServer):
     # ------------------------------------------------------------ diagnostics
 
     def publish(self, document: Document) -> None:
-        """Send what is known now: the syntax of this text, and what the last check found, moved along."""
-        found = [*document.syntax, *document.semantic]
-        shown = [d for d in (to_diagnostic(item, document) for item in found) if d is not None]
+        """Send all current diagnostics: those of syntax, and those of the last check, moved."""
+        result = [*document.syntax, *document.semantic]
+        shown = [d for d in (to_diagnostic(item, document) for item in result) if d is not None]
         self.text_document_publish_diagnostics(
             types.PublishDiagnosticsParams(document.uri, shown, document.version)
         )

@@ -1,13 +1,13 @@
-"""Documents of the client, their imports, positions, and what can be said of them in the background.
+"""Documents of the client, their imports and positions, and the check that runs in the background.
 
 The protocol counts lines, ended by LF, CRLF or CR, and columns in code units of an encoding that client and
 server agree on; everything here counts code points of the whole text.
 
-Nothing here touches a `Document`: a check gets what it needs when it begins and gives back one value, so that
-it may run beside the editing.
+A check does not touch a `Document`: it gets its input when it begins and returns one value, so that it may
+run while the user edits.
 
-An open buffer counts for its file, on the disk or not yet. Files that are not open are read when asked for,
-again when they have changed.
+An open buffer stands for its file, which need not be on the disk yet. Files that are not open are read when
+they are needed, and again when they have changed.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.compiler.check import check_compiles, check_frames
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.manifest import Manifest
+from scenelang.editors.dumps import common_start
 from scenelang.language import library, tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Fix, Label, SourceFile, Span
 from scenelang.language.diagnostics import Edit as Change
@@ -59,15 +60,9 @@ class Edit:
 
 def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
     """The shortest single edit from one text, or list of lines, to another."""
-    start = _alike(old, new)
-    end = _alike(old[start:][::-1], new[start:][::-1])
+    start = common_start(old, new)
+    end = common_start(old[start:][::-1], new[start:][::-1])
     return Edit(start, len(old) - end, len(new) - end)
-
-
-def _alike(left: Sequence[str], right: Sequence[str]) -> int:
-    """Number of items with which both sequences begin."""
-    pairs = enumerate(zip(left, right, strict=False))
-    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
 
 class Lines:
@@ -80,7 +75,7 @@ class Lines:
         self._plain = text.isascii()
 
     def _end(self, line: int) -> int:
-        """Where a line ends, its newline left out."""
+        """The offset of a line's end, its newline left out."""
         if line + 1 == len(self.starts):
             return len(self.text)
         end = self.starts[line + 1] - 1
@@ -123,7 +118,7 @@ class Lines:
 
 
 def width(text: str, encoding: Encoding) -> int:
-    """How many code units a text has."""
+    """The number of a text's code units."""
     if encoding == "utf-32" or text.isascii():
         return len(text)
     if encoding == "utf-8":
@@ -140,7 +135,7 @@ def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple
     return text[:start] + change.text + text[end:], Edit(start, end, start + len(change.text))
 
 
-MAX_SEEN: Final = 4  # values and nodes kept of one place
+MAX_SEEN: Final = 4  # values and nodes that are recorded of one place
 
 
 class Superseded(Exception):
@@ -149,11 +144,11 @@ class Superseded(Exception):
 
 @dataclass(slots=True)
 class Seen:
-    """What one place had while a scene was evaluated.
+    """Values or nodes of one place during an evaluation.
 
     Args:
-        values: of the first frame the first few, in order, equal ones once.
-        count: how many there were.
+        values: the first few of the first frame, in order, each once.
+        count: the number of all.
     """
 
     values: list[Any] = field(default_factory=list)
@@ -162,7 +157,7 @@ class Seen:
 
 @dataclass(slots=True)
 class Checked:
-    """What a check found.
+    """The result of a check.
 
     Args:
         diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
@@ -193,7 +188,7 @@ def check(
         file: the tree.
         path: its file, if it has one.
         root: the folder that imports cannot leave; by default the file's.
-        texts: what open files hold.
+        texts: texts of open files.
         model: draw with this model instead of the scene's.
         parsed: the text has no syntax mistakes.
         stop: asks it to give up.
@@ -201,7 +196,7 @@ def check(
     Raises:
         Superseded: ``stop`` was set meanwhile.
     """
-    found, frame = Diagnostics(), 0
+    result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
 
     def watch(span: Span, value: Any) -> None:
@@ -219,19 +214,19 @@ def check(
             raise Superseded
 
     source = Source(path, tree=file, model=model, root=root, texts=texts)
-    evaluation = source.evaluation(found, replays=True, watch=watch)
+    evaluation = source.evaluation(result, replays=True, watch=watch)
     scene, spans = evaluation.run(0)
     after("evaluate")
     manifest = None
     if parsed:
-        find_unused(file, found)
+        find_unused(file, result)
         if scene is not None:
-            manifest = check_compiles(scene, spans, found, after=after)
+            manifest = check_compiles(scene, spans, result, after=after)
         frame = 1
-        check_frames(evaluation, found, first=scene, after=after)
+        check_frames(evaluation, result, first=scene, after=after)
         after("frames")
     wanted = frozenset(evaluation.wanted)
-    return Checked(file.span.source, in_file_order(found.items), wanted, seen, manifest)
+    return Checked(file.span.source, in_file_order(result.items), wanted, seen, manifest)
 
 
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
@@ -244,12 +239,12 @@ class Document:
     """A text with its tree and what is known about it.
 
     Args:
-        uri: what the client calls it.
+        uri: its address for the client.
         path: its resolved file; None for a buffer that has none.
         version: the client's number of this text; None for a file that is not open.
         checked: the last evaluation that ended, perhaps of an older text.
-        edits: what has been edited since that.
-        semantic: what it found, at the places of now.
+        edits: the edits since that.
+        semantic: its diagnostics, at their current places.
     """
 
     uri: str
@@ -263,7 +258,7 @@ class Document:
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
         return self.path.name if self.path is not None else self.uri
 
     @property
@@ -307,8 +302,8 @@ class Document:
             help = "`scenelang check` does, up to 10 MB"
             nowhere = Span(self.source, 0, 0)
             return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
-        found = Diagnostics()
-        return parse(self.source, found), tuple(found)
+        result = Diagnostics()
+        return parse(self.source, result), tuple(result)
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
@@ -321,7 +316,7 @@ class Document:
             self.__dict__.pop(name, None)
 
     def before(self, offset: int) -> int | None:
-        """Where a place stood in the text that was checked; None where it has been edited since."""
+        """The offset of a place in the text that was checked; None where it has been edited since."""
         for edit in reversed(self.edits):
             if offset >= edit.new_end:
                 offset -= edit.delta
@@ -373,11 +368,11 @@ class Workspace:
         return document
 
     def get(self, uri: str) -> Document | None:
-        """An open buffer, or the file that the address means."""
+        """An open buffer, or the file of an address."""
         return self.open.get(uri) or self.by_path(_resolved(path_of(uri)))
 
     def by_path(self, path: Path | None) -> Document | None:
-        """The document of a resolved file: its buffer, or what is on the disk."""
+        """The document of a resolved file: its buffer, or the file on the disk."""
         if path is None:
             return None
         for document in self.open.values():
@@ -399,7 +394,7 @@ class Workspace:
         return document
 
     def texts(self) -> dict[Path, str]:
-        """What open files hold, for imports."""
+        """The texts of open files, for imports."""
         return {d.path: d.text for d in self.open.values() if d.path is not None}
 
     def known(self) -> Iterator[Document]:
@@ -418,7 +413,7 @@ class Workspace:
     # ------------------------------------------------------------ names across files
 
     def imported(self, document: Document, text: str) -> Document | None:
-        """The document that an import's path means."""
+        """The document of an import's path."""
         if library.is_reserved(text):
             return self.by_path(library.find(text))
         return self.by_path(self._place(document, text))
@@ -434,14 +429,14 @@ class Workspace:
             return None
 
     def _place(self, document: Document, text: str) -> Path | None:
-        """The file that a path in a document means."""
+        """The file of a path in a document."""
         folder = document.path.parent if document.path is not None else next(iter(self.folders), None)
         if folder is None or not text or "\0" in text or os.path.isabs(text) or PureWindowsPath(text).drive:
             return None
         return _resolved(folder / text)
 
     def definition(self, document: Document, use: Use) -> tuple[Document, Symbol] | None:
-        """Where what a use means is defined, over as many files as it takes."""
+        """The definition that a use means, with its file, also across imports."""
         if use.role == "argument":
             callee = self.definition(document, use.callee) if use.callee is not None else None
             if callee is None:
@@ -456,11 +451,11 @@ class Workspace:
         library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
         if library is None:
             return None
-        found = library.names.top.symbols.get(use.text.partition(".")[0])
-        return (library, found) if found is not None and found.is_exported else None
+        result = library.names.top.symbols.get(use.text.partition(".")[0])
+        return (library, result) if result is not None and result.is_exported else None
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:
-        """Every place that means a definition; its own is among them."""
+        """All uses of a definition, its own place among them."""
         for use in document.names.uses:
             target = self.definition(document, use) if use.text == symbol.name else None
             if target is not None and target[1] is symbol:
@@ -479,7 +474,7 @@ class Workspace:
 
 
 def scenes_below(folder: Path, most: int) -> Iterator[Path]:
-    """The scenes in a folder, hidden folders left out; so many files are looked at."""
+    """The scenes in a folder, hidden folders left out, among its first ``most`` files."""
     count = 0
     for where, inner, files in os.walk(folder):
         inner[:] = sorted(name for name in inner if not name.startswith(".") and name != "node_modules")

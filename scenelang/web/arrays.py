@@ -1,14 +1,14 @@
-"""What a page gets beside its form: scripts, arrays, grids, and Programs as rows.
+"""Parts of a page: its script, the blob of arrays, elements, and the rows of a Program.
 
-The files of ``web/`` are ES modules for the sake of editors and tests. A page gets them one after the other
-in one scope, without their imports and exports, so names at their top level differ across all of them.
+The files of ``viewer/`` are ES modules for the sake of editors and tests. A page gets them one after the
+other in one scope, without imports and exports, so names at their top level differ across all of them.
 
-They are named in the data as ``[kind, offset, count]``, with a kind of `KINDS`, an offset in bytes into the
-blob, a multiple of 4, and a count of numbers.
+Arrays lie in one blob. The data names an array as ``[kind, offset, count]``: a kind of `KINDS`, an offset in
+bytes into the blob, a multiple of 4, and a count of numbers. Pyramids of elements are unfolded by the page
+(``viewer/grids.js``), as their steps, deflated, are a fifth of the grid.
 
-The page unfolds pyramids itself (``web/grids.js``): its steps are a fifth of the grid, deflated.
-
-The page's own evaluator (``web/graph.js``) makes rows of a scene; rows of a Program never change.
+Rows of a Program never change; those of a scene with params are made by the page's evaluator
+(``viewer/graph.js``).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MODULES: Final = (
     *("elements", "balls", "solid"),
     *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
 )
-"""Of ``web/``; each stands behind what it imports."""
+"""Files of ``viewer/``, each behind those that it imports."""
 
 _IMPORT: Final = re.compile(r'^import \{[^}]*\} from "[^"]*";\n', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(?:async )?(?:function|class|const)\b)", re.MULTILINE)
@@ -51,12 +51,12 @@ _EXPORT: Final = re.compile(r"^export (?=(?:async )?(?:function|class|const)\b)"
 
 @cache
 def script() -> str:
-    """All of it, to stand in a function or a module."""
+    """The script of a page, for the body of a function or a module."""
     return "\n".join(_EXPORT.sub("", _IMPORT.sub("", web(f"{name}.js"))) for name in MODULES)
 
 
 def web(name: str) -> str:
-    """The text of a file of ``web/``."""
+    """The text of a file of ``viewer/``."""
     return files("scenelang").joinpath("web/viewer", name).read_text("utf-8")
 
 
@@ -71,14 +71,14 @@ KINDS: Final = {
 
 
 class Store:
-    """Arrays one after the other, as they lie in the blob."""
+    """The blob of arrays, one after the other."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
         self._size = 0
 
     def add(self, array: np.ndarray) -> list[Any]:
-        """Take in an array of a dtype of `KINDS` and return what names it in the data."""
+        """Add an array of a dtype of `KINDS`; return its name in the data."""
         data = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<")).tobytes()
         name = [KINDS[array.dtype.name], self._size, array.size]
         self._parts.append(data + bytes(-len(data) % 4))
@@ -128,15 +128,15 @@ def _shape(element: Element, store: Store) -> dict[str, Any]:
 
 @lru_cache(maxsize=32)
 def bounds_of(element: Element) -> tuple[float, float, float]:
-    """Of an element of the plane x, y and r: it is no nearer than |q.x| - x, |q.y| - y and |q| - r."""
+    """Numbers x, y and r for an element of the plane: it is no nearer than |q.x| - x, |q.y| - y, |q| - r."""
     grid = unpacked(element)
     axis = np.linspace(-1.0, 1.0, len(grid))
     x, y = np.meshgrid(axis, axis, indexing="ij")
-    # a cell's distances lie between those of its nodes, and beyond the square they grow as the way out does
+    # a cell's distances lie between those of its nodes; outside the square they grow with the distance to it
     least = np.min([grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]], 0)
     most = [np.maximum(length[:-1, :-1], length[1:, 1:]) for length in (abs(x), abs(y))]
-    found = [float((length - least).max()) for length in (*most, np.hypot(*most))]
-    return max(found[0], 1.0), max(found[1], 1.0), max(found[2], 2.0**0.5)
+    result = [float((length - least).max()) for length in (*most, np.hypot(*most))]
+    return max(result[0], 1.0), max(result[1], 1.0), max(result[2], 2.0**0.5)
 
 
 def _picture(element: Element, store: Store) -> dict[str, Any]:
@@ -236,10 +236,10 @@ def stage_of(stage: Stage) -> dict[str, Any]:
 
 
 def _index(known: np.ndarray, code: np.ndarray) -> int:
-    found = np.flatnonzero((known.astype(np.float32) == code).all(1))
-    if not len(found):
+    result = np.flatnonzero((known.astype(np.float32) == code).all(1))
+    if not len(result):
         raise ProgramError("codes that are not the model's")
-    return int(found[0])
+    return int(result[0])
 
 
 def _scales(program: Program, layout: Layout) -> list[float]:

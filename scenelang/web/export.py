@@ -1,4 +1,4 @@
-"""Scenes as pages that draw themselves: the view of a scene, the page around it, `scenelang.export`."""
+"""Scenes as pages that draw themselves: the view of a scene, its text for screen readers, the page."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from scenelang.drawing.image import Image
 
 
-MOST: Final = 5  # kinds of objects and colours that are named
+MOST: Final = 5  # kinds of objects, and colours, that a text names
 _HUES: Final = (
     (0.03, "red"),
     (0.11, "orange"),
@@ -58,7 +58,7 @@ _HUES: Final = (
     (0.80, "purple"),
     (0.95, "pink"),
     (1.00, "red"),
-)  # up to which hue, in turns, a colour is called so
+)  # the largest hue, in turns, of each name
 
 _PLURALS: Final = {"torus": "tori"}
 
@@ -95,7 +95,7 @@ def alternative(data: dict[str, Any]) -> str:
 
 
 def colour_name(rgb: Iterable[float]) -> str:
-    """What an sRGB colour is called, in one or two words."""
+    """The name of an sRGB colour, in one or two words."""
     r, g, b = (min(1.0, max(0.0, float(v))) for v in rgb)
     hue, light, _ = colorsys.rgb_to_hls(r, g, b)
     chroma = max(r, g, b) - min(r, g, b)
@@ -120,8 +120,7 @@ def _colour(data: dict[str, Any], row: dict[str, Any]) -> Iterable[float]:
 def _counted(names: Iterable[str]) -> str:
     """``2 squares, a pentagon and a star``."""
     counts = Counter(names)
-    told = [_several(name, n) for name, n in counts.most_common(MOST)]
-    return _listed(told, len(counts))
+    return _listed([_several(name, n) for name, n in counts.most_common(MOST)], len(counts))
 
 
 def _several(name: str, count: int) -> str:
@@ -141,7 +140,7 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What a page draws.
+    """The content of a page.
 
     Args:
         data: JSON data; docs/architecture.md has its parts.
@@ -226,7 +225,7 @@ def view_of(
 
 
 def _measured(manifest: Manifest) -> dict[str, Any]:
-    """How far the model is from the exact picture on the scenes of its own set."""
+    """Errors of a model against exact pictures, on the scenes of its own set."""
     figures = manifest.measured.get("sets", {}).get(manifest.set)
     if figures is None:
         return {}
@@ -271,7 +270,7 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
         "width": str(width),
         "height": str(height),
         "alt": alt,
-        "model": told(data["model"]),
+        "model": about_model(data["model"]),
         "view": packed(view.message().encode()),
         "code": packed(code.encode()),
         "loader": loader,
@@ -280,23 +279,23 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
 
 
 def control_rows(view: View) -> int:
-    """About how high the controls of a view are, in rem."""
+    """The approximate height of a view's controls, in rem."""
     data = view.data
     fixed = {one["name"] for one in data["fixed"]}
     live = [param for param in data["params"] if param["name"] not in fixed]
-    told = sum("label" in param for param in live)
+    labels = sum("label" in param for param in live)
     timeline, camera = bool(data["animation"]), bool(data["dimension"] == 3)
-    return ceil(2.5 * len(live) + 1.5 * told + 2 * len(fixed) + 3 * bool(live) + 3 * timeline + 6 * camera)
+    return ceil(2.5 * len(live) + 1.5 * labels + 2 * len(fixed) + 3 * bool(live) + 3 * timeline + 6 * camera)
 
 
 def plain(text: str) -> str:
-    """A text whose controls, marks of direction among them, are written out, such as ⟨U+202E⟩."""
+    """A text with control characters, marks of direction among them, written out: ⟨U+202E⟩."""
     hidden = ("Cc", "Cf", "Cs", "Co", "Zl", "Zp")
     return "".join(f"⟨U+{ord(c):04X}⟩" if unicodedata.category(c) in hidden else c for c in text)
 
 
-def told(model: dict[str, Any]) -> str:
-    """What the page says of its model, as HTML."""
+def about_model(model: dict[str, Any]) -> str:
+    """A sentence about a model, as HTML."""
     name, summary = (f"<bdi>{escape(plain(model[key]))}</bdi>" for key in ("name", "summary"))
     line = f"Drawn by the neural network {name} ({summary})"
     figures = model.get("measured") or {}
@@ -334,8 +333,8 @@ def export(
     """Write an HTML page that draws a scene in any browser with WebGL2 and asks for nothing else.
 
     Args:
-        source: a scene's file, whose params the page can change and whose animation it plays; or a compiled
-            Program's (.safetensors), a Scene or a Program, which are as they are.
+        source: the file of a scene, whose params the page can change and whose animation it plays; or the
+            file of a Program (.safetensors), a Scene or a Program, which do not change.
         out: the page.
         params: values for a file's params that the page starts from; as for `scenelang.load`.
         size: canvas in pixels instead of the scene's; the picture keeps its aspect.
@@ -376,11 +375,11 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]
     if isinstance(source, Scene):
         scene: Scene | None = source
     else:
-        found = Diagnostics()
-        evaluation = source.evaluation(found)
+        result = Diagnostics()
+        evaluation = source.evaluation(result)
         scene = evaluation.run(0)[0]
-        if scene is None or found.errors:
-            raise SceneError(found)
+        if scene is None or result.errors:
+            raise SceneError(result)
     assert scene is not None
     program = compile_scene(scene)
     return scene_view(program, scene, evaluation, title=title), program
@@ -392,9 +391,9 @@ def scene_view(
     """The view of a compiled scene.
 
     Args:
-        program: what the page shows first.
-        scene: what it was compiled from, where there is one.
-        evaluation: of the text of that scene, after the run that gave it, where there is one.
+        program: compiled from the scene; the page shows it at first.
+        scene: None for a Program from a file.
+        evaluation: of the scene's text, after the run that gave the scene; None for one without text.
         title: of the page.
     """
     source: list[tuple[str, str]] = []
@@ -411,7 +410,7 @@ def scene_view(
 
 
 def still(program: Program) -> bytes:
-    """A picture of a Program as WebP, large enough that what is small in it can be read."""
+    """A picture of a Program as WebP, large enough for its small parts."""
     side = STILL_SIDE[2 if program.stage is None else 3] / max(program.canvas)
     width, height = (max(1, round(side * length)) for length in program.canvas)
     return _packed(render(replace(program, canvas=(width, height))).to_pil())
@@ -424,7 +423,7 @@ def frame(value: Scene | Program, picture: Image) -> str:
         picture: of the value, for browsers that cannot draw it.
 
     Returns:
-        Nothing where no page can draw its model.
+        The HTML, empty where no page can draw its model.
     """
     program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
     try:
@@ -452,6 +451,6 @@ def _packed(picture: PIL.Image.Image) -> bytes:
 
 
 def _shown(name: str, first: str) -> str:
-    """What a page calls a file: by its place beside the scene's, and of others only their names."""
+    """A file's name on a page: its path from the scene's folder; of a file outside it the last part alone."""
     place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
     return Path(name).name if place.startswith("../") else place

@@ -1,4 +1,4 @@
-"""The folder that `play` serves: scenes, unsaved texts, files that were made, and messages of the page."""
+"""The folder that `play` serves, unsaved texts, files for download, and messages of the page."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import secrets
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +23,7 @@ from scenelang.language.session import Unreadable, decode_source
 
 MOST_FILES: Final = 2000
 MOST_LOOKED: Final = 20_000
-"""Files that are looked at for scenes; in a folder with more only those at its top are watched."""
+"""Files that are searched for scenes; in a folder with more only those at its top are watched."""
 _MOST_PARTS: Final = 8
 _MOST_NAME: Final = 200  # bytes of a name; a temporary file beside it has a few more
 # Control characters, what Windows gives a meaning, what turns the direction of a text, halves of characters.
@@ -33,7 +34,23 @@ _DEVICE: Final = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9Â¹Â
 
 
 class Refused(Exception):
-    """What is asked of a file cannot be done; the message says why."""
+    """Raised where a request cannot be granted; the message says why."""
+
+
+class JobFailed(Exception):
+    """Raised where a job has no result; the message says why."""
+
+
+class Answer(Record):
+    """Result of a job.
+
+    Args:
+        data: sent to the page.
+        head: facts for the server.
+    """
+
+    data: bytes
+    head: dict[str, Any] = field(default_factory=dict)
 
 
 class Changed(Exception):
@@ -48,7 +65,7 @@ class Folder:
     """A folder of scenes.
 
     Args:
-        path: where it is.
+        path: the folder.
         root: the folder that imports cannot leave; None for each scene's own.
     """
 
@@ -58,7 +75,7 @@ class Folder:
 
     def names(self) -> list[str]:
         """The scenes in it and below, sorted; hidden folders and links to folders left out."""
-        found: list[str] = []
+        result: list[str] = []
         looked = 0
         for where, inner, files in os.walk(self.path):
             deep = len(Path(where).relative_to(self.path).parts)
@@ -68,18 +85,18 @@ class Folder:
             for file in files:
                 name = Path(where, file).relative_to(self.path).as_posix()
                 if fits(name):
-                    found.append(name)
+                    result.append(name)
             looked += len(files) + len(inner)
             self.is_large = looked > MOST_LOOKED
-            if self.is_large or len(found) > MOST_FILES:
+            if self.is_large or len(result) > MOST_FILES:
                 break
-        return sorted(found, key=lambda name: (name.count("/"), name))[:MOST_FILES]
+        return sorted(result, key=lambda name: (name.count("/"), name))[:MOST_FILES]
 
     def place(self, name: str) -> Path:
-        """Where a file is or would be; links lead to what lies inside.
+        """The path of a file, which need not be there.
 
         Raises:
-            Refused: it has no name that a scene may have, or lies outside.
+            Refused: the name is not one of a scene, or leads out of the folder.
         """
         if not fits(name):
             raise Refused(f"`{repr(name[:80])[1:-1]}` is not the name of a scene in this folder")
@@ -113,10 +130,10 @@ class Folder:
         """Write a file whole, with the line ends that it has; returns its digest.
 
         Args:
-            base: the digest of what is there now; None where nothing is.
+            base: the digest of the current file; None where there is none.
 
         Raises:
-            Changed: something else is there.
+            Changed: the file has another digest.
             Refused: it cannot be written, or is, or lies behind, a link.
         """
         path = self.place(name)
@@ -138,7 +155,7 @@ class Folder:
         return _digest(data)
 
     def rename(self, name: str, to: str) -> None:
-        """Give a file another name, which none may have; raises `Refused`."""
+        """Give a file a name that no other has; raises `Refused`."""
         old, new = self.place(name), self.place(to)
         if old.is_symlink() or not old.is_file():
             raise Refused(f"there is no file `{name}`")
@@ -152,14 +169,14 @@ class Folder:
             raise Refused(f"cannot rename `{name}`: {_reason(error)}") from None
 
     def holds(self, path: str) -> bool:
-        """Whether an absolute path leads to a place in the folder."""
+        """True where an absolute path leads to a place in the folder."""
         try:
             return "\0" not in path and Path(path).resolve().is_relative_to(self.path)
         except (OSError, RuntimeError, ValueError):
             return False
 
     def name_of(self, path: Path) -> str | None:
-        """What a path is called here; None for what is not a scene of this folder."""
+        """The name of a path in this folder; None where it is not a scene of it."""
         try:
             name = path.relative_to(self.path).as_posix()
         except ValueError:
@@ -168,7 +185,7 @@ class Folder:
 
 
 def fits(name: str) -> bool:
-    """Whether a name is one that a scene may have, on any system: ``a/b.nsg``."""
+    """True for names that a scene may have on any system, such as ``a/b.nsg``."""
     parts = name.split("/")
     return (
         name.endswith(".nsg")
@@ -201,7 +218,7 @@ class Unsaved(Record):
 
     text: str
     disk: str | None  # digest of the file that it was an edit of; None where there was none
-    seconds: float  # how long ago it was kept
+    seconds: float  # since it was stored
 
 
 class Journal:
@@ -211,7 +228,7 @@ class Journal:
         self.folder = folder if folder is not None else state_folder(os.environ, sys.platform) / "play"
 
     def keep(self, path: Path, text: str, disk: str | None) -> None:
-        """Keep a scene's unsaved text; raises `OSError`."""
+        """Store a scene's unsaved text; raises `OSError`."""
         self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         entry = {"file": str(path), "text": text, "disk": disk, "time": time.time()}
         place = self._place(path)
@@ -220,7 +237,7 @@ class Journal:
         write_whole(place, json.dumps(entry).encode())
 
     def find(self, path: Path) -> Unsaved | None:
-        """What was kept of a scene."""
+        """The unsaved text of a scene, if there is one."""
         try:
             entry = read_json(read_regular(self._place(path), 8 * MAX_BYTES))
             text, disk, at = entry["text"], entry["disk"], entry["time"]
@@ -251,7 +268,7 @@ class Journal:
 
 
 def state_folder(environment: Mapping[str, str], platform: str) -> Path:
-    """Where programs of a user keep what is neither theirs to edit nor worth a backup."""
+    """The folder for a user's program state, which is neither to be edited nor worth a backup."""
     if own := environment.get("SCENELANG_STATE"):
         return Path(own)
     if platform == "win32":
@@ -264,29 +281,29 @@ def state_folder(environment: Mapping[str, str], platform: str) -> Path:
 
 
 class Files:
-    """Files that were made, each to be fetched once.
+    """Files for download, each to be fetched once.
 
     Args:
-        seconds: how long they are kept.
+        seconds: time after which they are dropped.
         most: bytes of all of them; the oldest go first.
     """
 
     def __init__(self, seconds: float = 600.0, most: int = 1 << 29) -> None:
         self._seconds, self._most = seconds, most
-        self._kept: dict[str, tuple[str, str, bytes]] = {}
+        self._stored: dict[str, tuple[str, str, bytes]] = {}
 
     def put(self, name: str, kind: str, data: bytes) -> str:
-        """Keep a file of a media type; what fetches it."""
+        """Store a file of a media type; return the key that fetches it."""
         key = secrets.token_urlsafe(16)
-        self._kept[key] = name, kind, data
-        while len(self._kept) > 1 and sum(len(kept[2]) for kept in self._kept.values()) > self._most:
-            del self._kept[next(iter(self._kept))]
-        asyncio.get_running_loop().call_later(self._seconds, self._kept.pop, key, None)
+        self._stored[key] = name, kind, data
+        while len(self._stored) > 1 and sum(len(data) for _, _, data in self._stored.values()) > self._most:
+            del self._stored[next(iter(self._stored))]
+        asyncio.get_running_loop().call_later(self._seconds, self._stored.pop, key, None)
         return key
 
     def take(self, key: str) -> tuple[str, str, bytes] | None:
         """The name, media type and bytes."""
-        return self._kept.pop(key, None)
+        return self._stored.pop(key, None)
 
 
 MOST_SIDE: Final = 8192
@@ -327,7 +344,7 @@ def whole_of(message: Json, key: str, low: int, high: int) -> int:
 
 
 def wishes(message: Json) -> Json:
-    """Params, frame and size."""
+    """Params, frame and size of a message that asks for a drawing."""
     params, size = message.get("params") or {}, message.get("size")
     if not isinstance(params, dict):
         raise ValueError("`params` is not an object")

@@ -1,18 +1,17 @@
 """Scenes as forms: their own program as JSON, for the evaluator that runs in a page.
 
-A scene without mistakes is taken for granted. What the page's model does not have is ``["no", why]``, which
-matters where it runs: it may stand in a branch that is never taken.
+A form is the syntax trees of a scene's files without places and unused names, with names resolved. The scene
+has no mistakes. Words that the page's model does not have are ``["no", why]``, an error only where they run:
+they may stand in a branch that is never taken.
 
-A form is what is left of the syntax trees of a scene's files without places and what is never used, with
-names resolved. An expression is a number, a boolean, or a list of a word and its operands; a statement is a
-list likewise; a block is a list of statements. ``["g", slot]`` is a variable of a file, and ``["v", hops,
-slot]`` one of the call so many definitions further out. ``web/evaluate.js`` has what each word means.
+An expression is a number, a boolean, or a list of a word and its operands; a statement is a list likewise; a
+block is a list of statements. ``["g", slot]`` is a variable of a file, and ``["v", hops, slot]`` one of the
+call so many definitions further out. ``viewer/evaluate.js`` runs them.
 """
 
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -21,7 +20,6 @@ from scenelang.assets.element import Element
 from scenelang.assets.records import Record, deep_stack
 from scenelang.assets.textures import load_textures
 from scenelang.compiler.manifest import Manifest
-from scenelang.language import tree
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.evaluation import Evaluation
@@ -61,28 +59,28 @@ class Scope:
     names: dict[str, Bound] = field(default_factory=dict)
 
     def find(self, name: str) -> Bound | None:
-        """What a name stands for, qualified or not."""
+        """The binding of a name, qualified or not."""
         alias, dot, rest = name.partition(".")
         scope: Scope | None = self
         while scope is not None and alias not in scope.names:
             scope = scope.parent
-        found = None if scope is None else scope.names[alias]
-        return found.inside.names.get(rest) if dot and found is not None and found.inside else found
+        result = None if scope is None else scope.names[alias]
+        return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
 @dataclass(slots=True, eq=False)
 class Bound:
-    """What a name stands for.
+    """The binding of a name.
 
     Args:
         kind: as of `scenelang.language.session.Binding`.
-        scope: where it was defined.
+        scope: the scope of its definition.
         node: the statement of a fn or module.
         inside: the names of an imported file.
         file: that file.
-        at: place of a fn or module among all that are called.
-        uses: what it needs of the names of files.
-        element: what a Scene calls a geometry of a file of elements.
+        at: index of a fn or module in `Writer.calls`, -1 for one that is not called.
+        uses: names of files that it uses.
+        element: the name in a Scene of a geometry from a file of elements.
     """
 
     kind: str
@@ -98,50 +96,71 @@ class Bound:
 
 @dataclass(slots=True)
 class Line:
-    """A statement of a file, what it defines, and what it needs of the names of files."""
+    """A statement of a file, the name that it defines, and the names of files that it uses."""
 
     form: Json
     bound: Bound | None
     uses: list[Bound]
 
 
-class Names(ABC):
-    """Writes the statements of a scene's files as far as names go.
+def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[nodes.Expr | None]:
+    """The argument of each parameter, None where it is left out."""
+    bound: dict[str, nodes.Expr] = {}
+    for at, arg in enumerate(args or ()):
+        bound[params[at] if arg.name is None else arg.name.text] = arg.value
+    return [bound.get(name) for name in params]
+
+
+_VALUES: Final = ("let", "param", "argument", "loop")
+
+
+class Lacking(Exception):
+    """Raised where the page's model lacks a material or an element; the message names it."""
+
+
+class Writer:
+    """Writes the statements of a scene's files as forms.
+
+    Args:
+        context: of the scene's file, prepared.
+        manifest: the model that draws the page.
+        elements: those that come first among `shapes` and `paints`.
 
     Attributes:
-        slots: how many all files have.
-        calls: fns and modules that are called.
-        params: each one's full name, statement, file and what its name stands for.
-        lengths: what ``canvas`` and ``animate`` need of the names of files.
+        slots: the number of slots of all files.
+        calls: forms of the fns and modules that are called.
+        params: full name, statement, file and binding of each param.
+        lengths: names of files that ``canvas`` and ``animate`` use.
+        shapes, paints: elements that rows name.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
         self.slots = 0
         self.calls: list[Json] = []
         self.uses: list[Bound] = []
         self.params: list[tuple[str, nodes.Param, FileContext, Bound]] = []
         self.lengths: dict[str, list[Bound]] = {"canvas": [], "animate": []}
+        self.manifest, listed = manifest, list(elements)
+        self.files = {file.name: file.zoo for file in context.session.elements.values()}
+        self.brought = Brought.of(tuple(context.session.elements.values()))
+        self.textures = load_textures()
+        self.shapes = [element for element in listed if not element.material]
+        self.paints = [element for element in listed if element.material]
 
-    @abstractmethod
-    def expression(self, expr: nodes.Expr, scope: Scope) -> Json:
-        """An expression."""
-
-    @abstractmethod
-    def statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> Json:
-        """A statement in a kind of block; None where it does nothing when it runs."""
+    # ------------------------------------------------------------ blocks and names
 
     def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
         """A block in a scope of its own."""
         scope = Scope(around.frame, around)
         bodies = self._declare(block.statements, scope)
-        made = [self.statement(stmt, scope, kind) for stmt in block.statements]
+        forms = [self.statement(stmt, scope, kind) for stmt in block.statements]
         for bound in bodies:
             self._body(bound)
             self.uses += bound.uses
-        return [form for form in made if form is not None]
+        return [form for form in forms if form is not None]
 
     def file(self, context: FileContext, tree: nodes.File, scope: Scope, imported: bool) -> list[Line]:
-        """A file's statements; of an imported one what it brings."""
+        """The statements of a file; of an imported one the exported definitions."""
         statements = [s for s in tree.statements if not imported or isinstance(s, BROUGHT)]
         self._declare(statements, scope)
         lines: list[Line] = []
@@ -176,7 +195,7 @@ class Names(ABC):
         return []
 
     def reached(self, roots: Iterable[Bound]) -> set[int]:
-        """Identities of all names of files that something needs; writes what of it is called."""
+        """Identities of all names of files that ``roots`` need; writes the fns and modules among them."""
         seen: dict[int, Bound] = {}
         stack = list(roots)
         while stack:
@@ -189,16 +208,16 @@ class Names(ABC):
         return set(seen)
 
     def _declare(self, statements: Sequence[nodes.Stmt], scope: Scope) -> list[Bound]:
-        found = []
+        result = []
         for stmt in statements:
             if isinstance(stmt, nodes.Fn | nodes.Module):
                 kind = "fn" if isinstance(stmt, nodes.Fn) else "module"
                 scope.names[stmt.name.text] = bound = Bound(kind, scope, node=stmt)
-                found.append(bound)
-        return found
+                result.append(bound)
+        return result
 
     def _body(self, bound: Bound) -> None:
-        """Write a fn or module: size of its calls, defaults, and what it is."""
+        """Write a fn or module: number of slots of a call, defaults, body."""
         at, stmt = self._called(bound), bound.node
         around, self.uses = self.uses, bound.uses
         frame = Frame(bound.scope.frame, 1 + len(stmt.params))
@@ -206,12 +225,12 @@ class Names(ABC):
         for slot, param in enumerate(stmt.params, 1):
             defaults.append(None if param.default is None else self.expression(param.default, inside))
             inside.names[param.name.text] = Bound("argument", inside, slot)
-        self.calls[at] = made = [0, defaults]
+        self.calls[at] = form = [0, defaults]
         if isinstance(stmt, nodes.Fn):
-            made.append(self.expression(stmt.body, inside))
+            form.append(self.expression(stmt.body, inside))
         else:
-            made.append(self.block(stmt.body, inside, "group"))
-        made[0] = frame.size
+            form.append(self.block(stmt.body, inside, "group"))
+        form[0] = frame.size
         self.uses = around
 
     def _called(self, bound: Bound) -> int:
@@ -229,7 +248,7 @@ class Names(ABC):
         return scope.frame.size - 1
 
     def hops(self, scope: Scope, to: Scope) -> int:
-        """How many calls further out the slots of another scope are; -1 for those of files."""
+        """Number of calls between a scope and the slots of another; -1 for those of files."""
         hops, frame = 0, scope.frame
         while frame is not to.frame:
             assert frame is not None
@@ -254,78 +273,41 @@ class Names(ABC):
         """Arguments, None where one is left out."""
         return [None if value is None else self.expression(value, scope) for value in values]
 
-
-def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[nodes.Expr | None]:
-    """The argument of each parameter, None where it is left out."""
-    bound: dict[str, nodes.Expr] = {}
-    for at, arg in enumerate(args or ()):
-        bound[params[at] if arg.name is None else arg.name.text] = arg.value
-    return [bound.get(name) for name in params]
-
-
-_VALUES: Final = ("let", "param", "argument", "loop")
-
-
-class Lacking(Exception):
-    """The page's model does not have what is named; the message says what."""
-
-
-class Writer(Names):
-    """Writes a scene's statements.
-
-    Args:
-        context: of the scene's file, prepared.
-        manifest: the model that draws the page.
-        elements: what rows name first.
-
-    Attributes:
-        shapes, paints: elements that rows name.
-    """
-
-    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
-        super().__init__()
-        self.manifest, listed = manifest, list(elements)
-        self.files = {file.name: file.zoo for file in context.session.elements.values()}
-        self.brought = Brought.of(tuple(context.session.elements.values()))
-        self.textures = load_textures()
-        self.shapes = [element for element in listed if not element.material]
-        self.paints = [element for element in listed if element.material]
-
     # ------------------------------------------------------------ expressions
 
-    def expression(self, expr: tree.Expr, scope: Scope) -> Json:
-        """An expression: a number, a boolean, or a word and what it works on."""
+    def expression(self, expr: nodes.Expr, scope: Scope) -> Json:
+        """An expression: a number, a boolean, or a word and its operands."""
         match expr:
-            case tree.Number():
+            case nodes.Number():
                 return [expr.unit, plain(expr.value)] if expr.unit else plain(expr.value)
-            case tree.Bool():
+            case nodes.Bool():
                 return expr.value
-            case tree.String():
+            case nodes.String():
                 return ["'", expr.value]
-            case tree.Color():
+            case nodes.Color():
                 return ["#", *(round(255 * part) for part in expr.rgb)]
-            case tree.Vector():
+            case nodes.Vector():
                 return ["[", *self.given(expr.items, scope)]
-            case tree.Range():
+            case nodes.Range():
                 ends = self.given((expr.start, expr.stop, expr.step), scope)
                 return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]
-            case tree.NameRef():
+            case nodes.NameRef():
                 return self._name(expr.name.text, scope)
-            case tree.Unary():
+            case nodes.Unary():
                 inner = self.expression(expr.operand, scope)
                 negative = expr.op == "-" and type(inner) in (int, float) and inner
                 return -inner if negative else [f"{expr.op}1", inner]
-            case tree.Binary():
+            case nodes.Binary():
                 return [expr.op, self.expression(expr.left, scope), self.expression(expr.right, scope)]
-            case tree.Conditional():
+            case nodes.Conditional():
                 return ["?", *self.given((expr.condition, expr.then, expr.otherwise), scope)]
-            case tree.CallExpr():
+            case nodes.CallExpr():
                 return self._function(expr, scope)
-            case tree.Index():
+            case nodes.Index():
                 return ["@", self.expression(expr.value, scope), self.expression(expr.index, scope)]
-            case tree.Member():
+            case nodes.Member():
                 return self._member(expr, scope)
-            case tree.MaterialExpr():
+            case nodes.MaterialExpr():
                 return self._material(expr, scope)
         raise TypeError(f"no form of {expr.__class__.__name__}")
 
@@ -340,13 +322,13 @@ class Writer(Names):
             return ["[", *map(plain, value.items)]
         return ["none"] if value is None else value
 
-    def _member(self, expr: tree.Member, scope: Scope) -> Json:
-        alias = scope.find(expr.value.name.text) if isinstance(expr.value, tree.NameRef) else None
+    def _member(self, expr: nodes.Member, scope: Scope) -> Json:
+        alias = scope.find(expr.value.name.text) if isinstance(expr.value, nodes.NameRef) else None
         if alias is not None and alias.inside is not None:
             return self.value(alias.inside.names[expr.name.text], scope)
         return [".", self.expression(expr.value, scope), COMPONENTS[expr.name.text]]
 
-    def _function(self, expr: tree.CallExpr, scope: Scope) -> Json:
+    def _function(self, expr: nodes.CallExpr, scope: Scope) -> Json:
         name, bound = expr.name.text, scope.find(expr.name.text)
         if bound is not None:
             return ["call", *self.call(bound, expr.args, scope)]
@@ -356,8 +338,8 @@ class Writer(Names):
 
     # ------------------------------------------------------------ materials
 
-    def _material(self, written: tree.MaterialExpr | tree.MaterialUse, scope: Scope) -> Json:
-        """``["material", place of how it is lit, place of its colours or -1, block]``."""
+    def _material(self, written: nodes.MaterialExpr | nodes.MaterialUse, scope: Scope) -> Json:
+        """``["material", index of its shading, index of its paint or -1, block]``."""
         try:
             lit, paint = self._look(written.name.text, written.shading, scope)
         except Lacking as lacking:
@@ -365,7 +347,7 @@ class Writer(Names):
         ops = [] if written.body is None else self.block(written.body, scope, "material")
         return ["material", self.manifest.materials.index(lit), paint, ops]
 
-    def _look(self, name: str, shading: tree.Name | None, scope: Scope) -> tuple[str, int]:
+    def _look(self, name: str, shading: nodes.Name | None, scope: Scope) -> tuple[str, int]:
         alias, dot, rest = name.partition(".")
         lit = self.manifest.materials[0] if shading is None else shading.text
         paint = -1
@@ -391,47 +373,47 @@ class Writer(Names):
 
     # ------------------------------------------------------------ statements
 
-    def statement(self, stmt: tree.Stmt, scope: Scope, kind: str) -> Json:
+    def statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> Json:
         """A statement in a kind of block; None where it does nothing when it runs."""
         match stmt:
-            case tree.Let():
+            case nodes.Let():
                 value = self.expression(stmt.value, scope)
                 return [*self._define(stmt.name, "let", scope), value]
-            case tree.Param():
+            case nodes.Param():
                 given = self.given((stmt.default, stmt.range), scope)
                 return ["param", self._define(stmt.name, "param", scope)[1], stmt.name.text, *given]
-            case tree.For():
+            case nodes.For():
                 items, inside = self.expression(stmt.iterable, scope), Scope(scope.frame, scope)
                 target = self._define(stmt.variable, "loop", inside)
                 return ["for", *target, items, self.block(stmt.body, inside, kind)]
-            case tree.If():
+            case nodes.If():
                 test, then = self.expression(stmt.condition, scope), self.block(stmt.then, scope, kind)
                 other = stmt.otherwise
-                if isinstance(other, tree.If):
+                if isinstance(other, nodes.If):
                     return ["if", test, then, [self.statement(other, scope, kind)]]
                 return ["if", test, then, [] if other is None else self.block(other, scope, kind)]
-            case tree.Node():
+            case nodes.Node():
                 inner = "chain" if stmt.kind == "chain" else "group"
                 return ["node", stmt.kind, self._width(stmt, scope), self.block(stmt.body, scope, inner)]
-            case tree.Combined():
+            case nodes.Combined():
                 width, child = self._width(stmt, scope), self.statement(stmt.child, scope, kind)
                 return ["join", stmt.op, width, child]
-            case tree.MaterialUse():
+            case nodes.MaterialUse():
                 return ["use", self._material(stmt, scope)]
-            case tree.Call():
+            case nodes.Call():
                 return self._headed(stmt, scope, kind)
         return None
 
-    def _define(self, name: tree.Name, kind: str, scope: Scope) -> list[Json]:
-        """Whether a name's slot is one of files, and which."""
+    def _define(self, name: nodes.Name, kind: str, scope: Scope) -> list[Json]:
+        """Give a name a new slot: ``["g", slot]`` of files, or ``["v", slot]`` of a call."""
         slot = self.slot(scope)
         scope.names[name.text] = Bound(kind, scope, slot)
         return ["g" if scope.frame is None else "v", slot]
 
-    def _width(self, stmt: tree.Node | tree.Combined, scope: Scope) -> Json:
+    def _width(self, stmt: nodes.Node | nodes.Combined, scope: Scope) -> Json:
         return self.given(bind(("k",), stmt.args), scope)[0]
 
-    def _headed(self, stmt: tree.Call, scope: Scope, kind: str) -> Json:
+    def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
         worn = bound is not None and bound.kind in _VALUES and stmt.args is None
@@ -451,14 +433,14 @@ class Writer(Names):
         ops = [] if stmt.body is None else self.block(stmt.body, scope, "material")
         return ["use", self.value(bound, scope), *([ops] if ops else [])]
 
-    def _setting(self, stmt: tree.Call, scope: Scope) -> Json:
+    def _setting(self, stmt: nodes.Call, scope: Scope) -> Json:
         name, word = stmt.name.text, SETTINGS[stmt.name.text]
         args = self.given(bind(word.params, stmt.args), scope)
         if name in STAGE and self.manifest.dimension == 2:
             return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
         return None if name == "canvas" else [name, *args]
 
-    def _move(self, stmt: tree.Call, scope: Scope, inks: bool) -> Json:
+    def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
         table = OPERATIONS if inks else TRANSFORMS
         if name not in table:
@@ -471,7 +453,7 @@ class Writer(Names):
 
     # ------------------------------------------------------------ elements
 
-    def _brought(self, stmt: tree.Call, called: str, body: Json) -> Json:
+    def _brought(self, stmt: nodes.Call, called: str, body: Json) -> Json:
         """A geometry of a file of elements, or a ready group."""
         alias, _, name = called.partition(".")
         try:
@@ -524,13 +506,13 @@ _LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 
 class Form(Record):
-    """A scene's form and what belongs to it in a view.
+    """A scene's form and its params in a view.
 
     Args:
         data: JSON for ``evaluateForm``.
         params: JSON of params that matter to the picture: their values, in radians and seconds, and ranges.
         fixed: names of those that no page can change, and why.
-        shapes, paints: elements that rows name by their places, shapes behind the model's geometries.
+        shapes, paints: elements that rows name by index, shapes behind the model's geometries.
     """
 
     data: Json
@@ -579,8 +561,8 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
     )
 
 
-def param_data(name: str, stmt: tree.Param, file: FileContext) -> dict[str, Any]:
-    """What a page has to know of a param to offer it."""
+def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
+    """The data of a param for its control on a page."""
     value = file.env[file.scope.names[stmt.name.text].slot]
     data: dict[str, Any] = {"name": name, "kind": _kind(value, stmt.default), "value": _json(value)}
     if stmt.range is not None:
@@ -590,7 +572,7 @@ def param_data(name: str, stmt: tree.Param, file: FileContext) -> dict[str, Any]
         elif isinstance(allowed, RangeValue):
             data |= _bounds(allowed)
     if isinstance(value, Angle | Time):
-        units = (node.unit for node in tree.walk(stmt.default) if isinstance(node, tree.Number))
+        units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.Number))
         data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")
     if label := _LABEL.match(stmt.span.source.text, (stmt.range or stmt.default).span.end):
         data["label"] = label[1].strip()
@@ -606,11 +588,11 @@ def _bounds(allowed: RangeValue) -> dict[str, Any]:
     return {"low": ends[0], "high": ends[1], "step": abs(allowed.step)}
 
 
-def _kind(value: Any, default: tree.Expr) -> str:
+def _kind(value: Any, default: nodes.Expr) -> str:
     if not isinstance(value, Vec):
         return _KINDS[value.__class__]
-    colours = isinstance(default, tree.Color) or (
-        isinstance(default, tree.CallExpr) and default.name.text in ("rgb", "hsv")
+    colours = isinstance(default, nodes.Color) or (
+        isinstance(default, nodes.CallExpr) and default.name.text in ("rgb", "hsv")
     )
     return "color" if colours else "vector"
 

@@ -1,8 +1,8 @@
 """Jobs of a process for the page: views, pictures, figures and files, of texts that may not be saved.
 
 A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
-others by their paths, ``root``, ``params``, ``frame``, ``size``, ``message``, to which the answer's data adds
-what was found, and of a file ``folder``, an empty one that lasts as long.
+other files by their paths, ``root``, ``params``, ``frame``, ``size``, and ``message``, to which the answer's
+data adds the result; a job that makes a file also has ``folder``, an empty one for the duration.
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ import io
 import json
 import time
 from collections.abc import Callable
-from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from scenelang.assets.records import Record
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.graph import Graph, Leaf, nodes
 from scenelang.compiler.manifest import load_manifest
@@ -36,51 +34,31 @@ from scenelang.output.animate import Progress, make
 from scenelang.output.frames import Clip, Shot, find_target, frame_key
 from scenelang.output.painting import Drawable, Painter
 from scenelang.web.export import View, page, scene_view, still
-
-
-class JobFailed(Exception):
-    """A job came to nothing; the message says why."""
-
-
-class Answer(Record):
-    """Result of a job.
-
-    Args:
-        data: what the page is sent.
-        head: what the server has to know.
-    """
-
-    data: bytes
-    head: dict[str, Any] = field(default_factory=dict)
-
+from scenelang.web.folder import Answer, JobFailed
 
 MOST_PIXELS: Final = 1 << 24
 MOST_ROWS: Final = 5000
 """Objects of a scene that a page is given: so many take 1 MB and most of a second."""
 MOST_TOLD: Final = 100  # problems of a scene
 _BY_NUMPY: Final = ("framed", "solid")  # renderers
-_KEPT: Final = Kept()
+_CACHE: Final = Kept()
 _EXACT: dict[str, Image] = {}  # the last exact picture, by what it shows
 
 Job = dict[str, Any]
 Tell = Callable[[float], None]
 
 
-class Trouble(Exception):
-    """A job that cannot be done; the message says why."""
-
-
 def do(job: Job, tell: Tell) -> Answer:
-    """Do a job, and tell the share done; raises `Trouble`."""
+    """Do a job, and report the share done; raises `JobFailed`."""
     try:
         return DO[job["do"]](job, tell)
     except SceneError as error:
         first = error.diagnostics[0].message if error.diagnostics else "the scene has errors"
-        raise Trouble(first) from None
+        raise JobFailed(first) from None
     except (RenderError, ProgramError, ValueError) as error:
-        raise Trouble(str(error)) from None
+        raise JobFailed(str(error)) from None
     except FileNotFoundError as error:
-        raise Trouble(f"there is no file {error.filename}") from None
+        raise JobFailed(f"there is no file {error.filename}") from None
 
 
 def warm() -> None:
@@ -105,20 +83,20 @@ def warm() -> None:
 def _view(job: Job, tell: Tell) -> Answer:
     """The scene for the page's own shader, and what is wrong with it."""
     started = time.perf_counter()
-    found = Diagnostics()
+    result = Diagnostics()
     shown: View | None = None
     lacking: list[str] = []
-    evaluation = _source(job).evaluation(found)
+    evaluation = _source(job).evaluation(result)
     try:
-        shown = _viewed(job, evaluation, found)[0]
+        shown = _viewed(job, evaluation, result)[0]
     except SceneError:
-        pass  # its diagnostics are `found`
+        pass  # `result` has its diagnostics
     except (ProgramError, FileNotFoundError) as error:
         lacking.append(str(error))
     data = {
         **job["message"],
         "view": shown and shown.message(),
-        "problems": [*map(_problem, found.items[:MOST_TOLD]), *map(_warning, lacking)],
+        "problems": [*map(_problem, result.items[:MOST_TOLD]), *map(_warning, lacking)],
         "ms": _since(started),
     }
     head = {"wanted": [str(path) for path in evaluation.wanted]}
@@ -127,11 +105,11 @@ def _view(job: Job, tell: Tell) -> Answer:
     return Answer(_json(data), head)
 
 
-def _viewed(job: Job, evaluation: Evaluation, found: Diagnostics) -> tuple[View, Program]:
+def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple[View, Program]:
     scene, spans = evaluation.run(0)
-    if scene is None or found.errors:
-        raise SceneError(found)
-    program = compile_scene(scene, spans=spans, diagnostics=found)
+    if scene is None or diagnostics.errors:
+        raise SceneError(diagnostics)
+    program = compile_scene(scene, spans=spans, diagnostics=diagnostics)
     if len(program) > MOST_ROWS:
         raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
     return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
@@ -141,9 +119,11 @@ def _warning(message: str) -> dict[str, Any]:
     return {"code": "", "severity": "warning", "message": message, "line": 1, "column": 1}
 
 
-def _problem(found: Diagnostic) -> dict[str, Any]:
-    line, column = found.span.source.position(found.span.start) if found.span is not None else (1, 1)
-    here = {"code": found.code, "severity": found.severity, "message": found.message}
+def _problem(diagnostic: Diagnostic) -> dict[str, Any]:
+    line, column = (
+        diagnostic.span.source.position(diagnostic.span.start) if diagnostic.span is not None else (1, 1)
+    )
+    here = {"code": diagnostic.code, "severity": diagnostic.severity, "message": diagnostic.message}
     return {**here, "line": line, "column": column}
 
 
@@ -201,13 +181,13 @@ def _figures(job: Job, tell: Tell) -> Answer:
 
 def _figures_of(picture: np.ndarray, exact: np.ndarray) -> dict[str, float | None]:
     """PSNR, SSIM and FLIP; None where the package that measures it is missing."""
-    found: dict[str, float | None] = {"psnr": round(psnr(picture, exact), 2)}
+    result: dict[str, float | None] = {"psnr": round(psnr(picture, exact), 2)}
     for name, measure in (("ssim", ssim), ("flip", flip)):
         try:
-            found[name] = round(measure(picture, exact), 5)
+            result[name] = round(measure(picture, exact), 5)
         except (ImportError, OSError):  # torch's libraries may not fit the memory
-            found[name] = None
-    return found
+            result[name] = None
+    return result
 
 
 def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
@@ -223,12 +203,12 @@ def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
 def _by_network(program: Program, tell: Tell | None = None) -> Image:
     _check_size(program.canvas)
     if load_manifest(program.model).renderer in _BY_NUMPY:
-        return draw_small(program, kept=_KEPT, progress=tell).image
+        return draw_small(program, kept=_CACHE, progress=tell).image
     return draw(program, How(device="cpu", threads=1), progress=tell).image
 
 
 def _exact(job: Job, clip: Clip) -> Image:
-    """The exact picture; the last one is kept, for figures and differences of it."""
+    """The exact picture; the last one is cached, for figures and differences."""
     shot = _shot(clip, job["frame"])
     _check_size(shot.scene.canvas)
     key = shot.scene.to_json()
@@ -245,15 +225,15 @@ def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Answ
     image.to_pil().save(data, "PNG", compress_level=1)  # a third of the time for a tenth more bytes
     png = base64.b64encode(data.getvalue()).decode()
     size = [image.shape[1], image.shape[0]]
-    told = {**job["message"], "png": png, "size": size, "ms": {**ms, "encode": _since(started)}, **facts}
-    return Answer(_json(told))
+    facts = {**job["message"], "png": png, "size": size, "ms": {**ms, "encode": _since(started)}, **facts}
+    return Answer(_json(facts))
 
 
 # ---------------------------------------------------------------- files
 
 
 class _ByNumpy(Painter):
-    """Draws frames as single pictures are drawn here: without torch."""
+    """Draws frames without torch, as single pictures are."""
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
         program = self.clip.program(shot)
@@ -267,21 +247,21 @@ def _file(job: Job, tell: Tell) -> Answer:
     if kind == "png":
         return Answer(_by_network(clip.program(_shot(clip, job["frame"])), tell).encode())
     if kind == "html":
-        found = Diagnostics()
-        view, program = _viewed(job, _source(job).evaluation(found), found)
+        result = Diagnostics()
+        view, program = _viewed(job, _source(job).evaluation(result), result)
         return Answer(page(view, still=still(program)).encode())
     _check_size(clip.first.scene.canvas)
 
-    def said(progress: Progress) -> None:
+    def report(progress: Progress) -> None:
         share = progress.done / max(1.0, progress.total)
         tell(0.9 * share if progress.stage == "drawing" else 0.9 + 0.1 * share)
 
     target = find_target(str(Path(job["folder"], f"film.{kind}")), "film")
-    made = make(_ByNumpy(clip), target, range(clip.frames), jobs=1, progress=said)
-    return Answer(made.files[0].read_bytes())
+    rendered = make(_ByNumpy(clip), target, range(clip.frames), jobs=1, progress=report)
+    return Answer(rendered.files[0].read_bytes())
 
 
-# ---------------------------------------------------------------- what all need
+# ---------------------------------------------------------------- common to all
 
 
 def _source(job: Job) -> Source:
@@ -303,7 +283,7 @@ def _shot(clip: Clip, frame: int) -> Shot:
 def _check_size(canvas: tuple[int, int]) -> None:
     if canvas[0] * canvas[1] > MOST_PIXELS:
         size = f"{canvas[0]} × {canvas[1]}"
-        raise Trouble(f"a canvas of {size}; pictures have at most {MOST_PIXELS:,} pixels here")
+        raise JobFailed(f"a canvas of {size}; pictures have at most {MOST_PIXELS:,} pixels here")
 
 
 def _json(data: dict[str, Any]) -> bytes:

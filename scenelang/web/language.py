@@ -1,6 +1,7 @@
 """The language server of a page, in a process of its own, ``python -m scenelang.web.language``.
 
-What the page says goes to it unless it names files elsewhere; which folder it is about, the server says.
+It gets the messages of the page, but for those that name files outside the folder; the folder and the root of
+imports are set here, not by the page.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ class Elsewhere(ValueError):
 
 
 class Languages:
-    """Language servers, one a page; one more waits for the next page, so that it need not."""
+    """Language servers, one for each page, and a spare one, so that the next page need not wait."""
 
     def __init__(self, folder: Folder) -> None:
         self._folder, self._closed = folder, False
         self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
 
     def start(self) -> None:
-        """Have one wait."""
+        """Start the spare one."""
         if self._spare is None and not self._closed:
             self._spare = asyncio.create_task(_start())
 
@@ -56,7 +57,7 @@ class Languages:
             self.start()
 
     async def close(self) -> None:
-        """End the one that waits."""
+        """End the spare one."""
         self._closed = True
         if self._spare is not None:
             await _end(await self._spare)
@@ -123,11 +124,11 @@ async def _down(stream: asyncio.StreamReader, socket: WebSocket) -> None:
 
 
 def checked(message: Any, folder: Folder) -> dict[str, Any]:
-    """A message of the page as it may go on.
+    """A message of the page, checked, with the folder and the root of this server.
 
     Raises:
         Elsewhere: it names a file outside the folder.
-        ValueError: it is none of the protocol's.
+        ValueError: it is not a message of the protocol.
     """
     if not isinstance(message, dict):
         raise ValueError("not a message")
@@ -154,10 +155,10 @@ def checked(message: Any, folder: Folder) -> dict[str, Any]:
 
 
 def _settings(given: Any, folder: Folder) -> dict[str, Any]:
-    """What the page sets of the language server, and the root of imports."""
+    """Settings for the language server: those of the page that are allowed, and the root of imports."""
     given = given.get("scenelang", given) if isinstance(given, dict) else {}
-    kept = {key: given[key] for key in ("debounceMs", "inlayHints") if key in given}
-    return kept if folder.root is None else {**kept, "root": str(folder.root)}
+    allowed = {key: given[key] for key in ("debounceMs", "inlayHints") if key in given}
+    return allowed if folder.root is None else {**allowed, "root": str(folder.root)}
 
 
 def _uris(value: Any) -> Iterator[str]:

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable, Collection, Coroutine
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -18,6 +18,7 @@ from scenelang.drawing.how import usable_cores
 from scenelang.language.limits import MAX_BYTES
 from scenelang.web.folder import (
     MOST_SIDE,
+    Answer,
     Changed,
     Files,
     Folder,
@@ -31,36 +32,18 @@ from scenelang.web.folder import (
     whole_of,
     wishes,
 )
-from scenelang.web.jobs import Answer
 from scenelang.web.pool import LIMITS_S, Jobs, Pool, Slot, Took
 
 log = logging.getLogger("scenelang.play")
 
 
-class Page(Protocol):
-    """A page that is open."""
-
-    @property
-    def names(self) -> Collection[str]:
-        """The files that it shows."""
-
-    def tell(self, message: Json | str) -> None:
-        """Send it a message."""
-
-    def changed(self, name: str, text: str | None, disk: str | None) -> None:
-        """Tell it what a file holds now."""
-
-    def imported(self, path: Path) -> None:
-        """Show again what imports a file that has changed."""
-
-
 class Play:
-    """What all pages share.
+    """The state that all pages share.
 
     Args:
         folder: the scenes.
         first: the one to show at first.
-        journal: keeps what is not saved.
+        journal: of unsaved texts.
     """
 
     def __init__(self, folder: Folder, first: str | None = None, journal: Journal | None = None) -> None:
@@ -71,14 +54,14 @@ class Play:
         self.views = Pool(most, nice=5)  # which stand back for them
         self.slow = Pool(2, nice=10)
         self.store = Files()
-        self.pages: set[Page] = set()
+        self.pages: set[Live] = set()
         self.reading = asyncio.Lock()
-        """Held from reading or writing a file to telling pages of it: what is older is told first."""
+        """Held from reading or writing a file until pages are told, so that they hear of changes in order."""
         self._tasks: set[asyncio.Future[Any]] = set()
         self._listed: list[str] | None = None
 
     def later(self, work: Coroutine[Any, Any, Any]) -> None:
-        """Do something beside all else."""
+        """Run a task in the background."""
 
         def ended(task: asyncio.Future[Any]) -> None:
             self._tasks.discard(task)
@@ -90,7 +73,7 @@ class Play:
         task.add_done_callback(ended)
 
     async def close(self) -> None:
-        """End whatever goes on."""
+        """Cancel all tasks and end all processes."""
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -98,7 +81,7 @@ class Play:
             await pool.close()
 
     async def files(self) -> Json:
-        """The message that lists what there is."""
+        """The message that lists the scenes and examples."""
         self._listed = await asyncio.to_thread(self.folder.names)
         return {
             "kind": "files",
@@ -111,14 +94,14 @@ class Play:
         }
 
     async def refresh(self) -> None:
-        """Tell all pages what there is, if that has changed."""
+        """Send all pages the list of files, if it has changed."""
         before = self._listed
         message = await self.files()
         if self._listed != before:
             for page in self.pages:
                 page.tell(message)
 
-    async def write(self, name: str, text: str, base: str | None, page: Page) -> str:
+    async def write(self, name: str, text: str, base: str | None, page: Live) -> str:
         """Write a file for a page, and tell the others; the file's digest. Raises as `Folder.write`."""
         async with self.reading:
             disk = await asyncio.to_thread(self.folder.write, name, text, base)
@@ -131,7 +114,7 @@ class Play:
             return disk
 
     def keep(self, path: Path, text: str, saved: str, disk: str | None) -> None:
-        """Keep a text that is not saved; where it is, forget what was kept."""
+        """Store a text that is not saved; drop the stored one where it is."""
         try:
             if text == saved:
                 self.journal.drop(path)
@@ -144,11 +127,10 @@ class Play:
 def _examples() -> list[str]:
     """Scenes that come with the page."""
     folder = files("scenelang").joinpath("web/editor/examples")
-    found = folder.iterdir() if folder.is_dir() else ()
-    return sorted(place.name for place in found if place.name.endswith(".nsg"))
+    result = folder.iterdir() if folder.is_dir() else ()
+    return sorted(place.name for place in result if place.name.endswith(".nsg"))
 
 
-live_log = logging.getLogger("scenelang.play")
 FILES: Final = {
     "png": "image/png",
     "gif": "image/gif",
@@ -157,7 +139,7 @@ FILES: Final = {
     "html": "text/html",
     "nsg": "text/plain",
 }
-KEEP_S: Final = 0.5  # between two keepings of an unsaved text
+KEEP_S: Final = 0.5  # between two times that an unsaved text is stored
 MOST_WAITING: Final = 1 << 26  # characters for a page that does not read
 MOST_OPEN: Final = 100
 
@@ -168,8 +150,8 @@ class Open:
     def __init__(self, path: Path, text: str, disk: str | None) -> None:
         self.path = path
         self.text, self.version = text, 0  # of the page
-        self.saved, self.disk = text, disk  # what the file held when the page was last told
-        self.base = disk  # digest of what the text is an edit of
+        self.saved, self.disk = text, disk  # the file's, as the page was last sent it
+        self.base = disk  # digest of the file that the text is an edit of
         self.wanted: frozenset[Path] = frozenset()  # files that it imports
         self.angles: frozenset[str] = frozenset()  # params in radians
         self.keeping: asyncio.TimerHandle | None = None
@@ -182,7 +164,7 @@ class Live:
         self._play, self._socket = play, socket
         self.open: dict[str, Open] = {}
         self._out: asyncio.Queue[str] = asyncio.Queue()
-        self._waiting = 0  # characters of what is to be sent
+        self._waiting = 0  # characters in the queue
         self._over = asyncio.Event()
         self._jobs = Jobs(self.tell)
 
@@ -208,7 +190,7 @@ class Live:
                 await self._socket.close()
 
     def tell(self, message: Json | str) -> None:
-        """Send a message as soon as those before are sent; a page that does not read is given up."""
+        """Queue a message; a page that does not read its messages is disconnected."""
         text = message if isinstance(message, str) else json.dumps(message)
         self._waiting += len(text)
         if self._waiting > MOST_WAITING:
@@ -229,7 +211,7 @@ class Live:
                 text = await self._socket.receive_text()
             except (WebSocketDisconnect, RuntimeError, KeyError):  # KeyError: bytes, not text
                 return
-            await asyncio.sleep(0)  # whatever is to be sent goes first, though there may be more to read
+            await asyncio.sleep(0)  # queued messages are sent first, though there may be more to read
             message: Json = {}
             try:
                 given = read_json(text.encode("utf-8"))
@@ -240,7 +222,7 @@ class Live:
             except (ValueError, RecursionError) as error:
                 self._trouble(message, f"not a message: {error}")
             except Exception as error:
-                live_log.exception("internal error")
+                log.exception("internal error")
                 self._trouble(message, f"internal error: {error!r}")
 
     def _trouble(self, message: Json, why: str) -> None:
@@ -346,7 +328,7 @@ class Live:
             )
 
     def _keep(self, name: str) -> None:
-        """Keep what is not saved of a file, now."""
+        """Store the unsaved text of a file now."""
         known = self.open[name]
         self._unkeep(known)
         if known.version:
@@ -358,7 +340,7 @@ class Live:
             known.keeping = None
 
     def changed(self, name: str, text: str | None, disk: str | None) -> None:
-        """Tell the page that a file of its is another one on the disk."""
+        """Send the page a file that has changed on the disk."""
         known = self.open.get(name)
         if known is None or known.disk == disk:
             return
@@ -371,7 +353,7 @@ class Live:
             self._view(name)
 
     def imported(self, path: Path) -> None:
-        """Show again what imports a file that has changed."""
+        """Draw again the scenes that import a file that has changed."""
         for name, known in self.open.items():
             if path in known.wanted:
                 self._view(name)
@@ -381,14 +363,14 @@ class Live:
     def _view(self, name: str) -> None:
         version = self.open[name].version
 
-        def found(answer: Answer) -> None:
+        def viewed(answer: Answer) -> None:
             known = self.open.get(name)
             if known is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
                 known.angles = frozenset(answer.head.get("angles", known.angles))
 
         message = {"kind": "view", "file": name, "version": version}
-        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, found)
+        self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, viewed)
 
     async def _draw(self, message: Json) -> None:
         name, known = self._known(message)
@@ -423,7 +405,7 @@ class Live:
         self._jobs.cancel(lambda slot, id, file: id == wanted and id is not None)
 
     def _start(self, slot: Slot, id: Any, name: str, job: Json, pool: Pool, done: Took | None = None) -> None:
-        """Do a job of a file as the page has it."""
+        """Start a job for a file, with the text that the page has."""
         known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
         job["params"] = {k: in_unit(v) if k in known.angles else v for k, v in job["params"].items()}

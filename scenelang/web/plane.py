@@ -1,8 +1,8 @@
-"""The framed network as a shader of the plane takes it: sizes and text for GLSL, and arrays.
+"""The framed network for the page's shader: GLSL with its sizes, and its weights as arrays.
 
-A decoder's hidden units that are never above zero, wherever in its disc a point lies, are left out: what is
-left answers the same, with a third of the multiplications. That is proved by a grid of points and by how fast
-a unit can change between them.
+A decoder's hidden units that are at most zero at all points of its disc are left out: the answers stay the
+same, with a third of the multiplications. The proof is a grid of points and bounds of a unit's change between
+them.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, FramedArrays
 from scenelang.language.words import TOKENS
 from scenelang.web.arrays import Store, web
 
-NODES: Final = 129  # along a side of the grid that bounds are looked for on
-QUARTERED: Final = 7  # times that a square may be, in a proof that a unit is never above zero
-INSIDE: Final = 0.01  # leaf units by which a point has to lie inside to be covered
+NODES: Final = 129  # along a side of the grid for bounds of decoders
+QUARTERED: Final = 7  # times that squares are quartered to prove that a unit is never above zero
+INSIDE: Final = 0.01  # leaf units: least depth inside of points that count as covered
 UNKNOWN: Final = 1e9  # leaf units: a bound that rules nothing out
 
 Floats = npt.NDArray[np.float64]
 
 
 class Leaf(NamedTuple):
-    """A decoder as shaders have it, in leaf units.
+    """A decoder for shaders, in leaf units.
 
     Args:
         first: (n, 3) of the units of the first layer: factors of x and y, and bias.
@@ -38,7 +38,7 @@ class Leaf(NamedTuple):
         far: growth beyond the rim.
         bounds: (3,) x, y and radius; it is no nearer than |q.x| - x, |q.y| - y and |q| - radius, times `far`
             where that is below 1.
-        inner: radius of a disc that it covers, 0 where none is known.
+        inner: radius of a disc within the shape, 0 where none is known.
     """
 
     first: Floats
@@ -53,7 +53,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view.
 
     Raises:
-        ProgramError: the network knows more of an object or of a point than a distance.
+        ProgramError: the network has more features of an object, or more state, than a distance.
     """
     config = network.config
     if not config.features == config.state == 1:
@@ -106,11 +106,11 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
 
 @lru_cache(maxsize=8)
 def leaves(network: FramedArrays) -> list[Leaf]:
-    """Of all geometries of a network."""
+    """The decoders of all geometries of a network."""
     axis = np.linspace(-RADIUS, RADIUS, NODES)
     p = np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
-    off = (axis[1] - axis[0]) * 0.5**0.5  # the way from the next node, at most
-    far, found = float(network.far[0]), []
+    off = (axis[1] - axis[0]) * 0.5**0.5  # largest distance of a point to the nearest node
+    far, result = float(network.far[0]), []
     for code, decoder in zip(network.codes, network.decoders(network.codes), strict=True):
         layers = [(np.asarray(w, np.float64), np.asarray(b, np.float64)) for w, b in decoder.layers]
         slopes = network.slopes.get(code.tobytes())
@@ -123,8 +123,8 @@ def leaves(network: FramedArrays) -> list[Leaf]:
             gaps = [n - (middle - rise) / min(far, 1.0) for n in (*abs(p), radius)]
             bounds = tuple([float(gap[seen].max()) + off for gap in gaps])
             inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
-        found.append(Leaf(*_pruned(layers), far, bounds, inner))
-    return found
+        result.append(Leaf(*_pruned(layers), far, bounds, inner))
+    return result
 
 
 def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
@@ -137,9 +137,9 @@ def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats
 
 
 def _firing(w: Floats, b: Floats, v: Floats, c: Floats) -> npt.NDArray[np.bool_]:
-    """Which units of the second layer are not proved to be at most zero in all of the disc.
+    """Mask (m,) of units of the second layer that are not proved to be at most zero in all of the disc.
 
-    Squares where that is open are looked at in quarters.
+    Squares without a proof are quartered.
     """
     half = RADIUS / 16
     axis = np.arange(half - RADIUS, RADIUS, 2 * half)

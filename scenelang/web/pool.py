@@ -1,6 +1,6 @@
 """Processes that compile and draw, and the jobs of one page.
 
-A job that takes too long, that nobody wants any more or that needs too much memory ends with its process.
+A job that takes too long, is cancelled or needs too much memory ends with its process.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from scenelang.web import worker
-from scenelang.web.folder import Json, Refused
-from scenelang.web.jobs import Answer, JobFailed
+from scenelang.web.folder import Answer, JobFailed, Json, Refused
 
 Said = Callable[[float], None]
 _CONTEXT: Final[Any] = multiprocessing.get_context("spawn" if sys.platform == "win32" else "forkserver")
@@ -34,28 +33,28 @@ class Worker:
         other.close()
 
     def do(self, job: dict[str, Any], said: Said) -> Answer:
-        """Have a job done, a file in a folder that lasts as long; raises `JobFailed`."""
+        """Have a job done, one that makes a file in a folder for the duration; raises `JobFailed`."""
         is_file = job["do"] == "file"
         with TemporaryDirectory(prefix="scenelang-") if is_file else nullcontext() as folder:
             try:
                 self._pipe.send({**job, "folder": folder})
-                while isinstance(told := self._pipe.recv(), float):
-                    said(told)
+                while isinstance(reply := self._pipe.recv(), float):
+                    said(reply)
             except (EOFError, OSError):
                 self.process.join()
                 raise JobFailed(_ENDED) from None
-        if isinstance(told, JobFailed):
-            raise told
-        answer: Answer = told
+        if isinstance(reply, JobFailed):
+            raise reply
+        answer: Answer = reply
         return answer
 
 
 class Pool:
-    """A number of processes, the last one that was used first.
+    """Processes for jobs; the one that was used last is used first.
 
     Args:
         most: processes at the same time.
-        nice: how much they stand back for others, as of ``nice``.
+        nice: their niceness.
     """
 
     def __init__(self, most: int, nice: int = 0) -> None:
@@ -74,8 +73,8 @@ class Pool:
 
         Args:
             job: JSON data, as `scenelang.web.jobs` has them, but for the folder.
-            limit_s: how long it may take, without the wait for others.
-            said: is told the share done.
+            limit_s: seconds that it may take, without the wait for others.
+            said: called with the share done.
 
         Raises:
             JobFailed: it failed, took too long, or its process ended.
@@ -135,7 +134,7 @@ Took = Callable[[Answer], None]
 
 
 class Jobs:
-    """What is done for a page, which is told of it.
+    """The jobs of a page, one in each slot.
 
     Args:
         tell: sends the page a message, or the text of one.
@@ -146,11 +145,11 @@ class Jobs:
         self._tasks: dict[Slot, tuple[asyncio.Task[None], Any, str]] = {}
 
     def start(self, slot: Slot, id: Any, file: str, job: Json, pool: Pool, done: Took | None) -> None:
-        """Do a job, for `scenelang.web.jobs`; the one that has its slot is cancelled.
+        """Start a job of `scenelang.web.jobs`; the one that has its slot is cancelled.
 
         Args:
             id: the page's name of it; None where it has none.
-            done: is given the answer, before the page is.
+            done: called with the answer before the page gets it.
 
         Raises:
             Refused: there are too many.
@@ -171,7 +170,7 @@ class Jobs:
         task.add_done_callback(ended)
 
     def cancel(self, wanted: Callable[[Slot, Any, str], bool]) -> None:
-        """Cancel those of which slot, name and file are wanted."""
+        """Cancel the jobs whose slot, id and file ``wanted`` is true of."""
         for slot, (task, id, file) in list(self._tasks.items()):
             if wanted(slot, id, file):
                 task.cancel()

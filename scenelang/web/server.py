@@ -9,11 +9,11 @@ the ``Host`` of a name that is not its own, and cannot hide its ``Origin``.
 the root ``?token=TOKEN`` does too. Of every request the token, the ``Host`` (a name of this machine) and the
 ``Origin`` are checked; a websocket must have an origin.
 
-- ``GET ./``: ``web/play.html``, in which ``__NONCE__`` is replaced by that of its content policy: scripts
+- ``GET ./``: ``editor/play.html``, in which ``__NONCE__`` is replaced by that of its content policy: scripts
   come from ``static/`` alone, a ``<style>`` needs the nonce (of CodeMirror: ``EditorView.cspNonce``),
   pictures may be ``data:`` and ``blob:``, nothing comes from elsewhere, and the page has no ``style="…"`` and
   no inline script.
-- ``GET static/NAME``: a file of ``web/``; ``static/viewer/NAME``: one of the viewer's, a module as it is
+- ``GET static/NAME``: a file of ``editor/``; ``static/viewer/NAME``: one of the viewer's, a module as it is
   written; ``static/examples/NAME.nsg``: a scene to start from.
 - ``GET download?key=KEY``: a file that was made, once.
 
@@ -120,13 +120,13 @@ def policy(nonce: str, host: str) -> str:
 
 
 class Guard:
-    """Lets requests through that have the token, come from the page itself and name this machine.
+    """Middleware that lets requests through that have the token, come from the page and name this machine.
 
     Args:
-        app: what answers; the token is taken off its paths.
-        token: what the page's address holds.
-        hosts: names by which this machine may be called, besides those of its loopback.
-        anywhere: any number of an address is a name of it: it serves others too.
+        app: gets the requests, their paths without the token.
+        token: of the page's address.
+        hosts: names of this machine besides those of its loopback.
+        anywhere: accept any IP address as a name of this machine, as it serves other machines too.
     """
 
     def __init__(self, app: ASGIApp, token: str, hosts: Iterable[str] = (), anywhere: bool = False) -> None:
@@ -175,7 +175,7 @@ class Guard:
             await PlainTextResponse(_REFUSED, 403)(scope, receive, answer)
 
     def _knows(self, scope: Scope) -> bool:
-        """Whether a request names this machine and no other page sent it."""
+        """True where a request names this machine and does not come from another page."""
         headers = Headers(scope=scope)
         host, origin, site = headers.getlist("host"), headers.getlist("origin"), headers.get("sec-fetch-site")
         if len(host) != 1 or not self._is_here(host[0]) or len(origin) > 1:
@@ -187,7 +187,7 @@ class Guard:
         return not origin or origin[0].lower() == f"http://{host[0].lower()}"
 
     def _is_here(self, host: str) -> bool:
-        """Whether a ``Host`` is a name of this machine; the port is in the origin."""
+        """True where a ``Host`` is a name of this machine; its port is checked with the origin."""
         name, _, port = host.lower().rpartition(":") if not host.endswith("]") else (host, "", "")
         name = name if port.isascii() and port.isdigit() else host.lower()
         name = name[1:-1] if name.startswith("[") and name.endswith("]") else name
@@ -200,34 +200,34 @@ class Guard:
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two texts are the same, in a time that does not tell how much of them is."""
+    """True for equal texts; the time it takes does not depend on where they differ."""
     return secrets.compare_digest(one.encode("utf-8", "replace"), other.encode())
 
 
 def is_loopback(host: str) -> bool:
-    """Whether nobody but this machine reaches an address."""
+    """True for an address that only this machine reaches."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        result = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         return False
-    return all(ipaddress.ip_address(str(place[4][0]).partition("%")[0]).is_loopback for place in found)
+    return all(ipaddress.ip_address(str(place[4][0]).partition("%")[0]).is_loopback for place in result)
 
 
-watch_log = logging.getLogger("scenelang.play")
-STEP_MS: Final = 30  # a change is told once nothing has changed for so long
+log = logging.getLogger("scenelang.play")
+STEP_MS: Final = 30  # without a change, after which changes are reported
 PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle of being written
-SLOW_MS: Final = 1000  # between two looks where the system gives no notice
+SLOW_MS: Final = 1000  # between two polls where the system reports no changes
 
 
 class _Filter(DefaultFilter):
-    """Not what is hidden, and no temporary files of ours."""
+    """A filter of hidden files and of temporary files that this package writes."""
 
     def __call__(self, change: Change, path: str) -> bool:
         return not Path(path).name.startswith(".") and super().__call__(change, path)
 
 
 async def watch(play: Play, stop: asyncio.Event) -> None:
-    """Tell pages of changes until ``stop``."""
+    """Report changes to pages until ``stop``."""
     await asyncio.to_thread(play.folder.names)  # which finds whether it is large
     for polling in (False, True):
         try:
@@ -241,11 +241,11 @@ async def watch(play: Play, stop: asyncio.Event) -> None:
                 force_polling=polling or None,
                 poll_delay_ms=SLOW_MS,
             )
-            async for found in changes:
-                play.later(_tell(play, {Path(path) for _, path in found}))
+            async for result in changes:
+                play.later(_tell(play, {Path(path) for _, path in result}))
             return
         except (OSError, RuntimeError) as error:
-            watch_log.warning("the system does not tell of changes: %s", error)
+            log.warning("the system does not tell of changes: %s", error)
 
 
 async def _tell(play: Play, paths: set[Path]) -> None:
@@ -266,7 +266,7 @@ async def _reread(play: Play, name: str) -> None:
             try:
                 text, disk = await asyncio.to_thread(play.folder.read, name)
             except Refused as error:
-                watch_log.warning("%s", error)
+                log.warning("%s", error)
                 return
             if text or patient:
                 for page in play.pages:
@@ -293,10 +293,10 @@ def make_app(play: Play) -> Starlette:
         return Response(text.replace("__NONCE__", nonce), media_type="text/html", headers=headers)
 
     async def download(request: Request) -> Response:
-        found = play.store.take(request.query_params.get("key", ""))
-        if found is None:
+        result = play.store.take(request.query_params.get("key", ""))
+        if result is None:
             return PlainTextResponse("There is no such file any more.\n", 404)
-        name, kind, data = found
+        name, kind, data = result
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}
         return Response(data, media_type=kind, headers=headers)
 
@@ -335,8 +335,8 @@ def make_app(play: Play) -> Starlette:
 
 async def _static(request: Request) -> Response:
     """A file of the package."""
-    found = _STATIC.fullmatch(request.path_params["name"])
-    place = files("scenelang").joinpath(_FROM[found[1]], found[2]) if found is not None else None
+    result = _STATIC.fullmatch(request.path_params["name"])
+    place = files("scenelang").joinpath(_FROM[result[1]], result[2]) if result is not None else None
     if place is None or not place.is_file():
         return PlainTextResponse("There is no such file.\n", 404)
     kind = _KINDS.get(Path(place.name).suffix) or mimetypes.guess_type(place.name)[0]
@@ -344,7 +344,7 @@ async def _static(request: Request) -> Response:
 
 
 def _few(answer: Callable[[WebSocket], Awaitable[None]]) -> Callable[[WebSocket], Awaitable[None]]:
-    """What refuses a connection where there are `MOST_PAGES` already."""
+    """Wrap an endpoint so that it refuses a connection where there are `MOST_PAGES` already."""
     count = 0
 
     async def counted(socket: WebSocket) -> None:
@@ -401,7 +401,7 @@ def serve(
         host: an address or name of this machine.
         port: None for any.
         browser: open the page.
-        say: told the address.
+        say: called with the address.
 
     Raises:
         OSError: as `listen`.

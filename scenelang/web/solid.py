@@ -1,8 +1,8 @@
 """The solid network for the page's shader: its layers as GLSL, its numbers as one array.
 
 Each shape's decoder and each token's cell is prepared here, as a renderer would: weights linear in a code,
-gains behind their exponential. What the scene decides, its rows, is the page's (``web/solid.js``). The rest
-of the shader, the same for every network, are the files of `FILES`.
+gains behind their exponential. The rows of the scene are the page's (``viewer/solid.js``). The rest of
+the shader, the same for every network, are the files of `FILES`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scenelang.drawing.solid.passes import SLACK
 from scenelang.web.arrays import Store, web
 
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
-"""Of ``web/``, one behind the other."""
+"""Files of ``viewer/``, in order."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
     "RADIUS": RADIUS,
@@ -66,7 +66,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
 
 
 def _cell(cell: Cell) -> np.ndarray:
-    """A cell (K, 4): what is made of a distance and the bump; then each line's own, past and bias."""
+    """A cell (K, 4): its factor of a distance and its bump; then each line's own, past and bias."""
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])
 
@@ -76,10 +76,10 @@ def _gates(paint: int, kind: int) -> str:
 
     def largest(first: int, count: int) -> str:
         gates = [f"dot(cells[at + {first + i}].xyz, vec3(d, before, 1.0))" for i in range(count)]
-        found = gates[0]
+        result = gates[0]
         for gate in gates[1:]:
-            found = f"max({found}, {gate})"
-        return f"return clamp({found}, 0.0, 1.0);"
+            result = f"max({result}, {gate})"
+        return f"return clamp({result}, 0.0, 1.0);"
 
     parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
     head = "(int at, float d, float before)"
@@ -134,7 +134,7 @@ def _padded(w: np.ndarray, b: np.ndarray, width: int) -> tuple[np.ndarray, np.nd
 
 
 def _back(column: np.ndarray, name: str) -> str:
-    """What a layer's gradients give to an input, by its weights there."""
+    """GLSL of an input's gradient from a layer's gradients; ``column`` has its weights in that layer."""
     fours = column.reshape(-1, 4)
     return " + ".join(f"dot({_four(four)}, {name}{k}d)" for k, four in enumerate(fours))
 

@@ -1,4 +1,4 @@
-"""Importing this loads what jobs need, in the process that those of a pool are forked from."""
+"""Loads the modules and models of jobs on import, in the process that those of a pool are forked from."""
 
 from __future__ import annotations
 

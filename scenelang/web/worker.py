@@ -13,11 +13,11 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
-from scenelang.web.jobs import Answer, JobFailed
+from scenelang.web.folder import Answer, JobFailed
 
 MOST_MEMORY: Final = 4 << 30
 """Bytes of addresses that a process may have, where the system counts them."""
-_TOLD_S: Final = 0.1  # between two tellings of how far a job is
+_REPORT_S: Final = 0.1  # between two reports of the share done
 _DEEP: Final = 10_000
 
 
@@ -42,20 +42,20 @@ def _end_with_server() -> None:
 
 
 def _answer(job: dict[str, Any], pipe: Connection) -> Answer | JobFailed:
-    from scenelang.web.jobs import Trouble, do
+    from scenelang.web.jobs import do
 
-    told = 0.0
+    reported = 0.0
 
     def tell(share: float) -> None:
-        nonlocal told
-        if time.monotonic() - told > _TOLD_S:
-            told = time.monotonic()
+        nonlocal reported
+        if time.monotonic() - reported > _REPORT_S:
+            reported = time.monotonic()
             pipe.send(float(share))
 
     try:
         return do(job, tell)
-    except Trouble as error:
-        return JobFailed(str(error))
+    except JobFailed as error:
+        return error
     except MemoryError:
         return JobFailed(f"it needs more than {MOST_MEMORY >> 30} GB of memory")
     except Exception as error:

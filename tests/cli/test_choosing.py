@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.compiler import compile as compile_module
+from scenelang.cli import jobs
+from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import available
 from scenelang.drawing.small import load_of
 from scenelang.output import frontier as frontier_file
@@ -180,15 +181,14 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
     assert f"model {other} (chosen by the frontier)" in text
     name = shipped.write("named.nsg", 'model "shapes2d"; square { scale(0.5); }\n')
     assert other in shipped.run("render", name, "-o", "a.png", "--max-flip", "0.05", "-v").stderr
-    real = compile_module.compile_scene
 
     def warns(scene: object, **options: object) -> object:
-        made = real(scene, **options)  # type: ignore[arg-type]
+        made = compile_scene(scene, **options)  # type: ignore[arg-type]
         if options.get("model") == other:
             options["diagnostics"].add("W0501", "4 objects, trained on 3", None)  # type: ignore[attr-defined]
         return made
 
-    monkeypatch.setattr(compile_module, "compile_scene", warns)
+    monkeypatch.setattr(jobs, "compile_scene", warns)
     text = said(shipped, "--max-flip", "0.05")
     assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text

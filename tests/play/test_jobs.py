@@ -96,7 +96,7 @@ def test_figures_count_what_is_written_and_what_is_left() -> None:
     ],
 )
 def test_what_cannot_be_done_says_why(parts: dict[str, Any], message: str) -> None:
-    with pytest.raises(jobs.Trouble, match=message):
+    with pytest.raises(jobs.JobFailed, match=message):
         done(**parts)
 
 

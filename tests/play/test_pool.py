@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from scenelang.web.jobs import JobFailed
+from scenelang.web.folder import JobFailed
 from scenelang.web.pool import Pool
 from tests.play.client import below, children
 

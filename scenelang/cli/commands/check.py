@@ -34,13 +34,13 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
         return ()
     from scenelang.language.pages import CODES
 
-    found = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
-    for code in found:
+    result = [code.strip().upper() for value in values for code in value.split(",") if code.strip()]
+    for code in result:
         if not any(known.startswith(code) for known in CODES):
             raise click.BadParameter(f"no code begins with `{code}`", ctx, param)
         if not code.startswith("W"):
             raise click.BadParameter(f"`{code}` is an error, and errors always count", ctx, param)
-    return tuple(found)
+    return tuple(result)
 
 
 @click.command("check")

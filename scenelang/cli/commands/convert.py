@@ -40,11 +40,11 @@ def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, r
     wanted = kind or SUFFIXES.get(Path(out or "").suffix.lower())
     if wanted is None:
         raise click.UsageError("Say what to write: --to nsg or json, or -o with such a suffix.")
-    found = read_input(file, request)
-    found.diagnostics.items += unused_defines(request)
-    say_diagnostics(found.diagnostics)
-    if found.scene is None or found.diagnostics.errors:
+    result = read_input(file, request)
+    result.diagnostics.items += unused_defines(request)
+    say_diagnostics(result.diagnostics)
+    if result.scene is None or result.diagnostics.errors:
         ctx.exit(1)
     from scenelang.language.scene_json import to_readable_json
 
-    put_out(to_readable_json(found.scene) if wanted == "json" else found.scene.to_nsg(), out)
+    put_out(to_readable_json(result.scene) if wanted == "json" else result.scene.to_nsg(), out)

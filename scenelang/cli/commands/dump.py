@@ -168,13 +168,13 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
 
 def _find_dot(kind: str) -> str:
     """The program that draws."""
-    found = shutil.which("dot")
-    if found is None:
+    result = shutil.which("dot")
+    if result is None:
         raise click.UsageError(
             f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."
         )
-    return found
+    return result
 
 
 def _picture(dot: str, kind: str, text: str) -> bytes:
@@ -203,8 +203,8 @@ def _plan(job: Input, request: Request, how: How) -> dict[str, Any]:
     assert job.program is not None
     opened = open_model(job.program.model, choose_device(how.device))
     asked, cores = request.source.model is not None, how.threads or threads_for(job.program.canvas)
-    found = plan_of(job.scene, job.program, job.graphs, opened, asked=asked, spans=job.spans, threads=cores)
-    return {"version": 1, "file": job.name, **found}
+    result = plan_of(job.scene, job.program, job.graphs, opened, asked=asked, spans=job.spans, threads=cores)
+    return {"version": 1, "file": job.name, **result}
 
 
 def _costs_text(plan: dict[str, Any]) -> str:

@@ -37,8 +37,8 @@ def command(code: str | None, listed: bool, kind: str, color: inputs.Color) -> N
     if code is None or listed:
         _print_list(list(CODES), kind, paint)
         return
-    found = re.search(r"[EWew]\d{4}", code)
-    wanted = found.group().upper() if found else code.strip()
+    result = re.search(r"[EWew]\d{4}", code)
+    wanted = result.group().upper() if result else code.strip()
     if wanted in CODES:
         _print_page(read_page(wanted), kind, paint)
         return

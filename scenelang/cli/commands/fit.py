@@ -22,39 +22,39 @@ MOST_FRAMES = 10_000  # whose pictures are looked for
 
 
 def _crop(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int, int, int] | None:
-    found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})\+(\d{1,5})\+(\d{1,5})", value or "")
-    if value is not None and (found is None or not int(found[1]) or not int(found[2])):
+    result = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})\+(\d{1,5})\+(\d{1,5})", value or "")
+    if value is not None and (result is None or not int(result[1]) or not int(result[2])):
         raise click.BadParameter(f"`{value}` is not a part such as 320x192+10+20", ctx, param)
-    return (int(found[3]), int(found[4]), int(found[1]), int(found[2])) if found else None
+    return (int(result[3]), int(result[4]), int(result[1]), int(result[2])) if result else None
 
 
 def _colour(ctx: click.Context, param: click.Parameter, value: str) -> tuple[float, float, float]:
-    found = re.fullmatch(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", value)
-    if found is None:
+    result = re.fullmatch(r"#?([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", value)
+    if result is None:
         raise click.BadParameter(f"`{value}` is not a colour such as #fff4e0", ctx, param)
-    return int(found[1], 16) / 255, int(found[2], 16) / 255, int(found[3], 16) / 255
+    return int(result[1], 16) / 255, int(result[2], 16) / 255, int(result[3], 16) / 255
 
 
 def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Path | dict[int, Path]:
     """One picture, or several by frames."""
     from scenelang.output.frames import Target, is_pattern
 
-    found: dict[int, Path] = {}
+    result: dict[int, Path] = {}
     for value in values:
         number, _, name = value.partition("=")
         if number.isdecimal():
-            found[int(number)] = Path(name)
+            result[int(number)] = Path(name)
         elif is_pattern(value):
             numbered = Target("sequence", Path(value).parent, Path(value).name)
             files = ((frame, numbered.file(frame)) for frame in range(MOST_FRAMES))
-            found |= {frame: file for frame, file in files if file.exists()}
+            result |= {frame: file for frame, file in files if file.exists()}
         elif len(values) == 1:
             return Path(value)
         else:
             raise click.BadParameter(f"`{value}` is one of several; say its frame, 12={value}", ctx, param)
-    if not found:
+    if not result:
         raise click.BadParameter(f"there is no picture `{values[0]}`", ctx, param)
-    return found
+    return result
 
 
 @click.command("fit")
@@ -159,7 +159,7 @@ def command(
     wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
     try:
         with Bar() as bar:
-            found = fit(
+            result = fit(
                 scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
                 background=background, model=model, root=root, frame=frame or 0, seed=seed, budget_s=budget,
                 progress=bar,
@@ -171,13 +171,13 @@ def command(
         say_trouble(str(error))
         raise click.exceptions.Exit(Trouble.exit_code) from None
     if out is not None:
-        put_out(found.text, out)
+        put_out(result.text, out)
     if compare is not None:
-        found.sheet().save(compare)
+        result.sheet().save(compare)
     if animate is not None:
-        still = [found.way[0]] * 4, [found.way[-1]] * 8  # long enough to be looked at
-        render(still[0] + list(found.way) + still[1], animate, fps=8)
-    for line in found.told():
+        still = [result.way[0]] * 4, [result.way[-1]] * 8  # long enough to be looked at
+        render(still[0] + list(result.way) + still[1], animate, fps=8)
+    for line in result.told():
         click.echo(line, err=out == "-")
-    if not found.done:
+    if not result.done:
         ctx.exit(NOT_CONVERGED)

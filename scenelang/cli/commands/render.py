@@ -134,17 +134,17 @@ def command(
         other = "--max-ms and --max-flip" if limits else f"--backend {how.backend}, whose pictures are exact"
         raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
     request = replace(request, source=replace(request.source, fps=fps))
-    clock, found = Clock(), None
+    clock, result = Clock(), None
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
-            found = read_input(files[0], request, clock, how)
-            if moves(found, target, film, out):
+            result = read_input(files[0], request, clock, how)
+            if moves(result, target, film, out):
                 if limits or more.prove:
                     what = "a proof is" if more.prove else "--max-ms and --max-flip are"
                     raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
-                found.diagnostics.items += unused_defines(request)
-                ctx.exit(animate(found, target, film, how, out, outputs, strict, verbose))
+                result.diagnostics.items += unused_defines(request)
+                ctx.exit(animate(result, target, film, how, out, outputs, strict, verbose))
     elif film.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     if cluster is not None:
@@ -156,7 +156,7 @@ def command(
         does = "a proof is of a scene" if more.prove else "the reference draws scenes"
         refused = f"{does}; a program keeps only what the network needs"
     every, code = prepare_all(
-        files, request, clock, how, strict=strict, graphs=more.prove, stored=refused, first=found
+        files, request, clock, how, strict=strict, graphs=more.prove, stored=refused, first=result
     )
     able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
     if limits and able:
@@ -191,10 +191,10 @@ def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[
     from scenelang.drawing.image import Outputs
     from scenelang.drawing.render import outputs_of, prove_drawn
 
-    found, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
+    result, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
     if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
         with clock("outputs"):
-            found = outputs_of(drawn, more.outputs, job.how, spans=job.spans)
+            result = outputs_of(drawn, more.outputs, job.how, spans=job.spans)
     if more.prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
@@ -205,9 +205,9 @@ def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[
     told = [] if (why := blank(job, image)) is None else [f"{path}: {why}"]
     if proof is not None:
         told.append(f"{path}: {proof.told()}")
-        found = replace(found, proof=proof) if "proof" in more.outputs else found
+        result = replace(result, proof=proof) if "proof" in more.outputs else result
     with clock("save"):
-        return told + _saved(image, found, path)
+        return told + _saved(image, result, path)
 
 
 def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:

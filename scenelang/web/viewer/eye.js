@@ -1,4 +1,4 @@
-// Nothing is seen from inside something opaque: the exact fold at the eye; see `passes/check_eye.py`.
+// Nothing is seen from inside something opaque: the exact fold at the eye; see `check_eye` of `scenelang/compiler/passes.py`.
 
 import { refuse } from "./values.js";
 import { BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT } from "./groups.js";

@@ -1,8 +1,8 @@
 // From a scene's tree to rows: transforms go to the leaves, empty nodes vanish, booleans become one stream.
 //
 // A leaf of the tree is {shape, steps, worn}, a fold {links: [{op, k, node}], steps, worn}; steps are nearest
-// the leaf first, and k is the width of a blend, 0 for none. See `scenelang/compiler/lower.py`, `passes/drop.py`,
-// `leaves.py` and `flatten.py`.
+// the leaf first, and k is the width of a blend, 0 for none. See `scenelang/compiler/lower.py` and
+// `scenelang/compiler/rewrites.py`.
 
 import { Wearing, refuse } from "./values.js";
 import { flatMap, invertedMap, usableMap } from "./maps.js";

@@ -1,4 +1,4 @@
-// Distances of elements: pyramids of grids, unfolded as elements/pyramid.py does.
+// Distances of elements: pyramids of grids, unfolded as scenelang/assets/pyramid.py does.
 
 /** Shares of four neighbours, of which the second and third lie around a place. */
 const [BEGIN, MIDDLE, END] = [[5, 15, -5, 1], [-1, 9, 9, -1], [1, -5, 15, 5]];
@@ -71,8 +71,8 @@ function halfway(grid, n, inner) {
 }
 
 /**
- * The colours of a paint of kind "colours", as elements/colours.py has them: linear, whole numbers up to
- * `unit`, at n^3 nodes, z first to change, a Uint16Array of three a node.
+ * The colours of a paint of kind "colours", as in scenelang/assets/colours.py: linear, whole numbers up to `unit`,
+ * at n^3 nodes, z first to change, a Uint16Array of three a node.
  */
 export function spaceColours({ sides, steps, fineness }, unit) {
   let [grid, from] = [null, 0];

@@ -1,5 +1,6 @@
-// The framed network at points of the plane: what renderers/device/kernel.py computes, and which pixels take
-// four samples as renderers/coverage.py says. In front stand sizes and angles.glsl, behind it the decoders.
+// The framed network at points of the plane, as scenelang/drawing/neural/device.py computes it, and the pixels that
+// take four samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
+// decoders.
 
 uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture; of groups
 uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one

@@ -1,5 +1,5 @@
 // Where objects of the plane lie in the world: how far they reach, and in which tiles of a frame.
-// Steps lead from the world to a leaf; balls are carried the other way, as renderers/frames.py does.
+// Steps lead from the world to a leaf; balls are carried the other way, as in scenelang/drawing/neural/frames.py.
 
 const MOST_PAIRS = 2 ** 22; // of an object and a tile
 
