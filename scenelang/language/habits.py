@@ -399,7 +399,7 @@ def _body(tokens: Tokens, at: int, head: int) -> int:
 
 
 def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
-    """Text and tokens of a replacement: holes keep their places, all else is empty.
+    """Text and tokens of a replacement: holes keep their places, a `BAD_` token takes the rest, all else is empty.
 
     Holes that change their order are left out of the tokens: nothing is known of them.
     """
@@ -423,8 +423,8 @@ def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
                 kind = "BAD_EXPRESSION" if hole.isupper() else "NAME"
                 new.append((language.kind(kind), at, at))
         elif word and word.startswith("BAD_"):
-            end = tokens.ends[match.stop - 1]
-            new.append((language.kind(word), tokens.starts[match.start], end))
+            begin, at = at, tokens.ends[match.stop - 1]  # behind the holes before it, so that spans nest
+            new.append((language.kind(word), begin, at))
         else:
             if hole:
                 whole = tokens.source.text

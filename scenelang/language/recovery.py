@@ -35,7 +35,7 @@ from scenelang.language.lexer import (
     statement_depth,
 )
 from scenelang.language.tables import END, tables
-from scenelang.language.words import UNITS
+from scenelang.language.words import TRANSFORMS, UNITS
 
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
@@ -281,6 +281,11 @@ _CLOSING = 1.1
 
 _DIVISION: Final = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
 """What is taken for a comment and was meant for a division."""
+_PLAIN: Final = re.compile(r"(?:[\w\s.,=#]|(?<=[(\[,])-|(?<=, )-)*+")
+"""Items in brackets without an operator between them: the bracket ends behind them all."""
+_FLAT: Final = re.compile(r"[^()\[\]{};]*+")
+"""The inside of brackets that holds no others: before a block, all of it belongs there."""
+_BEGINNINGS: Final = ("let", "param", "fn", "module")
 _DEFINITIONS: Final = ("let", "param", "fn")
 _NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
 _CODES: Final = {
@@ -653,11 +658,15 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message, help = f"unfinished statement: {message}", "the line breaks off here"
     elif first in (")", "]") and open_:
         labels = [Label(Span(tokens.source, *tokens.place(open_[-1])), "opened here")]
+        inside = tokens.ends[open_[-1]], end
+        if not breaks_off and len(open_) == len(names) == 1:
+            simple = {"`;`": _PLAIN, "`{`": _FLAT}.get(shown)
+            fix = first if simple and simple.fullmatch(tokens.source.text, *inside) else None
     elif first == ";":
         help = "a `;` ends every statement without a block"
         if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
             help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
-        elif breaks_off or shown == "`}`":
+        elif breaks_off or shown == "`}`" or _surely_next(tokens, at):
             fix = ";"
     elif first in _NAMED:
         message = f"expected {_NAMED[first]}, found {shown}"
@@ -669,6 +678,14 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message = f"{message} before {shown}"
         fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
     report.add(code, message, *place, labels=labels, help=help, fix=fix)
+
+
+def _surely_next(tokens: Tokens, at: int) -> bool:
+    """Test whether a token within a line can only begin a statement of its own."""
+    text = tokens.text(at)
+    inside = text == "material" or text in TRANSFORMS
+    moved = inside and tokens.text(at - 1) == ")" and head(tokens, at - 1) in TRANSFORMS
+    return moved or text in _BEGINNINGS
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
