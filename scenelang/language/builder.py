@@ -39,7 +39,7 @@ def make(cls: type[M], fields: dict[str, Any]) -> M:
 
 
 class Builder:
-    """What the statements of one block put into their node.
+    """Contents of a node, collected from the statements of its block.
 
     Attributes:
         children: nodes, or the links of a chain.
@@ -123,7 +123,7 @@ class FileContext:
 
 
 class Place(NamedTuple):
-    """Where a statement or an expression stands.
+    """Place of a statement or an expression: its scope, its file and its session.
 
     Args:
         kind: the kind of block around it.
@@ -146,7 +146,7 @@ class Place(NamedTuple):
 
     @property
     def report(self) -> Reporter:
-        """Where mistakes go."""
+        """Reporter of the session."""
         return self.file.session.report
 
     def inner(self, kind: Kind | None = None) -> Place:

@@ -190,7 +190,7 @@ class Evaluation:
 
     @property
     def spent(self) -> bool:
-        """Whether all runs together exceed the limits of one."""
+        """Test whether all runs together exceed the limits of one."""
         return self._steps > MAX_STEPS or self._objects > MAX_OBJECTS
 
     def warn_of_zeros(self) -> None:
@@ -297,10 +297,10 @@ def load(
         ValueError: ``size`` is not a canvas.
         OSError: the file cannot be opened.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
-    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(found, frame)
-    return _sound(scene, found)
+    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(diagnostics, frame)
+    return _sound(scene, diagnostics)
 
 
 def loads(
@@ -321,10 +321,10 @@ def loads(
         text: the scene.
         name: what diagnostics call it.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
     source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
-    return _sound(source.scene(found, frame)[0], found)
+    return _sound(source.scene(diagnostics, frame)[0], diagnostics)
 
 
 def opened(
@@ -345,9 +345,9 @@ def opened(
     return _sound(scene, diagnostics), spans
 
 
-def _sound(scene: Scene | None, found: Diagnostics) -> Scene:
+def _sound(scene: Scene | None, diagnostics: Diagnostics) -> Scene:
     if scene is None:
-        raise SceneError(found)
+        raise SceneError(diagnostics)
     return scene
 
 
@@ -414,7 +414,7 @@ def param_named(evaluation: Evaluation, name: str) -> tree.Param:
 
 
 def knob_of(stmt: tree.Param, file: FileContext) -> Knob:
-    """What a param may be set to, after a run; raises `ParamError` where nothing says so."""
+    """Values that a param may be set to, after a run; raises `ParamError` where nothing gives them."""
     name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
     allowed: Any = None
     if stmt.range is not None:
@@ -464,7 +464,7 @@ def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def is_colour(expr: tree.Expr) -> bool:
-    """Whether an expression is written as a colour."""
+    """Test whether an expression is written as a colour."""
     return isinstance(expr, tree.Color) or (
         isinstance(expr, tree.CallExpr) and expr.name.text in ("rgb", "hsv")
     )
@@ -526,12 +526,12 @@ def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
 
 def literals_of(evaluation: Evaluation, names: Iterable[str]) -> dict[str, str]:
     """The values that params of the file had in the last run, as text of the language."""
-    found, file = {}, evaluation.context
+    literals, file = {}, evaluation.context
     for name, stmt in params_of(evaluation).items():
         if name in names:
             value = file.env[file.scope.names[name].slot]
-            found[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
-    return found
+            literals[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
+    return literals
 
 
 def rewritten(file: tree.File, literals: Mapping[str, str]) -> str:

@@ -427,8 +427,8 @@ def lookup(name: tree.Name, place: Place) -> Binding | None:
     if binding.value is None:
         return Binding("poison")
     exported: FileContext = binding.value
-    found = exported.scope.names.get(rest)
-    return None if found is None or found.kind == "import" else found
+    result = exported.scope.names.get(rest)
+    return None if result is None or result.kind == "import" else result
 
 
 def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, help: str | None = None) -> None:
@@ -492,15 +492,15 @@ def prepare_member(expr: tree.Member, place: Place) -> Code:
         code = prepare(value, place)
         return POISONED if code.value is POISON else member(code, expr.name, place, value)
     name = tree.Name(expr.span, f"{value.span.text}.{expr.name.text}")
-    found = lookup(name, place)
-    if found is not None:
-        return _as_value(name, found, place)
+    result = lookup(name, place)
+    if result is not None:
+        return _as_value(name, result, place)
     unknown_member(name, place, binding.value)
     return POISONED
 
 
 def signature(name: str, params: Sequence[str], required: int) -> str:
-    """How a call looks, for help texts: ``translate(x, y[, z])``."""
+    """Form of a call, for help texts: ``translate(x, y[, z])``."""
     text = ", ".join(params[:required])
     for param in params[required:]:
         text += f"[, {param}]" if text else f"[{param}]"
@@ -673,7 +673,7 @@ def _doubted_hsv(exprs: Sequence[tree.Expr], place: Place) -> Callable[..., Any]
 
 
 def entering(name: tree.Name, args: Sequence[Given], definition: Definition, place: Place) -> Run | None:
-    """How to make the slots of one call, which also counts it; None if the arguments do not fit.
+    """Function that counts a call and makes its slots; None if the arguments do not fit.
 
     When the call is over, the caller takes 1 from the session's depth and puts its calls back.
     """

@@ -147,11 +147,11 @@ class Tokens:
         return self.starts[first], self.ends[(stop or first + 1) - 1]
 
     def end_before(self, index: int) -> int:
-        """Where the token before ``index`` ends: where something missing belongs."""
+        """End of the token before ``index``, the place of something missing."""
         return self.ends[index - 1] if index else 0
 
     def on_new_line(self, index: int) -> bool:
-        """Whether a token is the first of its line."""
+        """Test whether a token is the first of its line."""
         return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
 
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
@@ -289,8 +289,8 @@ class _Slips:
             )
             return
         self._keep("NUMBER", start, end)
-        found = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
-        value, rest = found.groups() if found else ("", text)
+        result = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
+        value, rest = result.groups() if result else ("", text)
         message, fix = f"`{text}` is not a number", None
         help = "numbers look like `1`, `0.5` or `1e-3`"
         if rest in ("f", "F"):
@@ -422,7 +422,7 @@ def advance(stack: list[int], kind: int) -> bool:
 
 
 def fits(stack: list[int], kind: int) -> bool:
-    """Whether one token can follow."""
+    """Test whether a token can follow."""
     return advance(stack.copy(), kind)
 
 

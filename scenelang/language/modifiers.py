@@ -143,8 +143,10 @@ def _numbers(cls: type[Frozen], refused: str = "") -> Callable[..., Any]:
         for operand, value in enumerate(values):
             if refused and describe(value) == "an angle":
                 raise unexpected("a number", value, refused, operand)
-        found = {name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))}
-        return make(cls, {"kind": kind, **found})
+        parameters = {
+            name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))
+        }
+        return make(cls, {"kind": kind, **parameters})
 
     return build
 
@@ -291,12 +293,12 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     if all(one is None or one.code.value is not VARIES for one in bound):
         place.file.weight += SAME_MOVE
         constants = [None if one is None else one.code.value for one in bound]
-        made: list[Any] = []
+        created: list[Any] = []
 
         def repeat(env: Env, out: Builder) -> None:
-            if not made:
-                made.append(construct(constants))
-            append(made[0], out)
+            if not created:
+                created.append(construct(constants))
+            append(created[0], out)
 
         return repeat
 
@@ -323,7 +325,7 @@ def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
 def _stands(
     place: Place, span: Span, what: str, help: str, inside: str | None = None, name: str = ""
 ) -> bool:
-    """Whether a material may stand here; reports it if not."""
+    """Test whether a material may stand here, and report it if not."""
     if place.kind not in ("file", "material"):
         return True
     at_top = place.kind == "file"
@@ -355,7 +357,7 @@ def prepare_material(expr: tree.MaterialExpr, place: Place) -> Code:
 
 
 def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Callable[[Env], Material] | None:
-    """How to make the material node; None where a name is unknown."""
+    """Function that makes the material node; None where a name is unknown."""
     name, session = written.name, place.session
     operations = _operations(written.body, place)
     called, shading = _called(name, place), _shading(written, place)
@@ -372,7 +374,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
-    """What a Scene calls a material; None after a report."""
+    """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
         known = {*MATERIALS, *TEXTURES}
@@ -414,7 +416,7 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
 
 
 def _operations(body: tree.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
-    """How to get the operations of a material's block."""
+    """Function that returns the operations of a material's block."""
     if body is None:
         return lambda env: ()
     prepared = prepare_inner(body, place.inner("material"))

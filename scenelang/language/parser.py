@@ -83,7 +83,7 @@ class Builder:
         return Span(self.source, start, self.ends[last] if isinstance(last, int) else last.span.end)
 
     def sign(self, token: int) -> Any:
-        """What a literal token stands for; recovery may have read it from other text."""
+        """Sign or word of a literal token; recovery may have read it from other text."""
         return self.signs[self.tokens.kinds[token]]
 
     # ------------------------------------------------------------ lists
@@ -285,7 +285,7 @@ class Builder:
 
 
 def _items(rest: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What stands between an opening bracket and the closing one, which is the last."""
+    """Items between an opening bracket and the closing one, which is the last part."""
     return tuple(rest[0]) if rest[1:] else ()
 
 
@@ -321,7 +321,7 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
 
 
 def _unbalanced(tokens: Tokens) -> bool:
-    """Whether some brace has no counterpart."""
+    """Test whether some brace has no counterpart."""
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
     return depths[-1] != 0 or min(depths) < 0
@@ -360,7 +360,7 @@ def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
 
 @cache
 def _classes() -> tuple[int, ...]:
-    """What each kind does to the depth."""
+    """Class of each kind, by its effect on the depth."""
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}

@@ -6,7 +6,7 @@ or too many. A text whose braces match is left alone, however it is laid out.
 
 What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
 replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
-Where none helps, the statement is skipped. Braces match before parsing (`braces`), so a skip stays inside
+Where none helps, the statement is skipped. Braces match before parsing (`balance`), so a skip stays inside
 its block.
 """
 
@@ -107,7 +107,7 @@ def _slips(tokens: Tokens) -> list[_Slip]:
     heads = [at for at in range(last) if tokens.on_new_line(at)]
     columns = [starts[at] - text.rfind("\n", 0, starts[at]) for at in heads]
     open_: list[tuple[int, int]] = []  # column and line of the heads of open blocks
-    found: list[_Slip] = []
+    slips: list[_Slip] = []
     doubled: set[int] = set()  # lines that leave two blocks open
     at_column: dict[int, int] = {}  # the last line that begins at a column
     for line, first in enumerate(heads):
@@ -117,7 +117,7 @@ def _slips(tokens: Tokens) -> list[_Slip]:
             head = open_.pop()[1]
             if head not in doubled:  # else one of its two is too many
                 head = line - 1
-            found.append(_Slip(heads[head], heads[head + 1], closing))
+            slips.append(_Slip(heads[head], heads[head + 1], closing))
         for at in range(first, stop):
             if kinds[at] == opening:
                 deeper = line + 1 == len(heads) or columns[line + 1] > column
@@ -129,18 +129,18 @@ def _slips(tokens: Tokens) -> list[_Slip]:
                     continue
                 head = at_column.get(column, line) if at == first else line
                 if head < line and columns[head + 1] > column:  # its block was not opened there
-                    found.append(_Slip(heads[head], heads[head + 1], opening))
+                    slips.append(_Slip(heads[head], heads[head + 1], opening))
                 else:
-                    found.append(_Slip(first, stop, opening))
+                    slips.append(_Slip(first, stop, opening))
         at_column[column] = line
         if sum(head == line for _, head in open_[-2:]) == 2:
             doubled.add(line)
     if open_ and open_[-1][1] == len(heads) - 1:
-        found.append(_Slip(heads[-1], last, closing))
-    if sum(1 if slip.missing == closing else -1 for slip in found) != surplus:  # an odd layout
+        slips.append(_Slip(heads[-1], last, closing))
+    if sum(1 if slip.missing == closing else -1 for slip in slips) != surplus:  # an odd layout
         wanted = closing if surplus > 0 else opening
-        found = [slip for slip in found if slip.missing == wanted][: abs(surplus)]
-    return sorted(found)[:_MOST]
+        slips = [slip for slip in slips if slip.missing == wanted][: abs(surplus)]
+    return sorted(slips)[:_MOST]
 
 
 # ---------------------------------------------------------------- mending a line
@@ -220,7 +220,7 @@ def _inside(kinds: list[int], first: int) -> list[int]:
 def _mends(
     tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
 ) -> Iterator[Repair]:
-    """What may be done at one place about a missing brace, each the cheaper the likelier it is."""
+    """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
     literals, kind = tables().literals, tokens.kinds[at]
     closes = missing == literals["}"]
     surplus = literals["{"] if closes else literals["}"]
@@ -310,7 +310,7 @@ def _kinds(names: str) -> tuple[int, ...]:
 
 @cache
 def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
-    """What may be missing: the tokens, the cost, and what has to follow if that matters."""
+    """Insertions to try: the tokens, the cost, and the token that has to follow if that matters."""
     return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
 
 
@@ -403,7 +403,7 @@ class Recovery:
             own = min(stop, bound + 1) - at
             return own + 0.15 * (min(stop, at + FOLLOWED) - at - own)
 
-        found: list[tuple[float, float, Repair, list[int]]] = []
+        attempts: list[tuple[float, float, Repair, list[int]]] = []
 
         def attempt(stack: list[int], place: int, repairs: Iterator[Repair]) -> None:
             cost = 0.1 + 0.1 * (at - place) if place < at else 0.0
@@ -415,11 +415,11 @@ class Recovery:
                 start = max(at, end)
                 stop = reach(trial.copy(), kinds, end, start + LOOKAHEAD)
                 if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
-                    found.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
+                    attempts.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
 
         def settle() -> tuple[float, Repair | None]:
             best: tuple[float, Repair | None] = (-inf, None)
-            for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
+            for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
                 end = repair.at + repair.delete
                 score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
                 best = max(best, (score, repair), key=lambda one: one[0])
@@ -509,7 +509,7 @@ class Recovery:
                 yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
 
     def _begins_statement(self, first: int, at: int) -> bool:
-        """Whether a line in open brackets, or behind half a head, reads like a statement of its own."""
+        """Test whether a line in open brackets, or behind half a head, reads like a statement of its own."""
         kinds = self.tokens.kinds
         if not self.tokens.on_new_line(at) or kinds[at] not in (self.name, *self.words):
             return False
@@ -718,7 +718,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
 
 
 def _listed(names: list[str]) -> str:
-    """What is missing, in words: "an expression, `)` and `{`"."""
+    """Missing tokens in words: "an expression, `)` and `{`"."""
     parts: list[str] = []
     for name in names:
         if parts and not (name.isalpha() or parts[-1][-2:-1].isalpha()) and name not in _NAMED:

@@ -32,7 +32,7 @@ UNBOUND: Final = object()
 
 
 class Needs(Record, frozen=False):
-    """What a statement, or the body of a function or module, depends on.
+    """Dependencies of a statement, or of the body of a function or module.
 
     Args:
         frame: it reads ``t``, ``u`` or ``frame`` itself.
@@ -43,7 +43,7 @@ class Needs(Record, frozen=False):
     on: list[Needs] = field(default_factory=list)
 
     def varies(self) -> bool:
-        """Whether it may differ from frame to frame; ask when everything is prepared."""
+        """Test whether it may differ from frame to frame; ask when everything is prepared."""
         seen, stack = {self}, [self]
         while stack:
             needs = stack.pop()
@@ -98,7 +98,7 @@ class Definition(Record, frozen=False):
 
 
 class Binding(Record, frozen=False):
-    """What a name stands for.
+    """Meaning of a name.
 
     Args:
         span: where; None for the language's own names.
@@ -139,7 +139,7 @@ class Scope(Record, frozen=False):
             scope = scope.parent
 
     def find(self, name: str) -> Binding | None:
-        """What ``name`` stands for here."""
+        """Binding of ``name`` here."""
         return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
@@ -148,7 +148,7 @@ class Scope(Record, frozen=False):
             yield from scope.names.items()
 
     def reach(self, slots: Slots) -> Callable[[Env], Env]:
-        """How to get the live ``slots``, which enclose this scope, from those of here."""
+        """Function that gets the live ``slots``, which enclose this scope, from those of here."""
         root = slots.root
         if root is not None:
             return lambda env: root
@@ -170,7 +170,7 @@ Watch = Callable[[Span, Any], None]
 
 
 class Settings(Record, frozen=False):
-    """What the top level sets, and where each was given.
+    """Settings of the top level, and the place of each.
 
     Args:
         canvas: width and height in pixels.
@@ -277,9 +277,9 @@ class Defines(Record, frozen=False):
         for name in self.values:
             if name in self.known or name in self.lost:
                 continue
-            found = nearest(name, self.known)
-            if found:
-                help, labels = f"did you mean `{found}`?", [Label(self.known[found], "this param")]
+            result = nearest(name, self.known)
+            if result:
+                help, labels = f"did you mean `{result}`?", [Label(self.known[result], "this param")]
             else:
                 names = listing(self.known)
                 help, labels = f"its params are {names}" if names else "the scene has no params", []
@@ -434,5 +434,5 @@ class Loader(Record, frozen=False):
 
 
 def _reason(error: BaseException) -> str:
-    """What the system says, lower case."""
+    """Reason that the system gives, in lower case."""
     return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()

@@ -93,7 +93,7 @@ LEFT_OUT: Final = object()  # an argument that was not given; None is the value 
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
-    """Whether a statement stands at top level; reports it if not."""
+    """Test whether a statement stands at top level, and report it if not."""
     if place.kind == "file" and not place.nested:
         return True
     misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
@@ -101,7 +101,7 @@ def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
 
 
 def _once(session: Session, what: str, span: Span) -> bool:
-    """Whether a setting is given for the first time; reports a second time."""
+    """Test whether a setting is given for the first time, and report a second one."""
     first = session.settings.given.setdefault(what, span)
     if first is not span:
         labels = (Label(first, "first given here"),)
@@ -291,10 +291,10 @@ def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     loader = context.loader
     binding = Binding("import", alias.span)
     good = define(alias, binding, place)
-    found = loader.load(stmt, context.path, context.session)
-    if found is None or not good:
+    loaded = loader.load(stmt, context.path, context.session)
+    if loaded is None or not good:
         return None
-    path, file = found
+    path, file = loaded
     if isinstance(file, Zoo):
         binding.value = _elements(path, file, stmt, context)
         return None
@@ -434,7 +434,7 @@ def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | Non
 
 
 def within(value: Any, allowed: Any) -> bool:
-    """Whether a value, or each number of a vector, is in a range or among choices.
+    """Test whether a value, or each number of a vector, is in a range or among choices.
 
     Raises:
         Problem: a value and a range that do not compare.
@@ -525,7 +525,7 @@ def literal(text: str, file: FileContext) -> Any:
 
 
 def _is_literal(expr: nodes.Expr) -> bool:
-    """Whether an expression names nothing and computes nothing but a sign."""
+    """Test whether an expression names nothing and computes nothing but a sign."""
     match expr:
         case nodes.Number() | nodes.Bool() | nodes.Color() | nodes.String():
             return True
@@ -567,7 +567,7 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
 
 
 def hides(binding: Binding | None, stmt: tree.Call) -> bool:
-    """Whether a scene's own name stands here for a setting: a module, or a material in use."""
+    """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
     return binding is not None and (
         binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
     )
@@ -633,7 +633,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
 
 
 def _advice(stmt: tree.Call, place: Place) -> Advice:
-    """What may have been meant by a statement whose name stands for nothing."""
+    """Advice on a statement whose name stands for nothing."""
     name, text = stmt.name, stmt.name.text
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
@@ -688,14 +688,14 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
     names = visible(place, VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    found = {*GEOMETRIES, *names}
+    known = {*GEOMETRIES, *names}
     if stmt.body is None:
-        return found if stmt.args is None else found | {*(TRANSFORMS if kind != "file" else SETTINGS)}
+        return known if stmt.args is None else known | {*(TRANSFORMS if kind != "file" else SETTINGS)}
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:
-        found = {*found, *NODES, *(["else"] if otherwise else [])}
-    return {*found, "else if"} if stmt.args is not None and otherwise else found
+        known = {*known, *NODES, *(["else"] if otherwise else [])}
+    return {*known, "else if"} if stmt.args is not None and otherwise else known
 
 
 EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {

@@ -36,7 +36,9 @@ SINGLE += [
     ("an invisible space", "square { sc\u200bale(0.5); }"),
     ("a control character", "square { scale(0.5); }\x07"),
 ]
-MANY = sorted(path for name in ("malformed", "mistaken") for path in (TESTS / "language" / name).glob("*.nsg"))
+MANY = sorted(
+    path for name in ("malformed", "mistaken") for path in (TESTS / "language" / name).glob("*.nsg")
+)
 
 EXAMPLES = sorted((TESTS.parent / "examples").glob("*.nsg"))
 
