@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.records import Record, deep_stack
-from scenelang.language import tree
 from scenelang.language import tree as nodes
 from scenelang.language.blocks import Body
 from scenelang.language.builder import Builder, FileContext, Place, make
@@ -387,7 +386,7 @@ class Knob(Record):
         inner: whether the value is a vector of the axes' numbers.
     """
 
-    stmt: tree.Param
+    stmt: nodes.Param
     value: Any
     axes: tuple[Axis, ...]
     inner: bool
@@ -398,12 +397,12 @@ class Knob(Record):
         return self.stmt.name.text
 
 
-def params_of(evaluation: Evaluation) -> dict[str, tree.Param]:
+def params_of(evaluation: Evaluation) -> dict[str, nodes.Param]:
     """The params of the file itself, by name; those of imports are other files'."""
-    return {stmt.name.text: stmt for stmt in evaluation.file.statements if isinstance(stmt, tree.Param)}
+    return {stmt.name.text: stmt for stmt in evaluation.file.statements if isinstance(stmt, nodes.Param)}
 
 
-def param_named(evaluation: Evaluation, name: str) -> tree.Param:
+def param_named(evaluation: Evaluation, name: str) -> nodes.Param:
     """A param of the file itself; raises `ParamError` without one."""
     known = params_of(evaluation)
     if name in known:
@@ -413,7 +412,7 @@ def param_named(evaluation: Evaluation, name: str) -> tree.Param:
     raise ParamError(f"no param `{name}` in `{evaluation.file.span.source.name}`" + f"; {help}" * bool(help))
 
 
-def knob_of(stmt: tree.Param, file: FileContext) -> Knob:
+def knob_of(stmt: nodes.Param, file: FileContext) -> Knob:
     """Values that a param may be set to, after a run; raises `ParamError` where nothing gives them."""
     name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
     allowed: Any = None
@@ -463,10 +462,10 @@ def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
     return choices
 
 
-def is_colour(expr: tree.Expr) -> bool:
+def is_colour(expr: nodes.Expr) -> bool:
     """Test whether an expression is written as a colour."""
-    return isinstance(expr, tree.Color) or (
-        isinstance(expr, tree.CallExpr) and expr.name.text in ("rgb", "hsv")
+    return isinstance(expr, nodes.Color) or (
+        isinstance(expr, nodes.CallExpr) and expr.name.text in ("rgb", "hsv")
     )
 
 
@@ -498,7 +497,7 @@ def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:
     return f"[{', '.join(_literal(item, axis, knob.stmt.default, digits) for item, axis in items)}]"
 
 
-def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
+def _literal(value: Any, axis: Axis, default: nodes.Expr, digits: int) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -511,7 +510,7 @@ def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
     x, kind = unpack(value)
     unit = ""
     if kind != "number":
-        units = (node.unit for node in tree.walk(default) if isinstance(node, tree.Number))
+        units = (node.unit for node in nodes.walk(default) if isinstance(node, nodes.Number))
         unit = next(filter(None, units), "deg" if kind == "angle" else "s")
     factor = _UNITS.get(unit, 1.0)
     if axis.choices:
@@ -534,11 +533,11 @@ def literals_of(evaluation: Evaluation, names: Iterable[str]) -> dict[str, str]:
     return literals
 
 
-def rewritten(file: tree.File, literals: Mapping[str, str]) -> str:
+def rewritten(file: nodes.File, literals: Mapping[str, str]) -> str:
     """A scene's text with other defaults of its params, by name; all else stays as it was."""
     text = file.span.source.text
     for stmt in reversed(file.statements):
-        if isinstance(stmt, tree.Param) and stmt.name.text in literals:
+        if isinstance(stmt, nodes.Param) and stmt.name.text in literals:
             span = stmt.default.span
             text = text[: span.start] + literals[stmt.name.text] + text[span.end :]
     return text

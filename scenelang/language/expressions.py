@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from scenelang.language import foreign, limits, tree, values, words
-from scenelang.language.advice import VALUES, report_problem, unknown, unknown_member
+from scenelang.language.advice import VALUES, member_advice, report_problem, unknown, unknown_member
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Fix, Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
@@ -236,8 +236,6 @@ def member(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
-        from scenelang.language.advice import member_advice  # only mistakes need it
-
         help, fix = member_advice(name), None
         if help is None:
             help, fix = did_you_mean(name.text, COMPONENTS, name.span)
@@ -653,8 +651,6 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code
 def _method(expr: tree.CallExpr, place: Place) -> None:
     """Report `v.length()`: a value has no functions."""
     rest, source = expr.name.text.partition(".")[2], expr.name.span.source
-    from scenelang.language.advice import member_advice  # only mistakes need it
-
     last = tree.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
     help = member_advice(last) or f"write {rest}(…) with the value as an argument"
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help)

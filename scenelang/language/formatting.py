@@ -711,9 +711,6 @@ def _comments(text: str) -> list[str]:
     return comments_of(scan(source, Report(source)))
 
 
-def _statements(text: str, found: Diagnostics) -> list[tuple[int, int]]:
+def _statements(text: str, diagnostics: Diagnostics) -> list[tuple[int, int]]:
     """Start and end of each statement of the top level of a text without errors."""
-    return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), found).statements]
-
-
-__all__ = ["format_range", "format_text"]
+    return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), diagnostics).statements]

@@ -176,10 +176,6 @@ class Tokens:
         for number, column in enumerate((self.kinds, self.starts, self.ends)):
             column[first:stop] = [token[number] for token in new]
 
-    def give_up(self, first: int, stop: int, name: str, start: int, end: int) -> None:
-        """Put one token that stands for what cannot be read in the place of some."""
-        self.splice(first, stop, [(tables().kind(name), start, end)])
-
     def drop(self, indices: Sequence[int]) -> None:
         """Take out any number of tokens at once."""
         gone = set(indices)

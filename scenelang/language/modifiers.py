@@ -7,7 +7,14 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language import tree
-from scenelang.language.advice import VALUES, report_problem, unknown, unknown_member
+from scenelang.language.advice import (
+    VALUES,
+    material_advice,
+    report_problem,
+    unknown,
+    unknown_material,
+    unknown_member,
+)
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -238,8 +245,6 @@ def _spec(stmt: tree.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        from scenelang.language.advice import material_advice
-
         help = f"put it into a material's block, as in {material_advice(place, name)}"
         if name == "flip":
             help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
@@ -438,8 +443,6 @@ def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
     elif name.text in GEOMETRIES:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        from scenelang.language.advice import unknown_material  # only mistakes need it
-
         hint, fix = unknown_material(name, place, known)
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
@@ -448,8 +451,6 @@ def _is_value(name: tree.Name, place: Place) -> None:
     """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
-        from scenelang.language.advice import material_advice  # only mistakes need it
-
         message = f"expected a material, found {describe(binding.value)}"
         help = f"for a colour write {material_advice(place, 'color', name.text)}"
         place.report.error("E0301", message, span, help=help, labels=binding.labels())
@@ -492,8 +493,6 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            from scenelang.language.advice import material_advice  # only mistakes need it
-
             help = f"for a colour write {material_advice(place, 'color', name)}"
             session.report.error("E0301", message, span, labels=binding.labels(), help=help)
             return

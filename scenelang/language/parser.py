@@ -415,7 +415,5 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
 def _give_up(tokens: Tokens, report: Report, first: int, at: int) -> None:
     help = "give a part of it a name with `let`, `fn` or `module`; the rest is skipped"
     report.add("E0120", f"nested deeper than {MAX_DEPTH} levels", *tokens.place(at), help=help)
-    tokens.give_up(first, len(tokens.kinds) - 1, "BAD_STATEMENT", tokens.starts[first], tokens.ends[-1])
-
-
-__all__ = ["parse"]
+    rest = (tables().kind("BAD_STATEMENT"), tokens.starts[first], tokens.ends[-1])
+    tokens.splice(first, len(tokens.kinds) - 1, [rest])

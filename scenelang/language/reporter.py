@@ -12,6 +12,7 @@ from typing import Final
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Effort, Fix, Label, SourceFile, Span
+from scenelang.language.foreign import SHAPES
 from scenelang.language.library import Calls
 from scenelang.language.limits import MAX_COMPARED, Halt
 
@@ -193,7 +194,5 @@ class Reporter(Record, frozen=False):
 
 def _called(site: Span) -> str | None:
     """Usage line of the library's module that a call names."""
-    from scenelang.language.foreign import SHAPES  # only mistakes need it
-
     alias, _, module = site.text.rpartition(".")
     return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None

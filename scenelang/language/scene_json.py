@@ -20,7 +20,6 @@ from pydantic_core import ErrorDetails, PydanticSerializationError
 from scenelang.assets.files import depth_of_json, no_number
 from scenelang.assets.records import Record, deep_stack
 from scenelang.language import nodes
-from scenelang.language import nodes as modifiers
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span
 from scenelang.language.library import SpanMap, Written
 from scenelang.language.nodes import MAX_NODE_DEPTH, TAGS, Link, Object, SceneNode, said
@@ -370,7 +369,7 @@ def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source:
 _FIELDS: Final = sorted(
     {
         name
-        for model in (*vars(modifiers).values(), *vars(nodes).values())  # which hold those of the stage
+        for model in vars(nodes).values()
         if isinstance(model, type) and issubclass(model, BaseModel)
         for name in model.__annotations__
         if not name.startswith(("_", "model_"))
