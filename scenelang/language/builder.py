@@ -86,7 +86,7 @@ class ChainBuilder(Builder):
 
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
-"""What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""
+"""Kind of a block, by its contents; ``unknown`` is that of something misspelt: all may stand there."""
 
 Action = Callable[[Env, Builder], None]
 

@@ -41,7 +41,7 @@ VARIES: Final = object()
 """Marks an expression whose value is known only when it runs."""
 _FOLDED_NUMBERS: Final = 64
 _ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
-"""What takes an angle first, and how it calls it."""
+"""Words whose first argument is an angle, and its name."""
 
 
 class Code(NamedTuple):
@@ -292,7 +292,7 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
-"""What operators mean on two numbers, unless that is an error or not finite."""
+"""Operators on two numbers, unless the result is an error or not finite."""
 _MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     **{op: partial(values.binary, op) for op in values.ARITHMETIC},
     **{op: partial(values.compare, op) for op in values.COMPARE},

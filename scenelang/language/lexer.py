@@ -70,7 +70,7 @@ _SAID = {
 """Slips without a fix: what stands in their place, code, message, help."""
 _LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
-"""What may follow a string whose end is known though its quote is missing."""
+"""Text that may follow a string whose end is known though its quote is missing."""
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
 
 
@@ -333,7 +333,7 @@ class _Slips:
 
 
 LOOKAHEAD = 8
-"""How far past a mistake a repair is followed; further on it tells nothing more."""
+"""Tokens past a mistake that a repair is followed for; more of them tell nothing more."""
 
 # What brings a half-written statement to its end. What is tried first ends something; an operand or a name
 # is taken only where nothing else will do.

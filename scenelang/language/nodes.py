@@ -232,7 +232,7 @@ class Frozen(BaseModel):
 
 
 TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
-"""What pydantic names in the place of a mistake and text does not nest by."""
+"""Parts of the place of a mistake in pydantic that text does not nest by."""
 _MOST: Final = 3  # mistakes that one exception tells
 _WIDTH: Final = 40  # characters of a value that are shown
 _KINDS: Final = {
@@ -493,7 +493,7 @@ MaterialOp = Annotated[
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
 Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
 Unsaid = Annotated[Literal["default"], Tag("unsaid")]
-"""What the scene does not state: the language's default."""
+"""Value of what the scene does not state: the language's default."""
 STATED = Tag("stated")
 EITHER = Discriminator(lambda value: "unsaid" if isinstance(value, str) else "stated")
 

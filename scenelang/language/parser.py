@@ -44,7 +44,7 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
 
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 _ESCAPES_ELSEWHERE = "abefrvxuUN'01234567"
-"""What means something behind a backslash in other languages: there nobody meant the backslash itself."""
+"""Letters with a meaning behind a backslash in other languages: nobody meant the backslash itself there."""
 _LITERALS = (tree.Number, tree.String, tree.Bool, tree.Color, tree.NameRef, tree.BadExpr)
 
 

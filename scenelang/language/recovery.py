@@ -41,7 +41,7 @@ _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
 _MOST: Final = 50  # slips of one text
 _INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
-"""What a brace may be written for, likely ones first."""
+"""Tokens that a brace may be written for, likely ones first."""
 
 
 class _Slip(NamedTuple):
@@ -245,7 +245,7 @@ def _mends(
 
 
 FOLLOWED: Final = 80
-"""How many tokens the repairs that look best are followed to choose between them."""
+"""Number of tokens for which the likeliest repairs are followed, to choose between them."""
 _WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 _FAR: Final = 1000  # tokens that the statement of a loop without braces may have
@@ -274,13 +274,13 @@ _REPLACEMENTS: Final = {
     "(": {"[": 1.3},
     "[": {"(": 1.3},
 }
-"""What is likely written for something else; anything else costs `_SUBSTITUTION` more than inserting it."""
+"""Likely slips: what is written, what was meant and its cost; any other costs `_SUBSTITUTION` more."""
 _DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
 _CLOSING = 1.1
 
 _DIVISION: Final = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
-"""What is taken for a comment and was meant for a division."""
+"""Comment that was meant for a division."""
 _PLAIN: Final = re.compile(r"(?:[\w\s.,=#]|(?<=[(\[,])-|(?<=, )-)*+")
 """Items in brackets without an operator between them: the bracket ends behind them all."""
 _FLAT: Final = re.compile(r"[^()\[\]{};]*+")

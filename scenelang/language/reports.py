@@ -26,7 +26,7 @@ from scenelang.language.diagnostics import Diagnostic, Edit, Fix, SourceFile, Sp
 
 TAB = 4
 LONGEST = 4000
-"""Of a line with more code points only so many are laid out, near what is shown of it.
+"""Code points of a line that are laid out at most, near the part that is shown.
 
 A file of one line may have 10 MB and 200 mistakes.
 """
@@ -239,7 +239,7 @@ def _line(
 WIDTH = 140
 """Cells of a line where no terminal says otherwise."""
 _MOST_LINES = 6
-"""Of a longer change the rest is left out."""
+"""Lines of a change that are shown at most."""
 
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

@@ -37,7 +37,7 @@ Role = Literal[
 
 
 _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
-"""What words of the language are in an expression."""
+"""Roles of the language's words in an expression."""
 
 
 class Symbol(Record, frozen=False):

@@ -28,7 +28,7 @@ from scenelang.language.scene import Animation, Elements
 Env = list[Any]
 
 UNBOUND: Final = object()
-"""What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
+"""Value of a slot before its ``let``, ``param`` or ``animate`` has run."""
 
 
 class Needs(Record, frozen=False):
@@ -166,7 +166,7 @@ class Scope(Record, frozen=False):
 
 
 Watch = Callable[[Span, Any], None]
-"""What an editor looks on with; it may raise `Halt` to end the evaluation."""
+"""Callback of an editor that watches; it may raise `Halt` to end the evaluation."""
 
 
 class Settings(Record, frozen=False):
@@ -338,7 +338,7 @@ class Loader(Record, frozen=False):
     root: Path | None
     chain: list[Path] = field(default_factory=list)
     sites: list[Span] = field(default_factory=list)
-    """Where the imports of that chain are written."""
+    """Places of the imports of that chain."""
     parsed: dict[Path, tree.File] = field(default_factory=dict)
     prepared: dict[Path, Any] = field(default_factory=dict)
     """The `FileContext` of each file that has been prepared, under its last name."""

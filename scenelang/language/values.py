@@ -615,7 +615,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "rgb": _rgb,
     "hsv": _hsv,
 }
-"""What each function means; raises Problem."""
+"""Implementation of each function; raises Problem."""
 CONSTANTS: Final[dict[str, Any]] = {
     "PI": math.pi,
     "TAU": math.tau,
