@@ -207,7 +207,7 @@ def unknown(name: tree.Name, place: Place, call: tree.CallExpr | None = None) ->
 
 
 def _advice(name: tree.Name, place: Place, call: tree.CallExpr | None) -> Advice:
-    """What may have been meant by a name in an expression."""
+    """Advice on a name in an expression that stands for nothing."""
     text, span = name.text, name.span
     lower, source = text.lower(), span.source.text
     dotted = source[span.end : span.end + 1] == "."

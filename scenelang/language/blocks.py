@@ -338,7 +338,7 @@ HOLDERS = ("file", "group", "chain", "unknown")
 
 
 def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
-    """Whether children may stand here; reports it if not."""
+    """Test whether children may stand here, and report it if not."""
     if place.kind in HOLDERS:
         return True
     if place.kind == "material":
@@ -524,7 +524,7 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
 
 
 def _makes_child(stmt: tree.Stmt, place: Place) -> bool:
-    """Whether a statement after a boolean word is an object, a node or a call of a module."""
+    """Test whether a statement after a boolean word is an object, a node or a call of a module."""
     if isinstance(stmt, tree.Call):
         binding = lookup(stmt.name, place)
         return stmt.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)

@@ -39,7 +39,7 @@ def make(cls: type[M], fields: dict[str, Any]) -> M:
 
 
 class Builder:
-    """What the statements of one block put into their node.
+    """Contents of a node, collected from the statements of its block.
 
     Attributes:
         children: nodes, or the links of a chain.
@@ -86,7 +86,7 @@ class ChainBuilder(Builder):
 
 
 Kind = Literal["file", "group", "chain", "object", "material", "unknown"]
-"""What a block may hold. ``unknown`` is the block of something misspelt: nothing is out of place there."""
+"""Kind of a block, by its contents; ``unknown`` is that of something misspelt: all may stand there."""
 
 Action = Callable[[Env, Builder], None]
 
@@ -123,7 +123,7 @@ class FileContext:
 
 
 class Place(NamedTuple):
-    """Where a statement or an expression stands.
+    """Place of a statement or an expression: its scope, its file and its session.
 
     Args:
         kind: the kind of block around it.
@@ -146,7 +146,7 @@ class Place(NamedTuple):
 
     @property
     def report(self) -> Reporter:
-        """Where mistakes go."""
+        """Reporter of the session."""
         return self.file.session.report
 
     def inner(self, kind: Kind | None = None) -> Place:

@@ -31,7 +31,7 @@ class SourceFile:
 
     @cached_property
     def _starts(self) -> list[int]:
-        """Where each line begins."""
+        """Offset of the beginning of each line."""
         return [0, *(newline.end() for newline in re.finditer("\n", self.text))]
 
     def position(self, offset: int) -> tuple[int, int]:
@@ -198,7 +198,7 @@ _MOST_SLIPS = 8
 
 
 class Effort(Record, frozen=False):
-    """What looking for similar names may still cost, over all of a scene: it may hold thousands of both."""
+    """Budget for finding similar names in one scene, which may hold thousands of names and mistakes."""
 
     left: int = 500_000  # pairs of letters that may still be compared
 
@@ -225,7 +225,7 @@ def ranked(
     limit = min(len(name) // 3 if slips is None else slips, _MOST_SLIPS)
     plain, letters = _plain(name), set(name.lower())
     effort = effort or Effort()
-    found = []
+    candidates = []
     for candidate in sorted(set(known)):
         if effort.spent:
             break
@@ -245,14 +245,14 @@ def ranked(
             distance += _FIRST * (name[:1].lower() != candidate[:1].lower())
             if distance > limit + _FIRST or distance >= max(len(name), len(candidate)):
                 continue
-        found.append((distance, candidate))
-    return sorted(found)
+        candidates.append((distance, candidate))
+    return sorted(candidates)
 
 
 def nearest(name: str, known: Iterable[str], slips: int | None = None) -> str | None:
     """The known name with the fewest slips from ``name``; None where none is near."""
-    found = ranked(name, known, slips)
-    return found[0][1] if found else None
+    result = ranked(name, known, slips)
+    return result[0][1] if result else None
 
 
 def _plain(name: str) -> str:
@@ -288,9 +288,9 @@ class Suggestion(str):
     name: str
 
     def __new__(cls, name: str) -> Suggestion:
-        made = super().__new__(cls, f"did you mean `{name}`?")
-        made.name = name
-        return made
+        suggestion = super().__new__(cls, f"did you mean `{name}`?")
+        suggestion.name = name
+        return suggestion
 
 
 def did_you_mean(
@@ -300,11 +300,11 @@ def did_you_mean(
 
     Where several names are equally near there is no fix, and the help names the first three.
     """
-    found = ranked(name, known, slips, effort)
-    if not found:
+    ranking = ranked(name, known, slips, effort)
+    if not ranking:
         return None, None
-    best = found[0][0]
-    near = [candidate for distance, candidate in found if distance < best + _CLEAR]
+    best = ranking[0][0]
+    near = [candidate for distance, candidate in ranking if distance < best + _CLEAR]
     if len(near) > 1:
         shown = [f"`{candidate}`" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
@@ -313,7 +313,7 @@ def did_you_mean(
 
 
 def is_slip(name: str, other: str, distance: float) -> bool:
-    """Whether one name can only have been meant for the other.
+    """Test whether one name can only have been meant for the other.
 
     `p3` is not `p2`, `rotateX` not `rotate` and `heptagon` not `pentagon`: they mean something of their own.
     """
@@ -404,7 +404,7 @@ def removal(source: SourceFile, start: int, end: int) -> Fix:
 
 
 def _fits(fix: Fix, text: str) -> bool:
-    """Whether a fix was made for this text and changes something."""
+    """Test whether a fix belongs to this text and changes something."""
     return any(e.span.text != e.replacement for e in fix.edits) and all(
         (e.span.source.text is text or e.span.source.text == text)
         and 0 <= e.span.start <= e.span.end <= len(text)
@@ -417,7 +417,7 @@ def _order(edit: Edit) -> tuple[int, int]:
 
 
 def _meets(taken: list[Edit], edit: Edit) -> bool:
-    """Whether an edit shares text with a neighbour, or an insertion its place: then order would matter."""
+    """Test whether an edit overlaps a neighbour or inserts at the same place, so that order would matter."""
     at = bisect_left(taken, _order(edit), key=_order)
     for other in taken[max(0, at - 1) : at + 1]:
         (start, end), (next_start, next_end) = sorted((_order(edit), _order(other)))
@@ -468,14 +468,14 @@ def settle(
             fixed[key] += done
         if after == now:
             return Settled(now, applied, left, True)
-        found = tuple(check(after))
-        if tuple(after.values()) in seen or (_unreadable(found) and not _unreadable(left)):
+        remaining = tuple(check(after))
+        if tuple(after.values()) in seen or (_unreadable(remaining) and not _unreadable(left)):
             break
         seen.add(tuple(after.values()))
-        now, applied, left = after, fixed, found
+        now, applied, left = after, fixed, remaining
     return Settled(now, applied, left, False)
 
 
-def _unreadable(found: Iterable[tuple[Key | None, Diagnostic]]) -> bool:
-    """Whether there are syntax errors; a fix that brings the first one is a bug, and its round is dropped."""
-    return any(d.code.startswith("E01") for _, d in found)
+def _unreadable(diagnostics: Iterable[tuple[Key | None, Diagnostic]]) -> bool:
+    """Test for syntax errors; a fix that brings the first one is a bug, and its round is dropped."""
+    return any(d.code.startswith("E01") for _, d in diagnostics)

@@ -39,7 +39,7 @@ def texts_of(comments: Iterable[Comment]) -> list[str]:
 
 
 class Notes(Record, frozen=False):
-    """What stands around one token."""
+    """Comments and blank lines around one token."""
 
     before: list[Comment] = field(default_factory=list)  # comments on lines of their own before it
     leading: Sequence[Comment] = ()  # block comments before it on its line
@@ -65,13 +65,13 @@ def attach(tokens: Tokens) -> dict[int, Notes]:
 def comments_of(tokens: Tokens) -> list[str]:
     """The texts of all comments, in order, without the white space at the ends of their lines."""
     text = tokens.source.text
-    found: list[str] = []
+    comments: list[str] = []
     end = 0
     for start, stop in zip(tokens.starts, tokens.ends, strict=True):
         if start - end > 1:
-            found += ["\n".join(map(str.strip, c.split("\n"))) for c in _COMMENT.findall(text, end, start)]
+            comments += ["\n".join(map(str.strip, c.split("\n"))) for c in _COMMENT.findall(text, end, start)]
         end = stop
-    return found
+    return comments
 
 
 def _attach(
@@ -152,7 +152,7 @@ class Word(Doc):
 
 
 class Break(Doc):
-    """Where the line breaks once the group around it does not fit."""
+    """Line break, taken once the group around it does not fit."""
 
     __slots__ = ()
 
@@ -168,7 +168,7 @@ class Concat(Doc):
 
 
 class Group(Doc):
-    """What is on one line if it fits, and otherwise as ``maker`` says, which is asked at most once."""
+    """Document on one line if it fits, otherwise that of ``maker``, which is called at most once."""
 
     __slots__ = ("_made", "maker")
 
@@ -178,7 +178,7 @@ class Group(Doc):
         self._made: Part | None = None
 
     def broken(self) -> Part:
-        """What it is where it does not fit on a line."""
+        """Layout over several lines."""
         if self._made is None:
             self._made = self.maker()
         return self._made
@@ -357,7 +357,7 @@ class _Printer:
             self.line = " " * self.margin + text
 
     def fits(self, flat: str, margin: int, stack: Sequence[tuple[int, Part]]) -> bool:
-        """Whether a text fits on the line, and what comes up to the next place to break too."""
+        """Test whether a text, and what follows it up to the next break, fits on the line."""
         column = margin + INDENT if self.ended else len(self.line) or self.margin
         room = WIDTH - column - len(flat)
         return room >= 0 and _reach(stack, room) <= room
@@ -399,7 +399,7 @@ def _shifted(line: str, shift: int | None) -> str:
 
 
 def _reach(stack: Sequence[tuple[int, Part]], room: int) -> int:
-    """How many columns follow before the line can break; may stop counting beyond ``room``."""
+    """Number of columns before the line can break; may stop counting beyond ``room``."""
     used = 0
     for _, top in reversed(stack):
         todo = [top]

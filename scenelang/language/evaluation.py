@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.records import Record, deep_stack
-from scenelang.language import tree
 from scenelang.language import tree as nodes
 from scenelang.language.blocks import Body
 from scenelang.language.builder import Builder, FileContext, Place, make
@@ -190,7 +189,7 @@ class Evaluation:
 
     @property
     def spent(self) -> bool:
-        """Whether all runs together exceed the limits of one."""
+        """Test whether all runs together exceed the limits of one."""
         return self._steps > MAX_STEPS or self._objects > MAX_OBJECTS
 
     def warn_of_zeros(self) -> None:
@@ -297,10 +296,10 @@ def load(
         ValueError: ``size`` is not a canvas.
         OSError: the file cannot be opened.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
-    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(found, frame)
-    return _sound(scene, found)
+    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(diagnostics, frame)
+    return _sound(scene, diagnostics)
 
 
 def loads(
@@ -321,10 +320,10 @@ def loads(
         text: the scene.
         name: what diagnostics call it.
     """
-    found = diagnostics if diagnostics is not None else Diagnostics()
+    diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
     source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
-    return _sound(source.scene(found, frame)[0], found)
+    return _sound(source.scene(diagnostics, frame)[0], diagnostics)
 
 
 def opened(
@@ -345,9 +344,9 @@ def opened(
     return _sound(scene, diagnostics), spans
 
 
-def _sound(scene: Scene | None, found: Diagnostics) -> Scene:
+def _sound(scene: Scene | None, diagnostics: Diagnostics) -> Scene:
     if scene is None:
-        raise SceneError(found)
+        raise SceneError(diagnostics)
     return scene
 
 
@@ -387,7 +386,7 @@ class Knob(Record):
         inner: whether the value is a vector of the axes' numbers.
     """
 
-    stmt: tree.Param
+    stmt: nodes.Param
     value: Any
     axes: tuple[Axis, ...]
     inner: bool
@@ -398,12 +397,12 @@ class Knob(Record):
         return self.stmt.name.text
 
 
-def params_of(evaluation: Evaluation) -> dict[str, tree.Param]:
+def params_of(evaluation: Evaluation) -> dict[str, nodes.Param]:
     """The params of the file itself, by name; those of imports are other files'."""
-    return {stmt.name.text: stmt for stmt in evaluation.file.statements if isinstance(stmt, tree.Param)}
+    return {stmt.name.text: stmt for stmt in evaluation.file.statements if isinstance(stmt, nodes.Param)}
 
 
-def param_named(evaluation: Evaluation, name: str) -> tree.Param:
+def param_named(evaluation: Evaluation, name: str) -> nodes.Param:
     """A param of the file itself; raises `ParamError` without one."""
     known = params_of(evaluation)
     if name in known:
@@ -413,8 +412,8 @@ def param_named(evaluation: Evaluation, name: str) -> tree.Param:
     raise ParamError(f"no param `{name}` in `{evaluation.file.span.source.name}`" + f"; {help}" * bool(help))
 
 
-def knob_of(stmt: tree.Param, file: FileContext) -> Knob:
-    """What a param may be set to, after a run; raises `ParamError` where nothing says so."""
+def knob_of(stmt: nodes.Param, file: FileContext) -> Knob:
+    """Values that a param may be set to, after a run; raises `ParamError` where nothing gives them."""
     name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
     allowed: Any = None
     if stmt.range is not None:
@@ -463,10 +462,10 @@ def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
     return choices
 
 
-def is_colour(expr: tree.Expr) -> bool:
-    """Whether an expression is written as a colour."""
-    return isinstance(expr, tree.Color) or (
-        isinstance(expr, tree.CallExpr) and expr.name.text in ("rgb", "hsv")
+def is_colour(expr: nodes.Expr) -> bool:
+    """Test whether an expression is written as a colour."""
+    return isinstance(expr, nodes.Color) or (
+        isinstance(expr, nodes.CallExpr) and expr.name.text in ("rgb", "hsv")
     )
 
 
@@ -498,7 +497,7 @@ def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:
     return f"[{', '.join(_literal(item, axis, knob.stmt.default, digits) for item, axis in items)}]"
 
 
-def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
+def _literal(value: Any, axis: Axis, default: nodes.Expr, digits: int) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -511,7 +510,7 @@ def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
     x, kind = unpack(value)
     unit = ""
     if kind != "number":
-        units = (node.unit for node in tree.walk(default) if isinstance(node, tree.Number))
+        units = (node.unit for node in nodes.walk(default) if isinstance(node, nodes.Number))
         unit = next(filter(None, units), "deg" if kind == "angle" else "s")
     factor = _UNITS.get(unit, 1.0)
     if axis.choices:
@@ -526,19 +525,19 @@ def _literal(value: Any, axis: Axis, default: tree.Expr, digits: int) -> str:
 
 def literals_of(evaluation: Evaluation, names: Iterable[str]) -> dict[str, str]:
     """The values that params of the file had in the last run, as text of the language."""
-    found, file = {}, evaluation.context
+    literals, file = {}, evaluation.context
     for name, stmt in params_of(evaluation).items():
         if name in names:
             value = file.env[file.scope.names[name].slot]
-            found[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
-    return found
+            literals[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
+    return literals
 
 
-def rewritten(file: tree.File, literals: Mapping[str, str]) -> str:
+def rewritten(file: nodes.File, literals: Mapping[str, str]) -> str:
     """A scene's text with other defaults of its params, by name; all else stays as it was."""
     text = file.span.source.text
     for stmt in reversed(file.statements):
-        if isinstance(stmt, tree.Param) and stmt.name.text in literals:
+        if isinstance(stmt, nodes.Param) and stmt.name.text in literals:
             span = stmt.default.span
             text = text[: span.start] + literals[stmt.name.text] + text[span.end :]
     return text

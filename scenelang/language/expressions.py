@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from scenelang.language import foreign, limits, tree, values, words
-from scenelang.language.advice import VALUES, report_problem, unknown, unknown_member
+from scenelang.language.advice import VALUES, member_advice, report_problem, unknown, unknown_member
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Fix, Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
@@ -41,7 +41,7 @@ VARIES: Final = object()
 """Marks an expression whose value is known only when it runs."""
 _FOLDED_NUMBERS: Final = 64
 _ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
-"""What takes an angle first, and how it calls it."""
+"""Words whose first argument is an angle, and its name."""
 
 
 class Code(NamedTuple):
@@ -236,8 +236,6 @@ def member(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
-        from scenelang.language.advice import member_advice  # only mistakes need it
-
         help, fix = member_advice(name), None
         if help is None:
             help, fix = did_you_mean(name.text, COMPONENTS, name.span)
@@ -294,7 +292,7 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
-"""What operators mean on two numbers, unless that is an error or not finite."""
+"""Operators on two numbers, unless the result is an error or not finite."""
 _MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     **{op: partial(values.binary, op) for op in values.ARITHMETIC},
     **{op: partial(values.compare, op) for op in values.COMPARE},
@@ -427,8 +425,8 @@ def lookup(name: tree.Name, place: Place) -> Binding | None:
     if binding.value is None:
         return Binding("poison")
     exported: FileContext = binding.value
-    found = exported.scope.names.get(rest)
-    return None if found is None or found.kind == "import" else found
+    result = exported.scope.names.get(rest)
+    return None if result is None or result.kind == "import" else result
 
 
 def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, help: str | None = None) -> None:
@@ -492,15 +490,15 @@ def prepare_member(expr: tree.Member, place: Place) -> Code:
         code = prepare(value, place)
         return POISONED if code.value is POISON else member(code, expr.name, place, value)
     name = tree.Name(expr.span, f"{value.span.text}.{expr.name.text}")
-    found = lookup(name, place)
-    if found is not None:
-        return _as_value(name, found, place)
+    result = lookup(name, place)
+    if result is not None:
+        return _as_value(name, result, place)
     unknown_member(name, place, binding.value)
     return POISONED
 
 
 def signature(name: str, params: Sequence[str], required: int) -> str:
-    """How a call looks, for help texts: ``translate(x, y[, z])``."""
+    """Form of a call, for help texts: ``translate(x, y[, z])``."""
     text = ", ".join(params[:required])
     for param in params[required:]:
         text += f"[, {param}]" if text else f"[{param}]"
@@ -653,8 +651,6 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code
 def _method(expr: tree.CallExpr, place: Place) -> None:
     """Report `v.length()`: a value has no functions."""
     rest, source = expr.name.text.partition(".")[2], expr.name.span.source
-    from scenelang.language.advice import member_advice  # only mistakes need it
-
     last = tree.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
     help = member_advice(last) or f"write {rest}(…) with the value as an argument"
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help)
@@ -673,7 +669,7 @@ def _doubted_hsv(exprs: Sequence[tree.Expr], place: Place) -> Callable[..., Any]
 
 
 def entering(name: tree.Name, args: Sequence[Given], definition: Definition, place: Place) -> Run | None:
-    """How to make the slots of one call, which also counts it; None if the arguments do not fit.
+    """Function that counts a call and makes its slots; None if the arguments do not fit.
 
     When the call is over, the caller takes 1 from the session's depth and puts its calls back.
     """

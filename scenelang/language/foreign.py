@@ -77,7 +77,7 @@ MATERIALS: Final = _each_word(
 """Materials under another name, and what there is instead of others."""
 
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
-"""What stands before the names of functions and constants."""
+"""Prefixes of the names of functions and constants."""
 
 VALUES: Final = _each_word(
     {

@@ -1,7 +1,7 @@
 """Scene text in one canonical layout: `format_text`, and `format_range` for editors.
 
-They take the place of those that build the tree (`scenelang.language.parser`): a token comes as its index,
-everything else as the part that another callback has made.
+The parser runs with callbacks that build documents in the place of a tree: a token comes as its index,
+everything else as the part that another callback has returned.
 
 Which blocks may stand on one line:
 
@@ -116,7 +116,7 @@ def _numbers(items: Sequence[Item]) -> list[str]:
 
 
 def blank_before(part: Part) -> bool:
-    """Whether a blank line stands before a part and its comments."""
+    """Test for a blank line before a part and its comments."""
     if isinstance(part, str):
         return False
     return part.before[0].blank if part.before else part.blank
@@ -445,7 +445,7 @@ def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Par
 
 
 def _lined(parts: Sequence[Part], flat: str | None) -> Group:
-    """What follows on the same line or, where that is too long, on a line of its own."""
+    """Document on the same line or, where that is too long, on a line of its own."""
     return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
 
 
@@ -711,9 +711,6 @@ def _comments(text: str) -> list[str]:
     return comments_of(scan(source, Report(source)))
 
 
-def _statements(text: str, found: Diagnostics) -> list[tuple[int, int]]:
+def _statements(text: str, diagnostics: Diagnostics) -> list[tuple[int, int]]:
     """Start and end of each statement of the top level of a text without errors."""
-    return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), found).statements]
-
-
-__all__ = ["format_range", "format_text"]
+    return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), diagnostics).statements]

@@ -1,4 +1,4 @@
-"""What people write out of habit, from OpenSCAD, GLSL, JavaScript and Python, and what is written here.
+"""Habits from OpenSCAD, GLSL, JavaScript and Python: the pattern that people write, and its form here.
 
 A habit is a pattern and its replacement, as texts with holes: ``for (<i> = [<A>:<B>])`` and
 ``for (<i> in <A>..<B>)``.
@@ -323,7 +323,7 @@ def _expression(pattern: str) -> re.Pattern[str]:
 
 
 class _Match(Record):
-    """Where the holes of a pattern were found: indices of tokens, first and past the last."""
+    """Places of a pattern's holes: indices of tokens, first and past the last."""
 
     tokens: Tokens
     start: int
@@ -338,7 +338,7 @@ class _Match(Record):
         start, stop = self.holes[hole]
         return self.tokens.source.text[self.tokens.starts[start] : self.tokens.ends[stop - 1]]
 
-    def told(self, words: str) -> str:
+    def filled(self, words: str) -> str:
         """Words for a report, with the names that it has in its holes."""
         for hole in filter(str.islower, self.holes):
             words = words.replace(f"<{hole}>", self.text(hole))
@@ -348,14 +348,14 @@ class _Match(Record):
 def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
     """The tokens from ``at`` on that a pattern describes; None where they are others."""
     text, begin = tokens.source.text, tokens.starts[at]
-    found = _expression(pattern).match(text, begin, begin + _LONGEST)
-    if found is None:
+    matched = _expression(pattern).match(text, begin, begin + _LONGEST)
+    if matched is None:
         return None
 
     def index(offset: int) -> int:
         return bisect_left(tokens.starts, offset, at, len(tokens.starts) - 1)
 
-    holes, stop = {}, index(found.end())
+    holes, stop = {}, index(matched.end())
     for piece in _PIECE.finditer(pattern):
         hole = piece["hole"]
         if hole in ("BODY", "BLOCK"):
@@ -365,7 +365,7 @@ def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
             holes[hole], stop = (stop, end), end
             stop += hole == "BLOCK" and tokens.text(stop) == ";"
         elif hole:
-            start, end = found.span(re.sub(r"\W", "_", f"g_{hole}"))
+            start, end = matched.span(re.sub(r"\W", "_", f"g_{hole}"))
             if start < end:
                 holes[hole] = (index(start), index(end))
     if stop <= at or any(first >= last for first, last in holes.values()):
@@ -401,7 +401,8 @@ def _body(tokens: Tokens, at: int, head: int) -> int:
 def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
     """Text and tokens of a replacement: holes keep their places, all else is empty.
 
-    Holes that change their order are left out of the tokens: nothing is known of them.
+    A `BAD_` token takes the text behind the last hole before it. Holes that change their order are left out
+    of the tokens: nothing is known of them.
     """
     tokens, language = match.tokens, tables()
     text, new, at = "", [], tokens.starts[match.start]
@@ -423,8 +424,8 @@ def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
                 kind = "BAD_EXPRESSION" if hole.isupper() else "NAME"
                 new.append((language.kind(kind), at, at))
         elif word and word.startswith("BAD_"):
-            end = tokens.ends[match.stop - 1]
-            new.append((language.kind(word), tokens.starts[match.start], end))
+            begin, at = at, tokens.ends[match.stop - 1]  # behind the holes before it, so that spans nest
+            new.append((language.kind(word), begin, at))
         else:
             if hole:
                 whole = tokens.source.text
@@ -469,27 +470,27 @@ def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at:
 
 
 def _anchors(tokens: Tokens, first: int, at: int) -> dict[str, list[int]]:
-    """Where a pattern may begin, by what it begins with."""
-    found: dict[str, list[int]] = {"(": [], "[": [], "<": [at], "A": [], "name": [first], "word": [first]}
-    found["word"] += [at - 1] * (at - 1 > first)
+    """Indices at which a pattern may begin, by its first word, sign or hole."""
+    anchors: dict[str, list[int]] = {"(": [], "[": [], "<": [at], "A": [], "name": [first], "word": [first]}
+    anchors["word"] += [at - 1] * (at - 1 > first)
     depth = 0
     for index in range(at - 1, max(first, at - 200), -1):
         text = tokens.text(index)
         depth += (text in (")", "]")) - (text in ("(", "["))
-        if depth <= 0 and text in ("(", "[", ",", "=", "return") and not found["A"]:
-            found["A"] = [index + 1]
+        if depth <= 0 and text in ("(", "[", ",", "=", "return") and not anchors["A"]:
+            anchors["A"] = [index + 1]
         if depth < 0:
             before = tokens.text(index - 1)
             operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
-            found[text] = [] if operand else [index]
+            anchors[text] = [] if operand else [index]
             break
-    return found
+    return anchors
 
 
 def _reads_on(
     tokens: Tokens, stack: list[int], first: int, at: int, match: _Match, new: list[Token], meant: str
 ) -> bool:
-    """Whether a replacement lets the rest of the statement read, or the head of one with a block."""
+    """Test whether a replacement lets the rest of the statement read, or the head of one with a block."""
     if match.start > at:
         return False
     before, after = tokens.part(first, match.start), tokens.part(match.stop, match.stop + _FOLLOWED)
@@ -518,12 +519,12 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
         return
     text = tokens.source.text
     old = text[start:end]
-    code, message, help = habit.code, match.told(habit.message), habit.help and match.told(habit.help)
+    code, message, help = habit.code, match.filled(habit.message), habit.help and match.filled(habit.help)
     safe = habit.safe and "…" not in new and "//" not in old and "/*" not in old
     if habit.message == _BOUND:
         name = match.text("n")
         if re.search(rf"\b{name}\b", text[:start]):
-            code, message, help, safe = "E0133", match.told(_ONCE), _NEW_NAME, False
+            code, message, help, safe = "E0133", match.filled(_ONCE), _NEW_NAME, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
             help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
     elif habit.message == _BEFORE and match.start and head(tokens, match.start - 1) in _MOVES:
@@ -550,7 +551,7 @@ def head(tokens: Tokens, at: int) -> str:
 
 
 def _alike(one: str, other: str) -> int:
-    """How many letters two texts begin with alike, without half a word."""
+    """Number of letters that two texts have in common at their start, without half a word."""
     pairs = enumerate(zip(one, other, strict=False))
     count = next((at for at, (a, b) in pairs if a != b), min(len(one), len(other)))
     while count and re.match(r"\w\w", one[count - 1 : count + 1] + other[count : count + 1]):

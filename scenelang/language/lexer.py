@@ -70,7 +70,7 @@ _SAID = {
 """Slips without a fix: what stands in their place, code, message, help."""
 _LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
-"""What may follow a string whose end is known though its quote is missing."""
+"""Text that may follow a string whose end is known though its quote is missing."""
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
 
 
@@ -147,11 +147,11 @@ class Tokens:
         return self.starts[first], self.ends[(stop or first + 1) - 1]
 
     def end_before(self, index: int) -> int:
-        """Where the token before ``index`` ends: where something missing belongs."""
+        """End of the token before ``index``, the place of something missing."""
         return self.ends[index - 1] if index else 0
 
     def on_new_line(self, index: int) -> bool:
-        """Whether a token is the first of its line."""
+        """Test whether a token is the first of its line."""
         return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
 
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
@@ -175,10 +175,6 @@ class Tokens:
         """Put others in the place of the tokens ``[first, stop)``."""
         for number, column in enumerate((self.kinds, self.starts, self.ends)):
             column[first:stop] = [token[number] for token in new]
-
-    def give_up(self, first: int, stop: int, name: str, start: int, end: int) -> None:
-        """Put one token that stands for what cannot be read in the place of some."""
-        self.splice(first, stop, [(tables().kind(name), start, end)])
 
     def drop(self, indices: Sequence[int]) -> None:
         """Take out any number of tokens at once."""
@@ -289,8 +285,8 @@ class _Slips:
             )
             return
         self._keep("NUMBER", start, end)
-        found = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
-        value, rest = found.groups() if found else ("", text)
+        result = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
+        value, rest = result.groups() if result else ("", text)
         message, fix = f"`{text}` is not a number", None
         help = "numbers look like `1`, `0.5` or `1e-3`"
         if rest in ("f", "F"):
@@ -337,7 +333,7 @@ class _Slips:
 
 
 LOOKAHEAD = 8
-"""How far past a mistake a repair is followed; further on it tells nothing more."""
+"""Tokens past a mistake that a repair is followed for; more of them tell nothing more."""
 
 # What brings a half-written statement to its end. What is tried first ends something; an operand or a name
 # is taken only where nothing else will do.
@@ -422,7 +418,7 @@ def advance(stack: list[int], kind: int) -> bool:
 
 
 def fits(stack: list[int], kind: int) -> bool:
-    """Whether one token can follow."""
+    """Test whether a token can follow."""
     return advance(stack.copy(), kind)
 
 

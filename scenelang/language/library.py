@@ -1,6 +1,6 @@
 """The library that ships, `std/…`, and the places where nodes of a Scene were written.
 
-Such a name means a file of this package wherever it is written. A user's own file of that name is
+A path ``std/shapes`` means a file of this package wherever it is written. A user's own file of that name is
 ``./std/shapes``; one with a suffix, ``std/shapes.nsg``, is always the user's.
 """
 
@@ -26,12 +26,12 @@ _FILES: Final = {f"std/{path.stem}": path for path in _FOLDER.iterdir() if path.
 
 
 def is_reserved(text: str) -> bool:
-    """Whether an import's path is the library's to give, a file of it or not."""
+    """Test whether an import's path is reserved for the library, whether it has such a file or not."""
     return _RESERVED.fullmatch(text) is not None
 
 
 def names() -> list[str]:
-    """What there is to import."""
+    """Names of the files that can be imported."""
     return sorted(_FILES)
 
 
@@ -41,17 +41,17 @@ def find(text: str) -> Path | None:
 
 
 def owns(path: Path) -> bool:
-    """Whether a resolved path is a file of the library."""
+    """Test whether a resolved path is a file of the library."""
     return path.parent == _FOLDER
 
 
 def called(name: str) -> str:
-    """What a file of the library is called in diagnostics and Programs, wherever it is installed."""
+    """Name of a library file in diagnostics and Programs, wherever it is installed."""
     return f"<{name}>"
 
 
 def holds(source: SourceFile) -> bool:
-    """Whether a text is a file of the library."""
+    """Test whether a text is a file of the library."""
     return source.name.startswith("<std/")
 
 

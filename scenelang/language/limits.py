@@ -1,6 +1,6 @@
 """Limits of a scene and of its evaluation, and costs in evaluation steps.
 
-Most of it is known when a block is prepared: a node of the tree is half a step, unless it is named here.
+Most costs are known when a block is prepared: a node of the tree is half a step, unless it is named here.
 """
 
 from __future__ import annotations

@@ -84,27 +84,27 @@ def _escaped(text: str, further: str = "") -> str:
 
 def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) -> str:
     """A SARIF 2.1.0 log with one run, its rules with the pages that explain them; states a ``version``."""
-    found = in_order(diagnostics)
-    severities = {d.code: d.severity for d in found}
+    ordered = in_order(diagnostics)
+    severities = {d.code: d.severity for d in ordered}
     used = sorted(severities)
     rules = [_rule(code, severities[code]) for code in used]
     driver: dict[str, Any] = {"name": "scenelang", "rules": rules}
     if version is not None:
         driver["version"] = version
-    errors = sum(d.severity == "error" for d in found)
-    counts = {"errors": errors, "warnings": len(found) - errors}
+    errors = sum(d.severity == "error" for d in ordered)
+    counts = {"errors": errors, "warnings": len(ordered) - errors}
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
-        "results": [_result(d, used.index(d.code)) for d in found],
-        "properties": {**counts, "fixable": sum(d.fix is not None for d in found)},
+        "results": [_result(d, used.index(d.code)) for d in ordered],
+        "properties": {**counts, "fixable": sum(d.fix is not None for d in ordered)},
     }
     log = {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
     return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
 
 
 def _rule(code: str, severity: str) -> dict[str, Any]:
-    """What viewers show of a code: its title, what it means, its page."""
+    """Rule of a code as viewers show it: title, meaning and page."""
     from scenelang.language.pages import read_page
 
     rule: dict[str, Any] = {"id": code, "defaultConfiguration": {"level": severity}}

@@ -7,7 +7,14 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language import tree
-from scenelang.language.advice import VALUES, report_problem, unknown, unknown_member
+from scenelang.language.advice import (
+    VALUES,
+    material_advice,
+    report_problem,
+    unknown,
+    unknown_material,
+    unknown_member,
+)
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -143,8 +150,10 @@ def _numbers(cls: type[Frozen], refused: str = "") -> Callable[..., Any]:
         for operand, value in enumerate(values):
             if refused and describe(value) == "an angle":
                 raise unexpected("a number", value, refused, operand)
-        found = {name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))}
-        return make(cls, {"kind": kind, **found})
+        parameters = {
+            name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))
+        }
+        return make(cls, {"kind": kind, **parameters})
 
     return build
 
@@ -236,8 +245,6 @@ def _spec(stmt: tree.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        from scenelang.language.advice import material_advice
-
         help = f"put it into a material's block, as in {material_advice(place, name)}"
         if name == "flip":
             help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
@@ -291,12 +298,12 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     if all(one is None or one.code.value is not VARIES for one in bound):
         place.file.weight += SAME_MOVE
         constants = [None if one is None else one.code.value for one in bound]
-        made: list[Any] = []
+        created: list[Any] = []
 
         def repeat(env: Env, out: Builder) -> None:
-            if not made:
-                made.append(construct(constants))
-            append(made[0], out)
+            if not created:
+                created.append(construct(constants))
+            append(created[0], out)
 
         return repeat
 
@@ -323,7 +330,7 @@ def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
 def _stands(
     place: Place, span: Span, what: str, help: str, inside: str | None = None, name: str = ""
 ) -> bool:
-    """Whether a material may stand here; reports it if not."""
+    """Test whether a material may stand here, and report it if not."""
     if place.kind not in ("file", "material"):
         return True
     at_top = place.kind == "file"
@@ -355,7 +362,7 @@ def prepare_material(expr: tree.MaterialExpr, place: Place) -> Code:
 
 
 def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Callable[[Env], Material] | None:
-    """How to make the material node; None where a name is unknown."""
+    """Function that makes the material node; None where a name is unknown."""
     name, session = written.name, place.session
     operations = _operations(written.body, place)
     called, shading = _called(name, place), _shading(written, place)
@@ -372,7 +379,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
-    """What a Scene calls a material; None after a report."""
+    """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
         known = {*MATERIALS, *TEXTURES}
@@ -414,7 +421,7 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
 
 
 def _operations(body: tree.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
-    """How to get the operations of a material's block."""
+    """Function that returns the operations of a material's block."""
     if body is None:
         return lambda env: ()
     prepared = prepare_inner(body, place.inner("material"))
@@ -436,8 +443,6 @@ def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
     elif name.text in GEOMETRIES:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        from scenelang.language.advice import unknown_material  # only mistakes need it
-
         hint, fix = unknown_material(name, place, known)
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
@@ -446,8 +451,6 @@ def _is_value(name: tree.Name, place: Place) -> None:
     """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
-        from scenelang.language.advice import material_advice  # only mistakes need it
-
         message = f"expected a material, found {describe(binding.value)}"
         help = f"for a colour write {material_advice(place, 'color', name.text)}"
         place.report.error("E0301", message, span, help=help, labels=binding.labels())
@@ -490,8 +493,6 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            from scenelang.language.advice import material_advice  # only mistakes need it
-
             help = f"for a colour write {material_advice(place, 'color', name)}"
             session.report.error("E0301", message, span, labels=binding.labels(), help=help)
             return

@@ -110,7 +110,7 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whol
 
 
 def singular(rows: Sequence[Sequence[float]]) -> bool:
-    """Whether the 3 x 3 linear block of an affine has no inverse.
+    """Test whether the 3 x 3 linear block of an affine has no inverse.
 
     A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
     """
@@ -167,7 +167,7 @@ def _decoded(name: str, text: str) -> tuple[float, float, float]:
 
 
 class Frozen(BaseModel):
-    """What all nodes of a Scene are."""
+    """Base of all nodes of a Scene."""
 
     # Validators are built when first used: a scene evaluated from text needs none.
     model_config = ConfigDict(
@@ -195,7 +195,7 @@ class Frozen(BaseModel):
 
     @classmethod
     def _names(cls) -> list[str]:
-        """What a constructor takes, in order."""
+        """Arguments of a constructor, in order."""
         return [name for name in cls.model_fields if name != "kind"]
 
     @classmethod
@@ -218,7 +218,7 @@ class Frozen(BaseModel):
         return given
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        """What differs from the defaults: the code that makes it."""
+        """Arguments that differ from the defaults: the code that makes the node."""
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
             if field.is_required() or value != field.default:
@@ -232,7 +232,7 @@ class Frozen(BaseModel):
 
 
 TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
-"""What pydantic names in the place of a mistake and text does not nest by."""
+"""Parts of the place of a mistake in pydantic that text does not nest by."""
 _MOST: Final = 3  # mistakes that one exception tells
 _WIDTH: Final = 40  # characters of a value that are shown
 _KINDS: Final = {
@@ -256,10 +256,10 @@ def said(item: ErrorDetails) -> str:
 
 
 def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
-    """What the constructor of class ``name`` raises; ``known`` are the names of its arguments."""
-    found = error.errors(include_url=False)
-    lines = [_line(item, known) for item in found[:_MOST]]
-    more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    """Exception that the constructor of class ``name`` raises; ``known`` are the names of its arguments."""
+    errors = error.errors(include_url=False)
+    lines = [_line(item, known) for item in errors[:_MOST]]
+    more = f"; and {len(errors) - _MOST} more" if len(errors) > _MOST else ""
     return ValueError(f"{name}: {'; '.join(lines)}{more}")
 
 
@@ -493,13 +493,13 @@ MaterialOp = Annotated[
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
 Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
 Unsaid = Annotated[Literal["default"], Tag("unsaid")]
-"""What the scene does not state: the language's default."""
+"""Value of what the scene does not state: the language's default."""
 STATED = Tag("stated")
 EITHER = Discriminator(lambda value: "unsaid" if isinstance(value, str) else "stated")
 
 
 class Camera(Frozen):
-    """Where a 3D scene is seen from; ``fov`` is the angle of view in radians across the shorter side."""
+    """Viewpoint of a 3D scene; ``fov`` is the angle of view in radians across the shorter side."""
 
     eye: Point = (0.0, 1.2, 6.0)
     target: Point = (0.0, 0.0, 0.0)
@@ -629,7 +629,7 @@ def blend_width(op: str, k: float) -> float | None:
 
 
 class _Joining(Frozen):
-    """What joins by an operator."""
+    """Base of nodes that join by an operator."""
 
     @model_validator(mode="after")
     def _unions_have_no_width(self, info: ValidationInfo) -> Self:

@@ -44,7 +44,7 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
 
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 _ESCAPES_ELSEWHERE = "abefrvxuUN'01234567"
-"""What means something behind a backslash in other languages: there nobody meant the backslash itself."""
+"""Letters with a meaning behind a backslash in other languages: nobody meant the backslash itself there."""
 _LITERALS = (tree.Number, tree.String, tree.Bool, tree.Color, tree.NameRef, tree.BadExpr)
 
 
@@ -83,7 +83,7 @@ class Builder:
         return Span(self.source, start, self.ends[last] if isinstance(last, int) else last.span.end)
 
     def sign(self, token: int) -> Any:
-        """What a literal token stands for; recovery may have read it from other text."""
+        """Sign or word of a literal token; recovery may have read it from other text."""
         return self.signs[self.tokens.kinds[token]]
 
     # ------------------------------------------------------------ lists
@@ -285,7 +285,7 @@ class Builder:
 
 
 def _items(rest: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What stands between an opening bracket and the closing one, which is the last."""
+    """Items between an opening bracket and the closing one, which is the last part."""
     return tuple(rest[0]) if rest[1:] else ()
 
 
@@ -321,7 +321,7 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
 
 
 def _unbalanced(tokens: Tokens) -> bool:
-    """Whether some brace has no counterpart."""
+    """Test whether some brace has no counterpart."""
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
     return depths[-1] != 0 or min(depths) < 0
@@ -360,7 +360,7 @@ def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
 
 @cache
 def _classes() -> tuple[int, ...]:
-    """What each kind does to the depth."""
+    """Class of each kind, by its effect on the depth."""
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
@@ -415,7 +415,5 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
 def _give_up(tokens: Tokens, report: Report, first: int, at: int) -> None:
     help = "give a part of it a name with `let`, `fn` or `module`; the rest is skipped"
     report.add("E0120", f"nested deeper than {MAX_DEPTH} levels", *tokens.place(at), help=help)
-    tokens.give_up(first, len(tokens.kinds) - 1, "BAD_STATEMENT", tokens.starts[first], tokens.ends[-1])
-
-
-__all__ = ["parse"]
+    rest = (tables().kind("BAD_STATEMENT"), tokens.starts[first], tokens.ends[-1])
+    tokens.splice(first, len(tokens.kinds) - 1, [rest])

@@ -6,7 +6,7 @@ or too many. A text whose braces match is left alone, however it is laid out.
 
 What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
 replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
-Where none helps, the statement is skipped. Braces match before parsing (`braces`), so a skip stays inside
+Where none helps, the statement is skipped. Braces match before parsing (`balance`), so a skip stays inside
 its block.
 """
 
@@ -35,13 +35,13 @@ from scenelang.language.lexer import (
     statement_depth,
 )
 from scenelang.language.tables import END, tables
-from scenelang.language.words import UNITS
+from scenelang.language.words import TRANSFORMS, UNITS
 
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
 _MOST: Final = 50  # slips of one text
 _INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
-"""What a brace may be written for, likely ones first."""
+"""Tokens that a brace may be written for, likely ones first."""
 
 
 class _Slip(NamedTuple):
@@ -107,7 +107,7 @@ def _slips(tokens: Tokens) -> list[_Slip]:
     heads = [at for at in range(last) if tokens.on_new_line(at)]
     columns = [starts[at] - text.rfind("\n", 0, starts[at]) for at in heads]
     open_: list[tuple[int, int]] = []  # column and line of the heads of open blocks
-    found: list[_Slip] = []
+    slips: list[_Slip] = []
     doubled: set[int] = set()  # lines that leave two blocks open
     at_column: dict[int, int] = {}  # the last line that begins at a column
     for line, first in enumerate(heads):
@@ -117,7 +117,7 @@ def _slips(tokens: Tokens) -> list[_Slip]:
             head = open_.pop()[1]
             if head not in doubled:  # else one of its two is too many
                 head = line - 1
-            found.append(_Slip(heads[head], heads[head + 1], closing))
+            slips.append(_Slip(heads[head], heads[head + 1], closing))
         for at in range(first, stop):
             if kinds[at] == opening:
                 deeper = line + 1 == len(heads) or columns[line + 1] > column
@@ -129,18 +129,18 @@ def _slips(tokens: Tokens) -> list[_Slip]:
                     continue
                 head = at_column.get(column, line) if at == first else line
                 if head < line and columns[head + 1] > column:  # its block was not opened there
-                    found.append(_Slip(heads[head], heads[head + 1], opening))
+                    slips.append(_Slip(heads[head], heads[head + 1], opening))
                 else:
-                    found.append(_Slip(first, stop, opening))
+                    slips.append(_Slip(first, stop, opening))
         at_column[column] = line
         if sum(head == line for _, head in open_[-2:]) == 2:
             doubled.add(line)
     if open_ and open_[-1][1] == len(heads) - 1:
-        found.append(_Slip(heads[-1], last, closing))
-    if sum(1 if slip.missing == closing else -1 for slip in found) != surplus:  # an odd layout
+        slips.append(_Slip(heads[-1], last, closing))
+    if sum(1 if slip.missing == closing else -1 for slip in slips) != surplus:  # an odd layout
         wanted = closing if surplus > 0 else opening
-        found = [slip for slip in found if slip.missing == wanted][: abs(surplus)]
-    return sorted(found)[:_MOST]
+        slips = [slip for slip in slips if slip.missing == wanted][: abs(surplus)]
+    return sorted(slips)[:_MOST]
 
 
 # ---------------------------------------------------------------- mending a line
@@ -220,7 +220,7 @@ def _inside(kinds: list[int], first: int) -> list[int]:
 def _mends(
     tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
 ) -> Iterator[Repair]:
-    """What may be done at one place about a missing brace, each the cheaper the likelier it is."""
+    """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
     literals, kind = tables().literals, tokens.kinds[at]
     closes = missing == literals["}"]
     surplus = literals["{"] if closes else literals["}"]
@@ -245,7 +245,7 @@ def _mends(
 
 
 FOLLOWED: Final = 80
-"""How many tokens the repairs that look best are followed to choose between them."""
+"""Number of tokens for which the likeliest repairs are followed, to choose between them."""
 _WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 _FAR: Final = 1000  # tokens that the statement of a loop without braces may have
@@ -274,13 +274,18 @@ _REPLACEMENTS: Final = {
     "(": {"[": 1.3},
     "[": {"(": 1.3},
 }
-"""What is likely written for something else; anything else costs `_SUBSTITUTION` more than inserting it."""
+"""Likely slips: what is written, what was meant and its cost; any other costs `_SUBSTITUTION` more."""
 _DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
 _CLOSING = 1.1
 
 _DIVISION: Final = re.compile(r"[ \t]*//[ \t]*[\w.()]{1,40}[ \t]*;[ \t]*(?=\n)")
-"""What is taken for a comment and was meant for a division."""
+"""Comment that was meant for a division."""
+_PLAIN: Final = re.compile(r"(?:[\w\s.,=#]|(?<=[(\[,])-|(?<=, )-)*+")
+"""Items in brackets without an operator between them: the bracket ends behind them all."""
+_FLAT: Final = re.compile(r"[^()\[\]{};]*+")
+"""The inside of brackets that holds no others: before a block, all of it belongs there."""
+_BEGINNINGS: Final = ("let", "param", "fn", "module")
 _DEFINITIONS: Final = ("let", "param", "fn")
 _NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
 _CODES: Final = {
@@ -305,7 +310,7 @@ def _kinds(names: str) -> tuple[int, ...]:
 
 @cache
 def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
-    """What may be missing: the tokens, the cost, and what has to follow if that matters."""
+    """Insertions to try: the tokens, the cost, and the token that has to follow if that matters."""
     return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
 
 
@@ -398,7 +403,7 @@ class Recovery:
             own = min(stop, bound + 1) - at
             return own + 0.15 * (min(stop, at + FOLLOWED) - at - own)
 
-        found: list[tuple[float, float, Repair, list[int]]] = []
+        attempts: list[tuple[float, float, Repair, list[int]]] = []
 
         def attempt(stack: list[int], place: int, repairs: Iterator[Repair]) -> None:
             cost = 0.1 + 0.1 * (at - place) if place < at else 0.0
@@ -410,11 +415,11 @@ class Recovery:
                 start = max(at, end)
                 stop = reach(trial.copy(), kinds, end, start + LOOKAHEAD)
                 if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
-                    found.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
+                    attempts.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
 
         def settle() -> tuple[float, Repair | None]:
             best: tuple[float, Repair | None] = (-inf, None)
-            for _, cost, repair, trial in sorted(found, key=lambda one: -one[0])[:8]:
+            for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
                 end = repair.at + repair.delete
                 score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
                 best = max(best, (score, repair), key=lambda one: one[0])
@@ -504,7 +509,7 @@ class Recovery:
                 yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
 
     def _begins_statement(self, first: int, at: int) -> bool:
-        """Whether a line in open brackets, or behind half a head, reads like a statement of its own."""
+        """Test whether a line in open brackets, or behind half a head, reads like a statement of its own."""
         kinds = self.tokens.kinds
         if not self.tokens.on_new_line(at) or kinds[at] not in (self.name, *self.words):
             return False
@@ -653,11 +658,15 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message, help = f"unfinished statement: {message}", "the line breaks off here"
     elif first in (")", "]") and open_:
         labels = [Label(Span(tokens.source, *tokens.place(open_[-1])), "opened here")]
+        inside = tokens.ends[open_[-1]], end
+        if not breaks_off and len(open_) == len(names) == 1:
+            simple = {"`;`": _PLAIN, "`{`": _FLAT}.get(shown)
+            fix = first if simple and simple.fullmatch(tokens.source.text, *inside) else None
     elif first == ";":
         help = "a `;` ends every statement without a block"
         if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
             help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
-        elif breaks_off or shown == "`}`":
+        elif breaks_off or shown == "`}`" or _surely_next(tokens, at):
             fix = ";"
     elif first in _NAMED:
         message = f"expected {_NAMED[first]}, found {shown}"
@@ -669,6 +678,14 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message = f"{message} before {shown}"
         fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
     report.add(code, message, *place, labels=labels, help=help, fix=fix)
+
+
+def _surely_next(tokens: Tokens, at: int) -> bool:
+    """Test whether a token within a line can only begin a statement of its own."""
+    text = tokens.text(at)
+    inside = text == "material" or text in TRANSFORMS
+    moved = inside and tokens.text(at - 1) == ")" and head(tokens, at - 1) in TRANSFORMS
+    return moved or text in _BEGINNINGS
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
@@ -701,7 +718,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
 
 
 def _listed(names: list[str]) -> str:
-    """What is missing, in words: "an expression, `)` and `{`"."""
+    """Missing tokens in words: "an expression, `)` and `{`"."""
     parts: list[str] = []
     for name in names:
         if parts and not (name.isalpha() or parts[-1][-2:-1].isalpha()) and name not in _NAMED:

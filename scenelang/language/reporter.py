@@ -1,4 +1,4 @@
-"""One place, one mistake; one name, one report; and nothing that only follows from a mistake of syntax."""
+"""Reporter of an evaluation: one report a place and a name, none that only follows from a syntax mistake."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Final
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Effort, Fix, Label, SourceFile, Span
+from scenelang.language.foreign import SHAPES
 from scenelang.language.library import Calls
 from scenelang.language.limits import MAX_COMPARED, Halt
 
@@ -28,7 +29,7 @@ _CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 
 
 class Damage(Record):
-    """What the syntax mistakes of a file leave unknown.
+    """Names and places of a file that its syntax mistakes leave unknown.
 
     Args:
         lines: lines of statements that were mended or skipped, by guess.
@@ -43,11 +44,11 @@ class Damage(Record):
     unmatched: bool = False
 
     def holds(self, span: Span) -> bool:
-        """Whether a place lies in what was mended or skipped."""
+        """Test whether a place lies in text that was mended or skipped."""
         return bool(self.lines) and span.locate()[0][0] in self.lines
 
     def explains(self, code: str, span: Span) -> bool:
-        """Whether a diagnostic may follow from a syntax mistake."""
+        """Test whether a diagnostic may follow from a syntax mistake."""
         if not self.lines:
             return False
         lost = self.nameless or self.unmatched or span.text.partition(".")[0] in self.words
@@ -90,7 +91,7 @@ def find_damage(file: tree.File, found: Iterable[Diagnostic]) -> Damage:
 
 
 class Reporter(Record, frozen=False):
-    """Where the mistakes of one evaluation go, and what is known of those reported.
+    """Mistakes of one evaluation, and the places and names that have been reported.
 
     Args:
         calls: the calls that are running.
@@ -110,7 +111,7 @@ class Reporter(Record, frozen=False):
     words_in: dict[SourceFile, frozenset[str]] = field(default_factory=dict)
 
     def damage(self, source: SourceFile) -> Damage:
-        """What syntax mistakes have damaged of a file."""
+        """Damage of a file by its syntax mistakes."""
         return self.damaged.get(source, _SOUND)
 
     def words(self, source: SourceFile) -> frozenset[str]:
@@ -120,7 +121,7 @@ class Reporter(Record, frozen=False):
         return self.words_in[source]
 
     def follows(self, code: str, span: Span) -> bool:
-        """Whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
+        """Test whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
         if not self.damaged:
             return False
         within = self.calls.outwards() if self.calls is not None else ()
@@ -193,7 +194,5 @@ class Reporter(Record, frozen=False):
 
 def _called(site: Span) -> str | None:
     """Usage line of the library's module that a call names."""
-    from scenelang.language.foreign import SHAPES  # only mistakes need it
-
     alias, _, module = site.text.rpartition(".")
     return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None

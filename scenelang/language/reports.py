@@ -11,7 +11,7 @@ mark over several lines the first is underlined to its end::
       |     ^^^^^^^^^^^
 
 Columns are counted in code points; on the screen tabs are widened and wide characters take two cells, so
-marks stay under what they mark (`diagnostics.cells`).
+marks stay under what they mark.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scenelang.language.diagnostics import Diagnostic, Edit, Fix, SourceFile, Sp
 
 TAB = 4
 LONGEST = 4000
-"""Of a line with more code points only so many are laid out, near what is shown of it.
+"""Code points of a line that are laid out at most, near the part that is shown.
 
 A file of one line may have 10 MB and 200 mistakes.
 """
@@ -92,7 +92,7 @@ def in_cells(text: str) -> Line:
 
 
 def left_out(text: str, at: int) -> int:
-    """How many code points in front of offset ``at`` are not laid out: none but in a very long line."""
+    """Number of code points before offset ``at`` that are not laid out: none but in a very long line."""
     return max(0, at - _BEFORE) // _BEFORE * _BEFORE if len(text) > LONGEST else 0
 
 
@@ -141,13 +141,13 @@ class Canvas:
 
     def lines(self, color: bool) -> list[str]:
         """The rows as text, without white space at their ends."""
-        found = []
+        result = []
         for row in self.rows:
             while row and not row[-1][0].strip() and (row[-1][0] or row[-2][0].isspace()):
                 row.pop()
             runs = groupby(row, key=lambda cell: cell[1])
-            found.append("".join(paint(style, "".join(c for c, _ in run), color) for style, run in runs))
-        return found
+            result.append("".join(paint(style, "".join(c for c, _ in run), color) for style, run in runs))
+        return result
 
 
 _LEAST_WIDTH = 30
@@ -239,7 +239,7 @@ def _line(
 WIDTH = 140
 """Cells of a line where no terminal says otherwise."""
 _MOST_LINES = 6
-"""Of a longer change the rest is left out."""
+"""Lines of a change that are shown at most."""
 
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
@@ -275,17 +275,17 @@ def render_text(
     Returns:
         Text that ends in a newline; empty where there is nothing to say.
     """
-    found = in_order(diagnostics)
-    if not found:
+    ordered = in_order(diagnostics)
+    if not ordered:
         return ""
-    blocks = [_block(diagnostic, width, color) for diagnostic in found[:most]]
-    if most is not None and len(found) > most:
-        left = len(found) - most
+    blocks = [_block(diagnostic, width, color) for diagnostic in ordered[:most]]
+    if most is not None and len(ordered) > most:
+        left = len(ordered) - most
         blocks.append(paint("bold", f"… and {left:,} more", color))
     if summary:
         if fixable is None:
-            fixable = sum(d.fix is not None for d in found)
-        blocks.append(_count(found, fixer, fixable, color))
+            fixable = sum(d.fix is not None for d in ordered)
+        blocks.append(_count(ordered, fixer, fixable, color))
     return "\n\n".join(blocks) + "\n"
 
 

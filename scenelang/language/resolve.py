@@ -37,7 +37,7 @@ Role = Literal[
 
 
 _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
-"""What words of the language are in an expression."""
+"""Roles of the language's words in an expression."""
 
 
 class Symbol(Record, frozen=False):
@@ -60,7 +60,7 @@ class Symbol(Record, frozen=False):
 
     @property
     def is_exported(self) -> bool:
-        """Whether files that import this one see it."""
+        """Test whether files that import this one see it."""
         return self.scope.parent is None and self.kind in ("let", "param", "fn", "module")
 
 
@@ -80,7 +80,7 @@ class Scope(Record, frozen=False):
             scope = scope.parent
 
     def find(self, name: str) -> Symbol | None:
-        """What a name stands for here."""
+        """Definition that a name stands for here."""
         return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
 
 
@@ -148,7 +148,7 @@ class Names:
                     yield symbol
 
     def exported(self) -> list[Symbol]:
-        """What files that import this one see."""
+        """Definitions that files that import this one see."""
         return [symbol for symbol in self.top.symbols.values() if symbol.is_exported]
 
     # ------------------------------------------------------------ definitions
@@ -341,7 +341,7 @@ def find_unused(file: tree.File, diagnostics: Diagnostics) -> None:
 
 
 def _is_inside_its_definition(use: Use) -> bool:
-    """Whether a use is the definition itself, or a call of a function or module in its own body."""
+    """Test whether a use is the definition itself, or a call of a function or module in its own body."""
     symbol = use.symbol
     if symbol is None or use.defines or symbol.kind not in ("fn", "module"):
         return use.defines

@@ -1,4 +1,4 @@
-"""The Scene: concrete, validated, frozen. What text evaluates to and what Python or JSON callers build.
+"""The Scene: concrete, validated, frozen. Text evaluates to one; Python and JSON callers build one.
 
 Angles are radians, lengths world units, colours numbers in [0, 1] as written (sRGB in 2D). Spans do not
 live here: the evaluator returns a `SpanMap` beside the Scene, keyed by `id()` of the node.
@@ -100,7 +100,7 @@ class Scene(SceneData):
 
 
 def same_nodes(a: Scene, b: Scene) -> bool:
-    """Whether two frames are made of the very same nodes, on one stage."""
+    """Test whether two frames hold the very same nodes, on one stage."""
     return (
         len(a.nodes) == len(b.nodes)
         and all(getattr(a, name) == getattr(b, name) for name in ("canvas", "background", *STAGE))

@@ -81,7 +81,7 @@ def _look(part: Part, file: str, plain: str) -> Material | None:
 
 @dataclass(slots=True)
 class _Held:
-    """What a file held when it was read; it is not part of the value, which the digest stands for."""
+    """Contents of a file when it was read; not part of the value, which the digest identifies."""
 
     zoo: Zoo | None = field(default=None, compare=False)
 
@@ -103,13 +103,13 @@ class Elements(Frozen):
     @staticmethod
     def of(name: str, path: str, zoo: Zoo) -> Elements:
         """A file that has been read."""
-        made = Elements(name, path, zoo.digest)
-        made._held.zoo = zoo
-        return made
+        elements = Elements(name, path, zoo.digest)
+        elements._held.zoo = zoo
+        return elements
 
     @property
     def zoo(self) -> Zoo | None:
-        """What is in the file; None where it has not been read."""
+        """Contents of the file; None where it has not been read."""
         return self._held.zoo
 
     def group(self, name: str) -> Group | Object:
@@ -176,7 +176,7 @@ def load_elements(path: str | Path, name: str | None = None) -> Elements:
 
 
 class SceneData(Frozen):
-    """What a `Scene` holds."""
+    """Fields of a `Scene`."""
 
     version: Version = 1
     model: Annotated[

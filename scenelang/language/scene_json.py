@@ -20,7 +20,6 @@ from pydantic_core import ErrorDetails, PydanticSerializationError
 from scenelang.assets.files import depth_of_json, no_number
 from scenelang.assets.records import Record, deep_stack
 from scenelang.language import nodes
-from scenelang.language import nodes as modifiers
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span
 from scenelang.language.library import SpanMap, Written
 from scenelang.language.nodes import MAX_NODE_DEPTH, TAGS, Link, Object, SceneNode, said
@@ -53,7 +52,7 @@ class Value(Record, frozen=False):
 
 
 def deeper_than(text: str, most: int) -> int:
-    """Where brackets first nest deeper than ``most``, in a text where they do."""
+    """Offset at which brackets first nest deeper than ``most``, in a text where they do."""
     depth = 0
     for token in _TOKENS.finditer(text):
         first = text[token.start()]
@@ -100,7 +99,7 @@ def read_places(text: str, twice: list[Value] | None = None) -> Value:
 
 
 def follow(root: Value, location: Sequence[Key]) -> tuple[Value, str]:
-    """What pydantic's location of an error leads to, and its path as `nodes[0].transforms[1].x`.
+    """Value at pydantic's location of an error, and its path as `nodes[0].transforms[1].x`.
 
     A location also names the kinds of nodes on the way, which JSON does not nest by, and may end in a
     name that is missing.
@@ -168,7 +167,7 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
 
 
 def _same(item: Any, default: Any) -> bool:
-    """Whether a value is the default, bit for bit: -0.0 is not 0.0."""
+    """Test whether a value is the default, bit for bit: -0.0 is not 0.0."""
     return bool(item == default) and repr(item) == repr(default)
 
 
@@ -199,11 +198,11 @@ def from_json(text: str | bytes, kind: type[S], root: Path | None = None) -> S:
         except UnicodeDecodeError as error:
             raise _failure(f"not UTF-8 text: byte {error.start}") from None
     source = SourceFile("<json>", text)
-    scene, found = _read(source, kind), Diagnostics()
+    scene, diagnostics = _read(source, kind), Diagnostics()
     if root is not None and scene.elements:
-        _read_elements(scene, root, source, read_places(text), found)
-    if found.errors:
-        raise SceneError(found)
+        _read_elements(scene, root, source, read_places(text), diagnostics)
+    if diagnostics.errors:
+        raise SceneError(diagnostics)
     return scene
 
 
@@ -275,12 +274,12 @@ def _refuse_repeated(source: SourceFile) -> None:
     if repeated:
         twice: list[Value] = []
         read_places(source.text, twice)
-        found = [Diagnostic("E0313", "a key that the object has already", v.span(source)) for v in twice]
-        raise SceneError(found[:_MAX_SHOWN])
+        result = [Diagnostic("E0313", "a key that the object has already", v.span(source)) for v in twice]
+        raise SceneError(result[:_MAX_SHOWN])
 
 
 def _node_depth(scene: SceneData) -> int:
-    """How deep nodes nest: 0 where none holds another."""
+    """Depth of nested nodes: 0 where none holds another."""
     depth, level = -1, list(scene.nodes)
     while level:
         depth += 1
@@ -335,15 +334,15 @@ def _no_json(error: ValueError, source: SourceFile) -> SceneError:
 
 def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] = ()) -> list[Diagnostic]:
     """One diagnostic for each place that does not fit."""
-    found = error.errors(include_url=False, include_input=False)[:_MAX_SHOWN]
-    if found[0]["type"] == "json_invalid":
+    errors = error.errors(include_url=False, include_input=False)[:_MAX_SHOWN]
+    if errors[0]["type"] == "json_invalid":
         try:
             json.loads(source.text, parse_constant=no_number)
         except ValueError as wrong:
             return list(_no_json(wrong, source).diagnostics)
-        return [Diagnostic("E0313", found[0]["msg"].lower(), None)]
+        return [Diagnostic("E0313", errors[0]["msg"].lower(), None)]
     root = read_places(source.text)
-    return [_problem(item, (*path, *item["loc"]), root, source) for item in found]
+    return [_problem(item, (*path, *item["loc"]), root, source) for item in errors]
 
 
 def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source: SourceFile) -> Diagnostic:
@@ -370,7 +369,7 @@ def _problem(item: ErrorDetails, location: tuple[Key, ...], root: Value, source:
 _FIELDS: Final = sorted(
     {
         name
-        for model in (*vars(modifiers).values(), *vars(nodes).values())  # which hold those of the stage
+        for model in vars(nodes).values()
         if isinstance(model, type) and issubclass(model, BaseModel)
         for name in model.__annotations__
         if not name.startswith(("_", "model_"))

@@ -28,11 +28,11 @@ from scenelang.language.scene import Animation, Elements
 Env = list[Any]
 
 UNBOUND: Final = object()
-"""What a slot holds before its ``let``, ``param`` or ``animate`` has run."""
+"""Value of a slot before its ``let``, ``param`` or ``animate`` has run."""
 
 
 class Needs(Record, frozen=False):
-    """What a statement, or the body of a function or module, depends on.
+    """Dependencies of a statement, or of the body of a function or module.
 
     Args:
         frame: it reads ``t``, ``u`` or ``frame`` itself.
@@ -43,7 +43,7 @@ class Needs(Record, frozen=False):
     on: list[Needs] = field(default_factory=list)
 
     def varies(self) -> bool:
-        """Whether it may differ from frame to frame; ask when everything is prepared."""
+        """Test whether it may differ from frame to frame; ask when everything is prepared."""
         seen, stack = {self}, [self]
         while stack:
             needs = stack.pop()
@@ -98,7 +98,7 @@ class Definition(Record, frozen=False):
 
 
 class Binding(Record, frozen=False):
-    """What a name stands for.
+    """Meaning of a name.
 
     Args:
         span: where; None for the language's own names.
@@ -139,7 +139,7 @@ class Scope(Record, frozen=False):
             scope = scope.parent
 
     def find(self, name: str) -> Binding | None:
-        """What ``name`` stands for here."""
+        """Binding of ``name`` here."""
         return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
@@ -148,7 +148,7 @@ class Scope(Record, frozen=False):
             yield from scope.names.items()
 
     def reach(self, slots: Slots) -> Callable[[Env], Env]:
-        """How to get the live ``slots``, which enclose this scope, from those of here."""
+        """Function that gets the live ``slots``, which enclose this scope, from those of here."""
         root = slots.root
         if root is not None:
             return lambda env: root
@@ -166,11 +166,11 @@ class Scope(Record, frozen=False):
 
 
 Watch = Callable[[Span, Any], None]
-"""What an editor looks on with; it may raise `Halt` to end the evaluation."""
+"""Callback of an editor that watches; it may raise `Halt` to end the evaluation."""
 
 
 class Settings(Record, frozen=False):
-    """What the top level sets, and where each was given.
+    """Settings of the top level, and the place of each.
 
     Args:
         canvas: width and height in pixels.
@@ -277,9 +277,9 @@ class Defines(Record, frozen=False):
         for name in self.values:
             if name in self.known or name in self.lost:
                 continue
-            found = nearest(name, self.known)
-            if found:
-                help, labels = f"did you mean `{found}`?", [Label(self.known[found], "this param")]
+            result = nearest(name, self.known)
+            if result:
+                help, labels = f"did you mean `{result}`?", [Label(self.known[result], "this param")]
             else:
                 names = listing(self.known)
                 help, labels = f"its params are {names}" if names else "the scene has no params", []
@@ -338,7 +338,7 @@ class Loader(Record, frozen=False):
     root: Path | None
     chain: list[Path] = field(default_factory=list)
     sites: list[Span] = field(default_factory=list)
-    """Where the imports of that chain are written."""
+    """Places of the imports of that chain."""
     parsed: dict[Path, tree.File] = field(default_factory=dict)
     prepared: dict[Path, Any] = field(default_factory=dict)
     """The `FileContext` of each file that has been prepared, under its last name."""
@@ -434,5 +434,5 @@ class Loader(Record, frozen=False):
 
 
 def _reason(error: BaseException) -> str:
-    """What the system says, lower case."""
+    """Reason that the system gives, in lower case."""
     return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()

@@ -13,10 +13,11 @@ from typing import Any, Final
 
 from scenelang.assets.zoo import Zoo
 from scenelang.language import blocks, expressions, foreign, library, modifiers, tree
-from scenelang.language import blocks as scene_nodes
-from scenelang.language import tree as nodes
 from scenelang.language.advice import (
     VALUES,
+    drawn,
+    in_library,
+    material_advice,
     report_early,
     report_problem,
     report_unknown,
@@ -93,7 +94,7 @@ LEFT_OUT: Final = object()  # an argument that was not given; None is the value 
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
-    """Whether a statement stands at top level; reports it if not."""
+    """Test whether a statement stands at top level, and report it if not."""
     if place.kind == "file" and not place.nested:
         return True
     misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
@@ -101,7 +102,7 @@ def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
 
 
 def _once(session: Session, what: str, span: Span) -> bool:
-    """Whether a setting is given for the first time; reports a second time."""
+    """Test whether a setting is given for the first time, and report a second one."""
     first = session.settings.given.setdefault(what, span)
     if first is not span:
         labels = (Label(first, "first given here"),)
@@ -291,10 +292,10 @@ def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     loader = context.loader
     binding = Binding("import", alias.span)
     good = define(alias, binding, place)
-    found = loader.load(stmt, context.path, context.session)
-    if found is None or not good:
+    loaded = loader.load(stmt, context.path, context.session)
+    if loaded is None or not good:
         return None
-    path, file = found
+    path, file = loaded
     if isinstance(file, Zoo):
         binding.value = _elements(path, file, stmt, context)
         return None
@@ -365,7 +366,7 @@ def prepare_file(context: FileContext, file: tree.File, *, imported: bool = Fals
     return prepare_block(statements, Place(context, context.scope, "file"), file.span)
 
 
-def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
+def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
     file, name, session, slots = place.file, stmt.name, place.session, place.scope.slots
     default = prepare(stmt.default, place)
     bounds = prepare(stmt.range, place) if stmt.range is not None else None
@@ -394,7 +395,7 @@ def prepare_param(stmt: nodes.Param, place: Place) -> Action | None:
     return action
 
 
-def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Session) -> Any:
+def _checked_default(value: Any, allowed: Any, stmt: tree.Param, session: Session) -> Any:
     """The default, or poison where it has no type for a param; reports one outside the range."""
     if value.__class__ not in (*UNITS, bool, str, Vec):
         message = f"{describe(value)} as the value of a param"
@@ -418,7 +419,7 @@ def _checked_default(value: Any, allowed: Any, stmt: nodes.Param, session: Sessi
     return value
 
 
-def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | None, Fix | None]:
+def _range_meant(value: Any, allowed: Any, range: tree.Expr) -> tuple[str | None, Fix | None]:
     """Help and fix for `in [3, 9]` where the default lies between the two."""
     ends = allowed.items if allowed.__class__ is Vec else ()
     if len(ends) != 2 or not all(one.__class__ is value.__class__ and one.__class__ in UNITS for one in ends):
@@ -427,14 +428,14 @@ def _range_meant(value: Any, allowed: Any, range: nodes.Expr) -> tuple[str | Non
     if not low < at < high:
         return None, None
     help = "a vector has the choices there are; a range is written 3..9"
-    if not isinstance(range, nodes.Vector):
+    if not isinstance(range, tree.Vector):
         return help, None
     text = "..".join(item.span.text for item in range.items)
     return help, Fix(f"write `{text}`", (Edit(range.span, text),))
 
 
 def within(value: Any, allowed: Any) -> bool:
-    """Whether a value, or each number of a vector, is in a range or among choices.
+    """Test whether a value, or each number of a vector, is in a range or among choices.
 
     Raises:
         Problem: a value and a range that do not compare.
@@ -451,7 +452,7 @@ def within(value: Any, allowed: Any) -> bool:
 
 
 def _from_outside(
-    full: str, given: Any, default: Any, allowed: Any, stmt: nodes.Param, file: FileContext
+    full: str, given: Any, default: Any, allowed: Any, stmt: tree.Param, file: FileContext
 ) -> Any:
     """The value from outside, of the default's type and in range; poison after a report."""
     span, report = stmt.name.span, file.session.report
@@ -514,9 +515,9 @@ def from_python(value: Any) -> Any:
 def literal(text: str, file: FileContext) -> Any:
     """The value of a literal; None where ``text`` is not a literal."""
     diagnostics, around = Diagnostics(), file.session
-    tree = parse(SourceFile("", f"let value = {text};"), diagnostics)
-    stmt = tree.statements[0] if len(tree.statements) == 1 else None
-    if diagnostics.errors or not isinstance(stmt, nodes.Let) or not _is_literal(stmt.value):
+    parsed = parse(SourceFile("", f"let value = {text};"), diagnostics)
+    stmt = parsed.statements[0] if len(parsed.statements) == 1 else None
+    if diagnostics.errors or not isinstance(stmt, tree.Let) or not _is_literal(stmt.value):
         return None
     session = Session(Reporter(diagnostics), around.expressions, around.statements)
     alone = FileContext(SourceFile("", text), session, file.loader, Defines({}))
@@ -524,16 +525,16 @@ def literal(text: str, file: FileContext) -> Any:
     return None if value is POISON or diagnostics.errors else value
 
 
-def _is_literal(expr: nodes.Expr) -> bool:
-    """Whether an expression names nothing and computes nothing but a sign."""
+def _is_literal(expr: tree.Expr) -> bool:
+    """Test whether an expression names nothing and computes nothing but a sign."""
     match expr:
-        case nodes.Number() | nodes.Bool() | nodes.Color() | nodes.String():
+        case tree.Number() | tree.Bool() | tree.Color() | tree.String():
             return True
-        case nodes.Unary(op="-" | "+", operand=nodes.Number()):
+        case tree.Unary(op="-" | "+", operand=tree.Number()):
             return True
-        case nodes.Vector():
+        case tree.Vector():
             return all(_is_literal(item) for item in expr.items)
-        case nodes.CallExpr():
+        case tree.CallExpr():
             return expr.name.text in ("rgb", "hsv") and all(_is_literal(a.value) for a in expr.args)
         case _:
             return False
@@ -567,7 +568,7 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
 
 
 def hides(binding: Binding | None, stmt: tree.Call) -> bool:
-    """Whether a scene's own name stands here for a setting: a module, or a material in use."""
+    """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
     return binding is not None and (
         binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
     )
@@ -621,8 +622,6 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
     if report_early(name, place):
         return
     if text in FUNCTIONS:
-        from scenelang.language.advice import material_advice  # only mistakes need it
-
         call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
         written = f"write color({call});" if inside else material_advice(place, "color", call)
         message = f"`{text}` is a function, not an object or a module"
@@ -633,7 +632,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
 
 
 def _advice(stmt: tree.Call, place: Place) -> Advice:
-    """What may have been meant by a statement whose name stands for nothing."""
+    """Advice on a statement whose name stands for nothing."""
     name, text = stmt.name, stmt.name.text
     candidates = _candidates(stmt, place)
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
@@ -642,8 +641,6 @@ def _advice(stmt: tree.Call, place: Place) -> Advice:
     if place.kind == "object" and text in MATERIALS:
         return _lacks_material(stmt)
     if help is None and place.kind in HOLDERS:
-        from scenelang.language.advice import in_library  # only mistakes need it
-
         if (here := _boolean(stmt)) is not None:
             return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
         help, fix = in_library(stmt, place), None
@@ -655,13 +652,9 @@ def _advice(stmt: tree.Call, place: Place) -> Advice:
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign.WORDS.get(text, "")
     if help is None and place.kind == "object" and meant in OPERATIONS.keys() - TRANSFORMS.keys():
-        from scenelang.language.advice import material_advice
-
         help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
     help = help or foreign.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain"):
-        from scenelang.language.advice import drawn  # only mistakes need it
-
         help = drawn(place)
     return help, fix
 
@@ -688,14 +681,14 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
     names = visible(place, VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    found = {*GEOMETRIES, *names}
+    known = {*GEOMETRIES, *names}
     if stmt.body is None:
-        return found if stmt.args is None else found | {*(TRANSFORMS if kind != "file" else SETTINGS)}
+        return known if stmt.args is None else known | {*(TRANSFORMS if kind != "file" else SETTINGS)}
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:
-        found = {*found, *NODES, *(["else"] if otherwise else [])}
-    return {*found, "else if"} if stmt.args is not None and otherwise else found
+        known = {*known, *NODES, *(["else"] if otherwise else [])}
+    return {*known, "else if"} if stmt.args is not None and otherwise else known
 
 
 EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
@@ -726,8 +719,8 @@ STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.For: blocks.prepare_for,
     tree.If: blocks.prepare_if,
     tree.Call: prepare_headed,
-    tree.Node: scene_nodes.prepare_node,
-    tree.Combined: scene_nodes.prepare_combined,
+    tree.Node: blocks.prepare_node,
+    tree.Combined: blocks.prepare_combined,
     tree.MaterialUse: modifiers.prepare_use,
     tree.BadStmt: blocks.skip,
 }

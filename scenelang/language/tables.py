@@ -64,7 +64,7 @@ def decode(data: dict[str, Any]) -> Tables:
 
 
 def grammar_path() -> Path:
-    """Where the grammar lies: inside an installed package, beside it in a checkout."""
+    """Path of the grammar: inside an installed package, next to it in a checkout."""
     inside = PACKAGE / "grammar" / "scenelang.lark"
     return inside if inside.exists() else PACKAGE.parent / "grammar" / "scenelang.lark"
 
@@ -80,9 +80,9 @@ def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
     What was ``shipped`` in a wheel belongs together.
     """
     with contextlib.suppress(OSError, ValueError):
-        found = json.loads(place.read_text("utf-8"))
-        if isinstance(found, dict) and (shipped or found.get("source") == source_mark(grammar)):
-            return found
+        loaded = json.loads(place.read_text("utf-8"))
+        if isinstance(loaded, dict) and (shipped or loaded.get("source") == source_mark(grammar)):
+            return loaded
     from scenelang.language.generate import make  # and Lark with it
 
     return make(grammar, place, source_mark(grammar))

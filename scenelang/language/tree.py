@@ -15,7 +15,7 @@ from scenelang.language.words import Combine
 
 
 class Spanned(Record):
-    """What stands at a place of the text."""
+    """Base of all parts of the tree: a piece of the text."""
 
     span: Span
 
@@ -129,7 +129,7 @@ class MaterialExpr(Expr):
 
 
 class BadExpr(Expr):
-    """What recovery could not read as an expression."""
+    """Text that recovery could not read as an expression."""
 
 
 # ---------------------------------------------------------------- statements
@@ -247,7 +247,7 @@ class MaterialUse(Stmt):
 
 
 class BadStmt(Stmt):
-    """What recovery could not read as a statement."""
+    """Text that recovery could not read as a statement."""
 
 
 class File(Spanned):

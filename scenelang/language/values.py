@@ -24,7 +24,7 @@ MAX_VECTOR_DEPTH: Final = 16
 
 
 class Problem(Exception):
-    """What is wrong with an operation; the caller knows the place.
+    """Mistake in an operation; the caller knows the place.
 
     Args:
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
@@ -131,7 +131,7 @@ class RangeValue:
         self.unit = unit
 
     def count(self) -> int:
-        """How many values there are; 0 when descending."""
+        """Number of values; 0 when descending."""
         step = 1.0 if self.step is None else self.step
         quotient = (self.stop - self.start) / step
         if not math.isfinite(quotient):
@@ -154,7 +154,7 @@ class RangeValue:
         return map(self.item, range(self.count()))
 
     def contains(self, value: float) -> bool:
-        """Whether ``value`` lies between the bounds and, where a step was written, on it."""
+        """Test whether ``value`` lies between the bounds and, where a step was written, on it."""
         low, high = (self.start, self.stop) if (self.step or 1.0) > 0 else (self.stop, self.start)
         if not low <= value <= high or (self.exclusive and value == self.stop):
             return False
@@ -200,7 +200,7 @@ def pack(number: float, unit: str) -> Any:
 
 
 def describe(value: Any) -> str:
-    """What kind of value it is, for messages."""
+    """Kind of a value, for messages."""
     if value.__class__ is Vec:
         count = len(value.items)
         return f"a vector of {plural(count, 'item')}"
@@ -321,9 +321,9 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
 def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> Problem:
     """Two values that an operator does not take; ``shared`` where the odd kind of one is the cause."""
     odd = {describe(a), describe(b)} - {"a number"}
-    found = odd.pop() if shared and len(odd) == 1 else ""
+    kind = odd.pop() if shared and len(odd) == 1 else ""
     notes = {1 - operand: describe((a, b)[1 - operand])}
-    return Problem("E0303", message, operand=operand, notes=notes, found=found)
+    return Problem("E0303", message, operand=operand, notes=notes, found=kind)
 
 
 def binary(op: str, a: Any, b: Any) -> Any:
@@ -615,7 +615,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "rgb": _rgb,
     "hsv": _hsv,
 }
-"""What each function means; raises Problem."""
+"""Implementation of each function; raises Problem."""
 CONSTANTS: Final[dict[str, Any]] = {
     "PI": math.pi,
     "TAU": math.tau,

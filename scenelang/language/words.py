@@ -14,7 +14,7 @@ UNITS: Final = ("deg", "rad", "turn", "ms", "s")
 Combine = Literal["union", "smooth", "subtract", "intersect"]
 COMBINE: Final[tuple[Combine, ...]] = get_args(Combine)
 TOKENS: Final[dict[str, int]] = {word: number for number, word in enumerate(COMBINE)}
-"""How an object joins what came before, and the number that a Program stores for it."""
+"""Words that join an object to what came before, and the number that a Program stores for it."""
 BLEND: Final = 0.15
 """The k of `smooth` unless said: it blends where distances differ by less, and lowers them by up to k/4."""
 
@@ -263,7 +263,7 @@ OPERATIONS: Final = _BOTH | _table(
     ),
     _call("hue", "angle", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
 )
-"""What stands in a material's block."""
+"""Operations in a material's block."""
 
 FUNCTIONS: Final = _table(
     _call("sin", "x", "The sine of an angle."),
@@ -334,7 +334,7 @@ SHADINGS: Final[dict[int, dict[str, str]]] = {
         "volumetric": "A medium that absorbs and scatters.",
     },
 }
-"""How a material is lit, in the plane and in space; the first of each is an object's without a material."""
+"""Shadings of a material, in the plane and in space; the first of each is an object's without a material."""
 TEXTURES: Final = (
     *("arrows", "bricks", "checker", "cobbles", "dots", "hexagons", "leaves", "letters"),
     *("noise", "plaid", "stripes", "terrazzo", "tiles", "waves", "wood", "zigzag"),
@@ -345,7 +345,7 @@ MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
 SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
 SCENES: Final = {2: "flat", 3: "solid"}
-"""What scenes of a dimension are called."""
+"""Names for scenes of a dimension."""
 
 
 def dimension_of(name: str) -> int | None:

@@ -13,7 +13,7 @@ from tests.language.cases import HERE, Outcome, mismatch, run_text
 from tests.language.reading import apply
 
 CASES = [case.partition("\n")[::2] for case in (HERE / "errors.nsgs").read_text("utf-8").split("=== ")[1:]]
-MALFORMED = sorted((HERE / "wrong").glob("*.nsg"))
+MALFORMED = sorted((HERE / "mistaken").glob("*.nsg"))
 
 
 @cache

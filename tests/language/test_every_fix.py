@@ -36,7 +36,9 @@ SINGLE += [
     ("an invisible space", "square { sc\u200bale(0.5); }"),
     ("a control character", "square { scale(0.5); }\x07"),
 ]
-MANY = sorted([*(TESTS / "language/malformed").glob("*.nsg"), *(TESTS / "language/wrong").glob("*.nsg")])
+MANY = sorted(
+    path for name in ("malformed", "mistaken") for path in (TESTS / "language" / name).glob("*.nsg")
+)
 
 EXAMPLES = sorted((TESTS.parent / "examples").glob("*.nsg"))
 
@@ -80,7 +82,7 @@ def test_most_kinds_of_mistakes_that_can_be_mended_are() -> None:
     }
 
 
-@pytest.mark.parametrize("path", MANY, ids=lambda path: f"{path.parent.parent.name}-{path.stem}")
+@pytest.mark.parametrize("path", MANY, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_fixes_of_many_mistakes_come_to_rest(path: Path) -> None:
     text = path.read_text("utf-8")
     before = check(text)

@@ -74,7 +74,7 @@ def test_random_text(text: str) -> None:
     run_text(text)
 
 
-SEEDS = [p.read_text("utf-8") for p in sorted((HERE / "wrong").glob("*.nsg"))]
+SEEDS = [p.read_text("utf-8") for p in sorted((HERE / "mistaken").glob("*.nsg"))]
 
 
 @OPTIONS

@@ -98,6 +98,12 @@ def test_no_fix_where_several_things_can_be_meant(code: str, text: str) -> None:
         ("star ; { scale(2); }", "star { scale(2); }"),
         ("square { scale(2); } */ star;", "square { scale(2); } star;"),
         ("let let _a = 1;", "let _a = 1;"),
+        ("square { scale(0.5) rotate(45deg); }", "square { scale(0.5); rotate(45deg); }"),
+        ("square { scale(2) material flat; }", "square { scale(2); material flat; }"),
+        ("let _a = 1 let _b = 2;", "let _a = 1; let _b = 2;"),
+        ("square { translate(-1, -2; }", "square { translate(-1, -2); }"),
+        ("let _v = [1, 2;", "let _v = [1, 2];"),
+        ("for (_i in 0..3 - 1 { star; }", "for (_i in 0..3 - 1) { star; }"),
     ],
 )
 def test_fixes_leave_no_odd_spaces(bad: str, good: str) -> None:

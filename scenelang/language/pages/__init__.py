@@ -55,7 +55,7 @@ class Example(Record):
 
 
 class Page(Record):
-    """What there is to know about a code."""
+    """Documentation of a code."""
 
     code: str  # such as ``E0302``
     text: str  # the Markdown, with its first line
@@ -68,7 +68,7 @@ class Page(Record):
 
     @property
     def retired(self) -> bool:
-        """Whether no diagnostic has this code any more; it is not used again."""
+        """Test whether no diagnostic has this code any more; it is not used again."""
         return self.title.startswith("retired: ")
 
     @property
@@ -81,7 +81,7 @@ class Page(Record):
 
     @property
     def meaning(self) -> str:
-        """What the code means: all between the title and the first section."""
+        """Meaning of the code: all between the title and the first section."""
         return self.text.partition("\n")[2].partition("\n## ")[0].strip()
 
     def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
