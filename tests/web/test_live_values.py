@@ -19,7 +19,7 @@ from scenelang.web.form import Scope, Writer
 
 pytestmark = pytest.mark.browser
 MODEL = load_manifest("shapes2d")
-TABLE = Path(__file__).parents[1] / "evaluate" / "expressions.nsgs"
+TABLE = Path(__file__).parents[1] / "language" / "expressions.nsgs"
 LITERALS = """0 1 2 3 0.5 -1 -2.5 7 1e-3 10 0.1 -0 1e200 255 30deg -45deg 0.5rad 0.25turn 0deg 2s 40ms -1s 0s
     [1,2] [0,1,0.5] X #d33 #7a5c3e [] [1,[2,3]] [10deg,20deg] [-1,0.5] true false "a" "day" "ä😀" none PI TAU
     t u frame frames (0..3) (0..<4step(0.5)) (0deg..90deg/**/step/**/30deg) (5..1)
