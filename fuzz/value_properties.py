@@ -139,14 +139,16 @@ def manifests_of_any_names_and_ranges_are_read(data: st.DataObject) -> None:
     materials = data.draw(_WORDS.filter(bool))
     line = st.text(st.characters(categories=("L", "N", "P")), min_size=1, max_size=9).filter(str.isprintable)
     span = st.tuples(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9)).map(sorted)
+    dimension = data.draw(st.sampled_from([2, 3]))
+    leaves = list(shipped.geometries) if dimension == 2 else ["sphere", "torus"]
     told = {
         "format": 1,
-        "name": data.draw(line.filter(lambda name: '"' not in name and "\\" not in name)),
+        "name": data.draw(line.filter(lambda name: name[0] != "." and not set(name) & set('"\\/:'))),
         "summary": data.draw(line),
-        "dimension": data.draw(st.sampled_from([2, 3])),
+        "dimension": dimension,
         "renderer": "framed",
         "lifting": "exact",
-        "geometries": data.draw(_WORDS | st.just(list(shipped.geometries))),
+        "geometries": data.draw(_WORDS | st.just(leaves)),
         "materials": materials,
         "limits": data.draw(
             st.dictionaries(st.sampled_from(["inner_warps", "outer_warps", "canvas"]), st.integers(0, 2))

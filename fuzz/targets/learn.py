@@ -22,8 +22,8 @@ KINDS = tuple(MOST_OF)
 def check(data: bytes) -> None:
     """A file of elements with their errors, or a FitError of one line."""
     suffix = KINDS[data[0] % len(KINDS)] if data else KINDS[0]
-    wish = {"steps": 1, "license": "CC0", "max_error": 0.5}
-    request = {"suffix": suffix, "name": "x", "wish": wish, "about": {"license": "CC0"}, "files": {}}
+    options = {"steps": 1, "license": "CC0", "max_error": 0.5}
+    request = {"suffix": suffix, "name": "x", "options": options, "about": {"license": "CC0"}, "files": {}}
     told: list[str] = []
     try:
         made = make(request, data[1:], lambda kind, *what: told.append(str(what)))

@@ -100,10 +100,10 @@ def striped(subdivisions: int = 4) -> Mesh:
 
 
 def test_the_smallest_grid_that_is_near_enough_is_kept() -> None:
-    tried: list[Any] = []
-    element = fit_colours(striped(), "ball", max_error=0.01, report=tried.append)
-    assert [rung.error <= 0.01 for rung in tried] == [*[False] * (len(tried) - 1), True]
-    assert (element.sizes[0], len(element.data)) == (tried[-1].side, tried[-1].bytes)
+    tried: list[tuple[int, int, float]] = []
+    element = fit_colours(striped(), "ball", max_error=0.01, report=lambda *grid: tried.append(grid))
+    assert [error <= 0.01 for _, _, error in tried] == [*[False] * (len(tried) - 1), True]
+    assert (element.sizes[0], len(element.data)) == tried[-1][:2]
     side = element.sizes[0]
     axis = np.linspace(-1, 1, side)
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
