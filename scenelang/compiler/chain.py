@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from scenelang.assets.records import Record
-from scenelang.compiler import steps as affine
 from scenelang.compiler.graph import Move
 from scenelang.compiler.spaces import PLANE, Space
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist, Warp, compose
 
 Moves = tuple[Move, ...]
 
@@ -21,7 +20,7 @@ def merged(moves: Iterable[Move]) -> Moves:
     for move in moves:
         last = out[-1].step if out else None
         if isinstance(move.step, Affine) and isinstance(last, Affine):
-            out[-1] = Move(Affine(affine.compose(move.step.rows, last.rows)), out[-1].span)
+            out[-1] = Move(Affine(compose(move.step.rows, last.rows)), out[-1].span)
         else:
             out.append(move)
     return tuple(out)
@@ -53,7 +52,7 @@ def normal(moves: Iterable[Move], space: Space) -> Moves:
 def _append_affine(out: list[Move], rows: Rows, move: Move) -> None:
     if out and isinstance(last := out[-1].step, Affine):
         move = out.pop()
-        rows = affine.compose(rows, last.rows)
+        rows = compose(rows, last.rows)
     if rows != IDENTITY:
         out.append(Move(Affine(rows), move.span))
 

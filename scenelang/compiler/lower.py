@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 from scenelang.assets.element import Element
 from scenelang.assets.textures import load_textures
-from scenelang.compiler import steps as affine
 from scenelang.compiler.graph import (
     MOST_STEPS,
     WHITE,
@@ -23,7 +22,20 @@ from scenelang.compiler.graph import (
 )
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, stage_of
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Twist, Warp
+from scenelang.compiler.steps import (
+    IDENTITY,
+    Affine,
+    Displace,
+    Rows,
+    Step,
+    Twist,
+    Warp,
+    compose,
+    rotation,
+    scaling,
+    shearing,
+    translation,
+)
 from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
 from scenelang.language.scene_data import Brought
@@ -36,7 +48,7 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
     In the plane nothing may leave it, and scales along z drop out.
     """
     if isinstance(transform, schema.Flip):
-        return Affine(affine.scaling(-1.0, 1.0))
+        return Affine(scaling(-1.0, 1.0))
     if isinstance(transform, schema.Twirl):
         return Warp(transform.k, (0.0, 0.0))
     if isinstance(transform, schema.Bend):
@@ -63,13 +75,13 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
 
 def _rows(transform: schema.Transform) -> Rows:
     if isinstance(transform, schema.Translate):
-        return affine.translation(transform.x, transform.y, transform.z)
+        return translation(transform.x, transform.y, transform.z)
     if isinstance(transform, schema.Scale):
-        return affine.scaling(transform.x, transform.y, transform.z)
+        return scaling(transform.x, transform.y, transform.z)
     if isinstance(transform, schema.Rotate):
-        return affine.rotation(transform.angle, transform.axis)
+        return rotation(transform.angle, transform.axis)
     if isinstance(transform, schema.Shear):
-        return affine.shearing(transform.axes, transform.k)
+        return shearing(transform.axes, transform.k)
     assert isinstance(transform, schema.Matrix)
     first, second, third, _ = transform.rows
     return (*first, *second, *third)
@@ -321,7 +333,7 @@ class _Lowering:
                 if step.code == "E0312" or element is not None:
                     self.say(step.code, step.message, op, step.help)
             elif isinstance(step, Affine):
-                rows = affine.compose(step.rows, rows)
+                rows = compose(step.rows, rows)
                 yield step
         if not PLANE.usable(rows):
             fact = f"the moves of the texture `{material.name}` compose to a singular one"

@@ -34,9 +34,20 @@ from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 from scenelang.assets.records import Record
-from scenelang.compiler import steps as affine
 from scenelang.compiler.geometries import GEOMETRIES, Corner
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist, Warp, inverted
+from scenelang.compiler.steps import (
+    IDENTITY,
+    Affine,
+    Displace,
+    Rows,
+    Step,
+    Turn,
+    Twist,
+    Warp,
+    compose,
+    composed,
+    inverted,
+)
 from scenelang.language import scene
 from scenelang.language.nodes import MOST, camera_fault, light_fault
 
@@ -397,14 +408,14 @@ class Solid(Space):
         """Centre and radius of a ball around all points below a level, and the affine map behind it."""
         radius, pending = 1.0, IDENTITY
         if level > 0.0:
-            stretch = self.stretches(affine.composed(steps))[0]
+            stretch = self.stretches(composed(steps))[0]
             radius += level / stretch if stretch else inf
         centre = 0.0, 0.0, 0.0
         for step in steps:
             if isinstance(step, Displace):
                 radius += abs(step.amount)
             elif isinstance(step, Affine):
-                pending = affine.compose(step.rows, pending)
+                pending = compose(step.rows, pending)
             else:
                 if pending is not IDENTITY:
                     centre, radius = _mapped(pending, centre), radius * self.stretches(pending)[1]
@@ -418,7 +429,7 @@ class Solid(Space):
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
         inner = row.inner - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
-        return (inner, affine.inverted(affine.composed(steps))) if inner > 0.0 else None
+        return (inner, inverted(composed(steps))) if inner > 0.0 else None
 
 
 def _mapped(rows: Rows, p: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -482,7 +493,7 @@ class Plane(Space):
         return Warp(sign * scale * turn.twirl, bend)
 
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
-        rows, reach = affine.composed(steps), 0.0
+        rows, reach = composed(steps), 0.0
         if level > 0.0:
             stretch = self.stretches(rows)[0]
             if stretch == 0.0:
@@ -500,7 +511,7 @@ class Plane(Space):
             return None
         if any(isinstance(step, Affine) for step in steps[:-1]):
             return None
-        return row.inner, affine.inverted(affine.composed(steps))
+        return row.inner, inverted(composed(steps))
 
 
 def flattened(rows: Rows) -> Rows:
@@ -610,7 +621,7 @@ def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, 
     pending = IDENTITY
     for step in steps:
         if isinstance(step, Affine):
-            pending = affine.compose(step.rows, pending)
+            pending = compose(step.rows, pending)
             continue
         if not isinstance(step, Warp):
             return EVERYWHERE[:4]

@@ -15,13 +15,12 @@ from lsprotocol import types
 
 from scenelang.assets.element import told
 from scenelang.assets.records import Record
-from scenelang.compiler import steps as affine
 from scenelang.compiler.chain import merged
 from scenelang.compiler.graph import Move
 from scenelang.compiler.lower import step_of
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.compiler.spaces import SPACES, Refusal, Space
-from scenelang.compiler.steps import Affine, Rows, Step, Warp
+from scenelang.compiler.steps import Affine, Rows, Step, Warp, composed
 from scenelang.editors.context import Cursor, cursor_at, find_callee, word_of
 from scenelang.editors.workspace import Document, Workspace, scenes_below, width
 from scenelang.language import library, tree, words
@@ -301,7 +300,7 @@ def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
 
 def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
     """The least and the greatest scale of a chain's affine maps."""
-    low, high = space.stretches(affine.composed(_steps(transforms, space)))
+    low, high = space.stretches(composed(_steps(transforms, space)))
     return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
 
 
