@@ -46,6 +46,7 @@ def test_program_digest(name: str) -> None:
     assert outcome.facts["program"] == facts["program"]
 
 
+@pytest.mark.torch
 @pytest.mark.parametrize("name", [name for name in NAMES if (FOLDER / f"{name}.npz").exists()])
 def test_network_draws_the_same(name: str) -> None:
     facts, arrays = stored(name)

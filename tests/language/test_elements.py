@@ -33,6 +33,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.torch
 def test_an_element_is_drawn_as_the_shape_it_is(folder: Path) -> None:
     scene = good(folder, f"{IMPORT}{RING} sphere {{ scale(0.4); translate(-1, 0, 0.5); }}")
     pure = good(folder, f"{PURE} sphere {{ scale(0.4); translate(-1, 0, 0.5); }}")
@@ -73,6 +74,7 @@ TILE = "zoo.tile { scale(0.8, 0.5); rotate(20deg); material flat { color(#c36); 
         "group { @ bend(0.6); twirl(0.8); scale(0.7); }",
     ],
 )
+@pytest.mark.torch
 @pytest.mark.parametrize("device", ["auto", "cpu"])
 def test_flat_elements_obey_booleans_and_warps(folder: Path, body: str, device: Any) -> None:
     head = f'model "shapes2d"; canvas(128, 128); {IMPORT} background(#9c9);'
