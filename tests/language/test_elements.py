@@ -85,6 +85,7 @@ def test_flat_elements_obey_booleans_and_warps(folder: Path, body: str, device: 
     assert psnr(*pictures) > 45
 
 
+@pytest.mark.torch
 def test_an_animation_tells_elements_apart(folder: Path) -> None:
     """Rows of two elements at one place have the same numbers."""
     shown = "zoo.{} {{ material flat {{ color(#111); }} }}"

@@ -49,6 +49,7 @@ def test_frames() -> None:
     assert scene.nodes[0].transforms == (nsg.Translate(x=0.5, y=0),)
 
 
+@pytest.mark.torch
 def test_public_names() -> None:
     assert nsg.__all__ == sorted(nsg.__all__)
     assert set(nsg.__all__) <= set(dir(nsg))
