@@ -1,11 +1,7 @@
 """The exact field of the plane in float64: samples, textures, leaves and folds, part by part.
 
-Works on numpy arrays and torch tensors alike: only names that both offer are used, so that training makes its
-data on any device by the formulas of the reference image. Points are one array (d, …), or a sequence of its d
-coordinates.
-
-A disc of points is carried back to each leaf. As a leaf's distance changes by no more than a point moves, the
-distance at the centre tells whether all of the disc is outside.
+Leaves and folds take numpy arrays and torch tensors alike, as training makes its data by them on any device.
+Points are one array (d, …), or a sequence of its d coordinates.
 """
 
 from __future__ import annotations
@@ -28,6 +24,9 @@ from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.drawing.image import decoded
 from scenelang.language.words import BLEND, TOKENS
 
+Floats = npt.NDArray[np.float64]
+Array = Any  # numpy array or torch tensor
+
 
 def sample_points(
     canvas: tuple[int, int], rows: range, per_side: int, columns: range | None = None
@@ -42,15 +41,10 @@ def sample_points(
     return np.stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
-Values = npt.NDArray[np.float64]
+def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
+    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M).
 
-
-def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
-    """Colours (M, 3) of a look with an element.
-
-    Args:
-        q: its own coordinates (d, M): those of the leaf, through the moves of the texture.
-        light: whether they are linear, decoded before anything is mixed.
+    They are linear if ``light``, decoded before anything is mixed.
     """
     assert look.element is not None
     values = _values(look.element, light)
@@ -63,7 +57,7 @@ def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
 
 
 @lru_cache(maxsize=16)
-def _values(element: Element, light: bool) -> Values:
+def _values(element: Element, light: bool) -> Floats:
     """Colours (h, w, 3) or (n, n, n, 3)."""
     result = texels(element).astype(np.float64)
     if element.form == "picture":  # of 8 bits
@@ -71,9 +65,9 @@ def _values(element: Element, light: bool) -> Values:
     return np.asarray(decoded(result), np.float64) if light else result
 
 
-def _mixed(values: Values, places: list[Values]) -> Values:
+def _mixed(values: Floats, places: list[Floats]) -> Floats:
     """Colours between the nearest nodes along each axis, where the first follows the last."""
-    total: Values = np.zeros((len(places[0]), 3))
+    total: Floats = np.zeros((len(places[0]), 3))
     first = [np.floor(place).astype(int) for place in places]
     for corner in np.ndindex(*(2,) * len(places)):
         share, index = np.ones(len(places[0])), []
@@ -84,7 +78,7 @@ def _mixed(values: Values, places: list[Values]) -> Values:
     return total
 
 
-def _stepped(rgb: Values, steps: Iterable[ColourStep]) -> Values:
+def _stepped(rgb: Floats, steps: Iterable[ColourStep]) -> Floats:
     """Colours behind operations, clamped after each."""
     for kind, *numbers in steps:
         if kind == "color":
@@ -97,7 +91,7 @@ def _stepped(rgb: Values, steps: Iterable[ColourStep]) -> Values:
     return rgb
 
 
-def _turned(rgb: Values, turns: float) -> Values:
+def _turned(rgb: Floats, turns: float) -> Floats:
     """The same S and V of HSV, and H further by so many turns."""
     most, least = rgb.max(1), rgb.min(1)
     first = rgb.argmax(1)
@@ -109,20 +103,13 @@ def _turned(rgb: Values, turns: float) -> Values:
     return np.stack([least + (most - least) * np.clip(2 - 6 * a, 0, 1) for a in away], 1)
 
 
-Array = Any  # numpy array or torch tensor
-
 Brought = Mapping[str, Any]
 """True shapes of elements by geometry: each answers points (M, d) of the leaf's own space with signed
 ``distances`` (M,), and in space with their gradients ``slopes`` (M, 3)."""
 
 
 def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Array:
-    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
-
-    Args:
-        p: points in leaf units, (d, …).
-        brought: shapes of elements, whose points are (d, M).
-    """
+    """Exact signed distance of a leaf at points (d, …), leaf units, those of elements (d, M)."""
     if brought and geometry in brought:
         return brought[geometry].distances(np.transpose(p))
     return GEOMETRIES[geometry].distance(p)
@@ -131,12 +118,9 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object.
+    """Yield (D, C) after each object, of a distance of shape S.
 
-    Args:
-        distances: world distances d of the objects, each of shape S.
-        colours: colours c, each of a shape that broadcasts against (*S, 3).
-        tokens: each a number, or an array that broadcasts against S.
+    Colours broadcast against (*S, 3); tokens are numbers, or arrays that broadcast against S.
     """
     big_d = c_now = None
     for d, c, token in zip(distances, colours, tokens, strict=True):
@@ -177,24 +161,17 @@ def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -
 
 
 def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return _cut(xp, big_d, -d, k), big_c
+    return _intersect(xp, big_d, big_c, -d, c, k)
 
 
 def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return _cut(xp, big_d, d, k), big_c
-
-
-def _cut(xp: Any, big_d: Array, d: Array, k: float) -> Array:
     if not k:
-        return xp.maximum(big_d, d)
+        return xp.maximum(big_d, d), big_c
     h = xp.clip(0.5 - 0.5 * (d - big_d) / k, 0.0, 1.0)  # the share of what is cut
-    return d + (big_d - d) * h + k * h * (1 - h)
+    return d + (big_d - d) * h + k * h * (1 - h), big_c
 
 
 _STEPS = (_union, _smooth, _subtract, _intersect)
-
-
-Floats = npt.NDArray[np.float64]
 
 
 def map_back(frame: Array, p: Array) -> list[Array]:
@@ -224,13 +201,9 @@ def carry_back(steps: Sequence[Step], p: Array) -> Array:
 @lru_cache(maxsize=1 << 12)
 def frame_back(step: Affine, dimension: int) -> Floats:
     """The inverse of an affine map, as d rows of d factors and a shift."""
-    inverse = np.linalg.inv(_linear(step, dimension))
-    shift = -inverse @ np.reshape(step.rows, (3, 4))[:dimension, 3]
-    return np.column_stack([inverse, shift])
-
-
-def _linear(step: Affine, dimension: int) -> Floats:
-    return np.reshape(step.rows, (3, 4))[:dimension, :dimension]
+    rows = np.reshape(step.rows, (3, 4))[:dimension]
+    inverse = np.linalg.inv(rows[:, :dimension])
+    return np.column_stack([inverse, -inverse @ rows[:, 3]])
 
 
 @lru_cache(maxsize=1 << 12)
@@ -239,7 +212,7 @@ def distance_scale(steps: tuple[Step, ...], dimension: int = 2) -> float:
     linear = np.eye(dimension)
     for step in steps:
         if isinstance(step, Affine):
-            linear = _linear(step, dimension) @ linear
+            linear = np.reshape(step.rows, (3, 4))[:dimension, :dimension] @ linear
     return float(np.linalg.svd(linear, compute_uv=False)[-1])
 
 
@@ -251,13 +224,11 @@ def evaluate(
     owners: bool = False,
     brought: Brought | None = None,
 ) -> tuple[Any, Any]:
-    """Distance D (M,) and colour C (M, 3) of a node at world points.
+    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64.
 
     Args:
-        p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
         owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
-        brought: shapes of elements.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
@@ -306,12 +277,8 @@ def parts(
         if len(rows) * len(columns) <= (_MOST if few else _LEAST):
             yield Fold("scene", ()) if low > 0 else node, rows, columns
         else:
-            todo += [(node, *half) for half in product(_halves(rows), _halves(columns))]
-
-
-def _halves(side: range) -> list[range]:
-    middle = len(side) // 2
-    return [half for half in (side[:middle], side[middle:]) if half]
+            halves = [(side[: len(side) // 2], side[len(side) // 2 :]) for side in (rows, columns)]
+            todo += [(node, *half) for half in product(*halves) if all(half)]
 
 
 def within(
@@ -325,12 +292,8 @@ def within(
 ) -> tuple[float, Node]:
     """A bound below the distance of a node in a disc of world points, and the node without what is outside.
 
-    Args:
-        centre, radius: of the disc, (2, 1) and world units.
-        outer: steps of the folds around the node, nearest first.
-        signed: whether no more is asked for than the sign of the distance, and the colour where it is
-            negative. Else nothing is left out: a blend wants the distance itself.
-        brought: shapes of elements.
+    Nothing is left out unless ``signed``: then no more is asked for than the sign of the distance, and the
+    colour where it is negative. A blend wants the distance itself.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
@@ -369,5 +332,5 @@ def _carried(steps: tuple[Step, ...], centre: Array, radius: float) -> tuple[Arr
 
 @lru_cache(maxsize=1 << 12)
 def _stretch(step: Affine) -> float:
-    """Greatest factor by which the way back through an affine map lengthens."""
+    """Greatest factor by which the way back lengthens."""
     return float(np.linalg.norm(frame_back(step, 2)[:, :2], 2))

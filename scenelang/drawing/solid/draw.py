@@ -32,20 +32,15 @@ def draw_solids(
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
-    """Draw a field of solids.
+    """Draw a field of solids: the picture, and what it took.
 
     Args:
-        field: the solids.
-        stage: camera, light, ground and sky.
         canvas: width and height in pixels.
         threads: bands drawn at the same time.
         split: bands are as high as for so many threads; by default ``threads``.
         samples: of a pixel: ``"adaptive"``, four where something changes from pixel to pixel and one
             elsewhere, ``"quick"``, the same at another of `PACES`, ``"four"`` or ``"one"``.
         progress: called with the share done, from any thread.
-
-    Returns:
-        The picture and what it took.
 
     Raises:
         ProgramError: numbers out of all proportion, which no compiled scene has.
@@ -97,10 +92,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
 def _shade(
     lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray, px: float = 0.0
 ) -> tuple[np.ndarray, Work]:
-    """Radiance, alpha and plain radiance (7, …) at places in pixels from the picture's upper left corner.
-
-    With px as of `Lighting.shade`.
-    """
+    """Radiance, alpha and plain radiance (7, …) at places of the picture; px as of `Lighting.shade`."""
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
@@ -137,12 +129,6 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
     """Outputs of a field of solids; objects are numbered as the field has them, from 1.
 
     Alpha is the mean of four samples where it changes from pixel to pixel, the rest is of the centre.
-
-    Args:
-        field: the solids.
-        stage: camera and ground.
-        canvas: width and height in pixels.
-        threads: parts drawn at the same time.
     """
     width, height = canvas
     lighting = Lighting(field, stage)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Camera, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.march import CAREFUL, STEPS, Pace, Piece, Trail, Work, march
@@ -26,110 +26,6 @@ FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
 PIXELS = 4096  # on surfaces, likewise
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
-
-
-class Lookups:
-    """Asks a field for colours between the samples of pixels.
-
-    The sides of pixels, px, are those of a picture that is 2 wide; 0 means one lookup.
-
-    Args:
-        field: the solids.
-        camera: whose rays they are.
-        nodes: points on a ray's way through a medium at which the light is asked for.
-    """
-
-    def __init__(self, field: SolidField, camera: Camera, nodes: int) -> None:
-        self._field, self._xp, self._nodes = field, field.xp, nodes
-        forward, right, up = np.asarray(camera.axes())
-        four = [across * right + along * up for along in (0.25, -0.25) for across in (-0.25, 0.25)]
-        self._eye, self._forward, self._four = (
-            self._xp.array(np.asarray(value, np.float32), field.network.codes)
-            for value in (
-                camera.eye,
-                forward * np.tan(camera.fov_rad / 2),
-                np.transpose(four)[:, :, None],
-            )
-        )
-
-    def mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
-        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n.
-
-        What a medium gives way to, if soft, has its own plane, and its own colours there.
-        """
-        xp, field = self._xp, self._field
-        if len(t) > PIXELS:
-            parts = [slice(at, at + PIXELS) for at in range(0, len(t), PIXELS)]
-            some = [
-                (Passes(passes.slots[:, :, at], passes.origins), way[:, at], t[at], n[:, at]) for at in parts
-            ]
-            return xp.concat([self.mean(*each, soft, px) for each in some], 1)
-        seen, objects = way * t, None
-        if soft:
-            owner = field.meet(passes, t + INTO, Wanted.KIND, owners=True).owner
-            objects = xp.whole(owner - 1).clip(0)
-            n = field.normals(objects, self._eye[:, None] + seen)
-        off = self._four * (px * t * (self._forward @ way))
-        towards = (n * seen).sum(0)
-        towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)
-        ratio = ((n[:, None] * off).sum(0) / towards).clip(-GRAZING, GRAZING)
-        off = (off - seen[:, None] * ratio) / (1 + ratio)
-        p = (self._eye[:, None] + way * (t + INTO))[:, None] + off
-        if objects is not None:
-            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
-        else:
-            four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
-            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
-        return result.reshape(3, 4, -1).mean(1)
-
-    def along(self, way: Array, trail: Trail, pieces: Piece, px: float) -> Iterator[tuple[Array, int, Array]]:
-        """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there.
-
-        Args:
-            way: of the rays (3, M).
-            trail: what they met.
-            pieces: their ways through media.
-        """
-        xp, (ray, begin, end, _) = self._xp, pieces
-        if not self._field.textures:
-            return
-        texels = self._field.textured(trail.at(xp, ray)) * (end - begin).clip(0.0, 1 / EXTINCTION)
-        for some, panels in (((texels > 0) & (texels <= BUSY), FEW), (texels > BUSY, MANY)):
-            whole = xp.where(some)
-            for start in range(0, len(whole), CHUNK):
-                index = whole[start : start + CHUNK]
-                part = tuple(xp.take(each, index) for each in pieces)
-                for node, woven in enumerate(self._woven(way, trail, part, panels, px)):
-                    yield index, node, woven
-
-    def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
-        """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
-
-        Between the nodes the light goes as the polynomial through them does. What this makes of a colour is
-        summed up at many more points, which are in turn those of the pixel's samples.
-        """
-        xp, (ray, begin, end, before) = self._xp, pieces
-        gauss, count = np.polynomial.legendre.leggauss, 2 * panels
-        places = ((np.arange(panels)[:, None] + (gauss(2)[0] + 1) / 2) / panels).reshape(-1)
-        nodes = (gauss(self._nodes)[0] + 1) / 2
-        bases = [
-            np.prod([(places - other) / (node - other) for other in nodes if other != node], 0)
-            for node in nodes
-        ]
-        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
-        left = 1 - xp.array(places[:, None].astype(np.float32), way) * taken
-        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (places, P)
-        weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before)
-        rays = xp.concat([ray] * count, 0)
-        ways = xp.take(way, rays)
-        p = self._eye[:, None] + ways * t
-        if px:
-            turns = np.resize((0, 1, 2, 3, 3, 2, 1, 0), count)
-            four = xp.stack([self._four[:, i] for i in turns.tolist()], 1)  # (3, places, 1)
-            p = p + (four * (px * t * (self._forward @ ways)).reshape(count, -1)).reshape(3, -1)
-        colours = self._field.colours(trail.at(xp, rays), t, p).reshape(3, count, -1) * weight
-        shares = [xp.array(base[:, None].astype(np.float32), way) for base in bases]
-        return [(colours * share).sum(1) for share in shares]
 
 
 CLEAR = 2e-4  # world units before a surface where rays from the light end
@@ -146,18 +42,11 @@ CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents o
 
 
 class Shade(NamedTuple):
-    """Light along M rays.
+    """Light along M rays."""
 
-    Args:
-        radiance: premultiplied and linear (3, M).
-        plain: the same with plain colours for those of textures.
-        alpha: (M,).
-        work: what it took.
-    """
-
-    radiance: Array
-    plain: Array
-    alpha: Array
+    radiance: Array  # premultiplied and linear (3, M)
+    plain: Array  # the same with plain colours for those of textures
+    alpha: Array  # (M,)
     work: Work
 
 
@@ -173,19 +62,16 @@ class Points(NamedTuple):
 
 
 class Lighting:
-    """A field under the light of its stage.
-
-    Args:
-        field: the solids.
-        stage: where they are.
-        pace: how carefully it is drawn.
-    """
+    """A field under the light of its stage, drawn at a pace."""
 
     def __init__(self, field: SolidField, stage: Stage, pace: Pace = CAREFUL) -> None:
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
-        self.eye, self.lamp, self.power, self.horizon, self.zenith = (
+        forward, right, up = np.asarray(stage.camera.axes())
+        # the samples of a pixel; the sides of pixels, px, are those of a picture that is 2 wide
+        four = [across * right + along * up for along in (0.25, -0.25) for across in (-0.25, 0.25)]
+        self.eye, self.lamp, self.power, self.horizon, self.zenith, self._forward, self._four = (
             field.xp.array(np.asarray(value, np.float32), like)
             for value in (
                 stage.camera.eye,
@@ -193,17 +79,15 @@ class Lighting:
                 [stage.light.power * c for c in stage.light.rgb] * twice,
                 stage.horizon * twice,
                 stage.zenith * twice,
+                forward * np.tan(stage.camera.fov_rad / 2),
+                np.transpose(four)[:, :, None],
             )
         )
-        self.lookups = Lookups(field, stage.camera, pace.nodes)
 
     def shade(self, way: Array, px: float = 0.0) -> Shade:
-        """Light along rays from the eye.
+        """Light along rays from the eye, whose unit directions are (3, M).
 
-        Args:
-            way: unit directions (3, M).
-            px: side of the pixels for which textures are looked up four times, of a picture that is 2 wide;
-                0: once.
+        Textures are looked up four times for pixels of a side px, of a picture that is 2 wide; once for 0.
         """
         xp, stage = self.xp, self.stage
         seen, limit = self._sky(way), self.limit(way)
@@ -226,7 +110,7 @@ class Lighting:
         if not result:
             return Shade(seen[:3], seen[-3:], alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
-        light, free, more = self._lit(points, xp.take(trail.soft, surface), _steps(trail))
+        light, free, more = self._lit(points, xp.take(trail.soft, surface), trail)
         work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
@@ -245,13 +129,9 @@ class Lighting:
         Those whose nodes do not tell how the light goes on between them are cut and asked again.
 
         Args:
-            way: of the rays (3, M).
-            trail: what they met.
-            pieces: their ways through media, P.
-            share: what these have of what is seen (P,).
+            share: what pieces have of what is seen (P,).
             light: what nodes on them send (R, K).
             free: whether any light reaches those (K,).
-            px: as of `shade`.
         """
         xp, count, work = self.xp, self.pace.nodes, Work(met=light.shape[1])
         glow = xp.full((len(light), way.shape[1]), 0.0, way)
@@ -266,9 +146,7 @@ class Lighting:
             each = (end - begin) / PARTS
             finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
             pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
-            light, _, more = self._lit(
-                self._scattering(way, trail, pieces, px)[0], trail.soft[:0], _steps(trail)
-            )
+            light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0], trail)
             work += more + Work(met=light.shape[1])
             xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
         return glow, work
@@ -312,19 +190,18 @@ class Lighting:
         rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
         colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:-1] * weight.reshape(-1)
-        for index, node, woven in self.lookups.along(way, trail, pieces, px):
+        for index, node, woven in self._textured(way, trail, pieces, px):
             xp.put(colour[:3], index + node * len(ray), woven)
         r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
         points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
         return points, weight.sum(0)
 
-    def _lit(self, points: Points, soft: Array, steps: int) -> tuple[Array, Array, Work]:
+    def _lit(self, points: Points, soft: Array, seen: Trail) -> tuple[Array, Array, Work]:
         """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
 
         Args:
-            points: all of them.
-            soft: of the first, 1 where they are not at a distance of 0 though something begins there.
-            steps: of rays at most.
+            soft: of the first points, 1 where they are not at a distance of 0 though something begins there.
+            seen: the trail of the rays from the eye that met the points.
         """
         xp, (p, light, more) = self.xp, points
         lit = xp.where(abs(more).sum(0) > 0)
@@ -333,7 +210,7 @@ class Lighting:
         edge = 0 * p[0]
         edge[: len(soft)] = soft
         edge = xp.take(edge, lit) > 0
-        limit = r - CLEAR * ~edge
+        limit, steps = r - CLEAR * ~edge, HASTY if seen.lost else STEPS
         trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, True, steps)
         clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
@@ -372,7 +249,7 @@ class Lighting:
             some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
             if len(some):
                 ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
-                mean = self.lookups.mean(passes.at(xp, some), ways, ts, ns, soft, px)
+                mean = self._mean(passes.at(xp, some), ways, ts, ns, soft, px)
                 xp.put(colour[:3], some, mean)
         return p, n, colour, 0 * colour
 
@@ -454,10 +331,80 @@ class Lighting:
             result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
         return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
+    def _mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
+        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n.
 
-def _steps(trail: Trail) -> int:
-    """Steps of the rays from the light to the points that rays from the eye met."""
-    return HASTY if trail.lost else STEPS
+        What a medium gives way to, if soft, has its own plane, and its own colours there.
+        """
+        xp, field = self.xp, self.field
+        if len(t) > PIXELS:
+            parts = [slice(at, at + PIXELS) for at in range(0, len(t), PIXELS)]
+            some = [
+                (Passes(passes.slots[:, :, at], passes.origins), way[:, at], t[at], n[:, at]) for at in parts
+            ]
+            return xp.concat([self._mean(*each, soft, px) for each in some], 1)
+        seen, objects = way * t, None
+        if soft:
+            owner = field.meet(passes, t + INTO, Wanted.KIND, owners=True).owner
+            objects = xp.whole(owner - 1).clip(0)
+            n = field.normals(objects, self.eye[:, None] + seen)
+        off = self._four * (px * t * (self._forward @ way))
+        towards = (n * seen).sum(0)
+        towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)
+        ratio = ((n[:, None] * off).sum(0) / towards).clip(-GRAZING, GRAZING)
+        off = (off - seen[:, None] * ratio) / (1 + ratio)
+        p = (self.eye[:, None] + way * (t + INTO))[:, None] + off
+        if objects is not None:
+            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
+        else:
+            four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
+            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
+        return result.reshape(3, 4, -1).mean(1)
+
+    def _textured(
+        self, way: Array, trail: Trail, pieces: Piece, px: float
+    ) -> Iterator[tuple[Array, int, Array]]:
+        """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there."""
+        xp, (ray, begin, end, _) = self.xp, pieces
+        if not self.field.textures:
+            return
+        texels = self.field.textured(trail.at(xp, ray)) * (end - begin).clip(0.0, 1 / EXTINCTION)
+        for some, panels in (((texels > 0) & (texels <= BUSY), FEW), (texels > BUSY, MANY)):
+            whole = xp.where(some)
+            for start in range(0, len(whole), CHUNK):
+                index = whole[start : start + CHUNK]
+                part = tuple(xp.take(each, index) for each in pieces)
+                for node, woven in enumerate(self._woven(way, trail, part, panels, px)):
+                    yield index, node, woven
+
+    def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
+        """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
+
+        Between the nodes the light goes as the polynomial through them does. What this makes of a colour is
+        summed up at many more points, which are in turn those of the pixel's samples.
+        """
+        xp, (ray, begin, end, before) = self.xp, pieces
+        gauss, count = np.polynomial.legendre.leggauss, 2 * panels
+        places = ((np.arange(panels)[:, None] + (gauss(2)[0] + 1) / 2) / panels).reshape(-1)
+        nodes = (gauss(self.pace.nodes)[0] + 1) / 2
+        bases = [
+            np.prod([(places - other) / (node - other) for other in nodes if other != node], 0)
+            for node in nodes
+        ]
+        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
+        left = 1 - xp.array(places[:, None].astype(np.float32), way) * taken
+        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (places, P)
+        weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before)
+        rays = xp.concat([ray] * count, 0)
+        ways = xp.take(way, rays)
+        p = self.eye[:, None] + ways * t
+        if px:
+            turns = np.resize((0, 1, 2, 3, 3, 2, 1, 0), count)
+            four = xp.stack([self._four[:, i] for i in turns.tolist()], 1)  # (3, places, 1)
+            p = p + (four * (px * t * (self._forward @ ways)).reshape(count, -1)).reshape(3, -1)
+        colours = self.field.colours(trail.at(xp, rays), t, p).reshape(3, count, -1) * weight
+        shares = [xp.array(base[:, None].astype(np.float32), way) for base in bases]
+        return [(colours * share).sum(1) for share in shares]
 
 
 def _dot(a: Array, b: Array) -> Array:
