@@ -15,7 +15,7 @@ from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import flip
 from tests.drawing import solid_oracle
 from tests.drawing.povray import MESHES, mesh, povray, povray_picture
-from tests.drawing.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
+from tests.drawing.solids import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
 from tests.pictures import psnr_db
 
 pytestmark = [

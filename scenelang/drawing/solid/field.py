@@ -8,11 +8,11 @@ group that draws goes on in the state around it where nothing has been met in th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -272,26 +272,10 @@ class Objects:
         self, q: Array, own: list[tuple[SolidFrame, Array, Array]], objects: Array, gradient: bool
     ) -> tuple[Array, Array]:
         """World distances (P,) at leaf coordinates, as `_local` has them; gradients (3, P) if asked."""
-        xp, place = self.xp, q
-        if self.far:
-            length = xp.sqrt((q * q).sum(0))
-            rim = RADIUS / length.clip(RADIUS)
-            place = q * rim
-        result = self._decoded(place, objects, gradient)
-        d, g = result[0], result[1:]
-        if self.far:
-            d = d + (length - RADIUS).clip(0.0)
-            if gradient:
-                n = q / length.clip(1e-9)
-                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
+        xp, bulge = self.xp, None
         if self.bumpy:
-            f, amount = xp.take(self.frequency, objects), xp.take(self.amount, objects)
-            s = xp.sin(f * q)
-            d = d + amount * (s[0] * s[1] * s[2])
-            if gradient:
-                c = xp.cos(f * q)
-                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
-                g = g + (amount * f) * more
+            bulge = xp.take(self.frequency, objects), xp.take(self.amount, objects)
+        d, g = self._leaf(q, partial(self._decoded, objects=objects), self.far, bulge, gradient)
         scale = xp.take(self.scale, objects)
         if not gradient:
             return d * scale, g
@@ -301,39 +285,57 @@ class Objects:
 
     def decoded(self, at: Array, bounds: Sequence[int]) -> Array:
         """Leaf distances (P,) at points (3, P) behind objects' maps, group by group, with bounds between."""
-        ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
-        ask += [partial(self._special, i) for i in self.special]
-        pieces = zip(ask, pairwise(bounds), strict=True)
-        parts = [distances(at[:, a:b])[0] for distances, (a, b) in pieces if a < b]
+        parts = []
+        for group, (a, b) in enumerate(pairwise(bounds)):
+            if a < b and group < len(self.decoders):
+                parts.append(self._field(at[:, a:b], False, self.decoders[group])[0])
+            elif a < b:
+                i = self.special[group - len(self.decoders)]
+                frame, decoder = self.solids[i].frame, self.decoders[int(self.decoder[i])]
+                bulge = (frame.frequency, frame.amount) if frame.amount else None
+                q, far = frame.local(self.xp, at[:, a:b]), self.solids[i].radius > RADIUS
+                parts.append(self._leaf(q, partial(self._field, decoder=decoder), far, bulge, False)[0])
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
 
-    def _special(self, i: int, at: Array) -> Array:
-        """Leaf distances (1, P) of an object at points (3, P) behind its map."""
-        xp, frame = self.xp, self.solids[i].frame
-        q = frame.local(xp, at)
-        place, beyond = q, 0.0
-        if self.solids[i].radius > RADIUS:
+    def _leaf(
+        self, q: Array, field: Callable[..., Array], far: bool, bulge: tuple[Any, Any] | None, gradient: bool
+    ) -> tuple[Array, Array]:
+        """Leaf distances (P,) by a field, which does not know what is ``far``; gradients (3, P) if asked."""
+        xp, place = self.xp, q
+        if far:
             length = xp.sqrt((q * q).sum(0))
-            place, beyond = q * (RADIUS / length.clip(RADIUS)), (length - RADIUS).clip(0.0)
-        d = self._field(place, self.decoders[int(self.decoder[i])], False) + beyond
-        if not frame.amount:
-            return d
-        s = xp.sin(frame.frequency * q)
-        return d + frame.amount * (s[0] * s[1] * s[2])
+            rim = RADIUS / length.clip(RADIUS)
+            place = q * rim
+        result = field(place, gradient=gradient)
+        d, g = result[0], result[1:]
+        if far:
+            d = d + (length - RADIUS).clip(0.0)
+            if gradient:
+                n = q / length.clip(1e-9)
+                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
+        if bulge is not None:
+            f, amount = bulge
+            s = xp.sin(f * q)
+            d = d + amount * (s[0] * s[1] * s[2])
+            if gradient:
+                c = xp.cos(f * q)
+                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
+                g = g + (amount * f) * more
+        return d, g
 
-    def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
+    def _decoded(self, q: Array, gradient: bool, objects: Array) -> Array:
         """Decode leaf coordinates (3, P) to distances (1, P), or to these and gradients (4, P)."""
         xp = self.xp
         if len(self.decoders) == 1:
-            return self._field(q, self.decoders[0], gradient)
+            return self._field(q, gradient, self.decoders[0])
         result, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
         for i, layers in enumerate(self.decoders):
             index = xp.where(which == i)
             if len(index):
-                xp.put(result, index, self._field(xp.take(q, index), layers, gradient))
+                xp.put(result, index, self._field(xp.take(q, index), gradient, layers))
         return result
 
-    def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
+    def _field(self, q: Array, gradient: bool, decoder: Smooth | GridShape) -> Array:
         if isinstance(decoder, GridShape):
             return decoder.field(q, gradient)
         return self.network.field(q, decoder, gradient)
