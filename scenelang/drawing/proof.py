@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
-from scenelang.compiler.graph import Fold, Graph, Leaf, Look, Node
+from scenelang.compiler.graph import Graph, Look
 from scenelang.compiler.groups import (
     INTERSECT,
     SMOOTH,
@@ -41,7 +41,7 @@ from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
-from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance
+from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -89,20 +89,6 @@ class Written(NamedTuple):
             else:  # shares clamp nothing and tear no colours apart
                 off *= 1 + 2 * max(0.0, max(numbers) - 1.0, -min(numbers))
         return off
-
-
-def written(root: Fold) -> dict[int, Written]:
-    """All objects of a lowered graph, by number."""
-    result: dict[int, Written] = {}
-    todo: list[tuple[Node, tuple[Step, ...]]] = [(root, ())]
-    while todo:
-        node, outer = todo.pop()
-        steps = (*[move.step for move in node.moves], *outer)
-        if isinstance(node, Leaf):
-            result[node.number] = Written(node.look, steps)
-        else:
-            todo += [(link.node, steps) for link in node.links]
-    return result
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
@@ -347,8 +333,9 @@ class Stream:
         widths = widths_of(raw, np.array([row.k for row in rows]))
         seen = felt(groups, widths)
         reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
-        objects, far = written(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
-        leaves = [objects[leaf.number] for leaf in self._leaves]
+        objects, far = placed_leaves(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
+        written = {leaf.number: Written(leaf.look, steps) for leaf, steps, _ in objects}
+        leaves = [written[leaf.number] for leaf in self._leaves]
         own = list(zip(leaves, reach.tolist(), strict=True))
         self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])
         self.rounding += EPS * widths.sum() / self.frames.scale

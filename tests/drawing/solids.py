@@ -162,7 +162,7 @@ MIXED = (
         token="smooth",
         k=0.3,
     ),
-    Object("torus", (scaled(0.5, 0.5, 0.5), turned(2.0), moved(0.0, 0.4, 0.3)), token="subtract"),
+    Object("torus", (scaled(0.5), turned(2.0), moved(0.0, 0.4, 0.3)), token="subtract"),
     Object("sphere", (scaled(1.1, 1.0, 1.2),), token="intersect"),
 )
 """Objects of every kind about the origin."""

@@ -59,9 +59,9 @@ def test_the_field_has_the_colours_of_the_reference(library: str, element) -> No
 SCENES = {
     "surfaces": (
         [
-            Object("torus", (scaled(1.1, 1.1, 1.1), turned(0.8)), paint=Paint(COARSE, STEPS), texture=MOVED),
+            Object("torus", (scaled(1.1), turned(0.8)), paint=Paint(COARSE, STEPS), texture=MOVED),
             Object("sphere", (scaled(0.6, 0.4, 0.6), moved(1, 0, 0.6)), token="smooth", paint=Paint(SPACE)),
-            Object("sphere", (scaled(0.4, 0.4, 0.4), moved(-0.8, 0.5, 0.4)), token="subtract"),
+            Object("sphere", (scaled(0.4), moved(-0.8, 0.5, 0.4)), token="subtract"),
         ],
         44,
     ),
@@ -72,15 +72,15 @@ SCENES = {
     "media": (
         [
             Object("sphere", (turned(0.5),), "volumetric", paint=Paint(COARSE, STEPS)),
-            Object("torus", (scaled(0.5, 0.5, 0.5), moved(1.3, 0, 0.5)), "volumetric", paint=Paint(SPACE)),
-            Object("sphere", (scaled(0.5, 0.5, 0.5), moved(-1.2, 0, 0.5)), "volumetric", (0.1, 0.3, 0.9)),
+            Object("torus", (scaled(0.5), moved(1.3, 0, 0.5)), "volumetric", paint=Paint(SPACE)),
+            Object("sphere", (scaled(0.5), moved(-1.2, 0, 0.5)), "volumetric", (0.1, 0.3, 0.9)),
         ],
         46,
     ),
     "solids in media": (
         [
             Object("sphere", (), "volumetric", (0.9, 0.9, 1.0)),
-            Object("torus", (scaled(0.94, 0.94, 0.94), turned(0.6)), paint=Paint(COARSE)),
+            Object("torus", (scaled(0.94), turned(0.6)), paint=Paint(COARSE)),
         ],
         40,
     ),

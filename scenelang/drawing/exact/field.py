@@ -20,6 +20,7 @@ from scenelang.assets.element import Element
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
+from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.drawing.image import decoded
 from scenelang.language.words import BLEND, TOKENS
@@ -137,41 +138,33 @@ def combine(
     """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one."""
     xp = namespace(d)
     if isinstance(token, int):
-        return _STEPS[token](xp, big_d, big_c, d, c, k)
+        out_d, share, _ = folded(xp, token, k or BLEND * (token == SMOOTH), big_d, d)
+        if share is None:
+            return out_d, big_c
+        share = share[..., None]
+        return out_d, big_c + (c - big_c) * share if token == SMOOTH else xp.where(share, c, big_c)
     out_d, out_c = big_d, big_c
-    for value, step in enumerate(_STEPS):
-        new_d, new_c = step(xp, big_d, big_c, d, c, k)
+    for value in TOKENS.values():
+        new_d, new_c = combine(big_d, big_c, d, c, value, k)
         chosen = token == value
         out_d = xp.where(chosen, new_d, out_d)
         out_c = xp.where(chosen[..., None], new_c, out_c)
     return out_d, out_c
 
 
-def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    over = d < xp.clip(big_d, 0.0, None)
-    return xp.minimum(big_d, d), xp.where(over[..., None], c, big_c)
-
-
-def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    k = k or BLEND
-    h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
-    mixed = big_c + (c - big_c) * h[..., None]
-    # each side by its own share: a difference of the two would swallow the nearer one's digits
-    return big_d * (1 - h) + d * h - k * h * (1 - h), mixed
-
-
-def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return _intersect(xp, big_d, big_c, -d, c, k)
-
-
-def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
+def folded(xp: Any, token: int, k: float, big_d: Array, d: Array) -> tuple[Array, Array, Array]:
+    """The distance behind an operand, its shares in the colour, None for none, and in the gradient."""
+    if token == UNION:
+        return xp.minimum(big_d, d), d < xp.clip(big_d, 0.0, None), d <= big_d
+    if token == SMOOTH:
+        h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
+        # each side by its own share: a difference of the two would swallow the nearer one's digits
+        return big_d * (1 - h) + d * h - k * h * (1 - h), h, h
+    d = -d if token == SUBTRACT else d
     if not k:
-        return xp.maximum(big_d, d), big_c
-    h = xp.clip(0.5 - 0.5 * (d - big_d) / k, 0.0, 1.0)  # the share of what is cut
-    return d + (big_d - d) * h + k * h * (1 - h), big_c
-
-
-_STEPS = (_union, _smooth, _subtract, _intersect)
+        return xp.maximum(big_d, d), None, d >= big_d
+    h = xp.clip(0.5 + 0.5 * (d - big_d) / k, 0.0, 1.0)
+    return big_d * (1 - h) + d * h + k * h * (1 - h), None, h
 
 
 def map_back(frame: Array, p: Array) -> list[Array]:
@@ -257,6 +250,18 @@ def evaluate(
     return big_d, big_c
 
 
+def placed_leaves(
+    node: Node, outer: tuple[Step, ...] = (), taken: bool = False
+) -> Iterator[tuple[Leaf, tuple[Step, ...], bool]]:
+    """Leaves in order with all their steps, and whether a `subtract` takes them away."""
+    steps = (*(move.step for move in node.moves), *outer)
+    if isinstance(node, Leaf):
+        yield node, steps, taken
+    else:
+        for at, link in enumerate(node.links):
+            yield from placed_leaves(link.node, steps, taken or (at > 0 and link.op == "subtract"))
+
+
 _MOST, _LEAST = 1 << 16, 1 << 10  # pixels of a part that is halved whatever it holds, and of one that is not
 _FEW = 4  # objects that are no reason to go on halving
 _DIGITS = 1e-12  # of a coordinate: more than float64 loses in a step
@@ -278,7 +283,7 @@ def parts(
             yield Fold("scene", ()) if low > 0 else node, rows, columns
         else:
             halves = [(side[: len(side) // 2], side[len(side) // 2 :]) for side in (rows, columns)]
-            todo += [(node, *half) for half in product(*halves) if all(half)]
+            todo += [(node, tall, wide) for tall, wide in product(*halves) if tall and wide]
 
 
 def within(

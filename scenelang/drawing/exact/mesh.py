@@ -271,14 +271,6 @@ def outer(
     return points[chosen], (normals * turned)[chosen], float((~(sides[0] | sides[1])).mean())
 
 
-def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """A mask (F,) of triangles (F, 3) that are the first with their corners in their order round."""
-    from trimesh.grouping import unique_rows
-
-    turned = np.take_along_axis(triangles, (triangles.argmin(1)[:, None] + np.arange(3)) % 3, 1)
-    return np.isin(np.arange(len(triangles)), unique_rows(turned)[0])
-
-
 def _igl() -> Any:
     with needed("libigl"):
         import igl
@@ -309,6 +301,7 @@ def mesh_of(
     """
     with needed("trimesh"):
         import trimesh
+        from trimesh.grouping import unique_rows
     notes = []
     if vertices.shape[1:] != (3,) or triangles.shape[1:] != (3,) or not len(triangles):
         raise FitError("it holds no triangles")
@@ -333,7 +326,11 @@ def mesh_of(
         notes.append(f"{plural((~sound).sum(), 'flat triangle')} left out")
         mesh.update_faces(sound)
         look = look and look.of(sound)
-    if not (once := _once(mesh.faces)).all():  # many at one place would all be asked, for each point
+    # triangles that are the first with their corners in their order round; of many at one place all would be
+    # asked, for each point
+    turned = (mesh.faces.argmin(1)[:, None] + np.arange(3)) % 3
+    first, _ = unique_rows(np.take_along_axis(mesh.faces, turned, 1))
+    if not (once := np.isin(np.arange(len(turned)), first)).all():
         notes.append(f"{plural((~once).sum(), 'repeated triangle')} left out")
         mesh.update_faces(once)
         look = look and look.of(once)
@@ -401,8 +398,11 @@ def read_solids(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             notes = _notes(data) if suffix == ".glb" else []
-            if suffix == ".obj":
-                _few(data)
+            if suffix == ".obj":  # what trimesh would read for minutes
+                if len(re.findall(rb"^[ \t]*(?:o|g|usemtl)\b", data, re.M)) > _MOST_PIECES:
+                    raise FitError(f"more than {_MOST_PIECES:,} objects, groups and changes of material")
+                if re.search(rb"^[ \t]*f(?:[ \t]+[^\s]+){%d}" % (_MOST_CORNERS + 1), data, re.M):
+                    raise FitError(f"a face of more than {_MOST_CORNERS:,} corners")
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
             result = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
@@ -412,14 +412,6 @@ def read_solids(
     except Exception as error:
         raise FitError(f"damaged or not a mesh: {str(error) or type(error).__name__}"[:200]) from error
     return solids, [*notes, *(f"`{name}` not found beside it" for name in sorted(beside.missing))]
-
-
-def _few(data: bytes) -> None:
-    """Refuse an OBJ that trimesh would read for minutes."""
-    if len(re.findall(rb"^[ \t]*(?:o|g|usemtl)\b", data, re.M)) > _MOST_PIECES:
-        raise FitError(f"more than {_MOST_PIECES:,} objects, groups and changes of material")
-    if re.search(rb"^[ \t]*f(?:[ \t]+[^\s]+){%d}" % (_MOST_CORNERS + 1), data, re.M):
-        raise FitError(f"a face of more than {_MOST_CORNERS:,} corners")
 
 
 def _notes(data: bytes) -> list[str]:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Stage
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.drawing.exact.field import (
     Array,
@@ -26,10 +26,13 @@ from scenelang.drawing.exact.field import (
     carry_back,
     colour_at,
     distance_scale,
+    folded,
     leaf_distance,
+    placed_leaves,
     sample_points,
 )
 from scenelang.drawing.image import Image, from_light
+from scenelang.language.words import TOKENS
 
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by
@@ -243,22 +246,11 @@ NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), n
 
 def join(op: str, k: float, a: State, b: State) -> State:
     """One step of the fold; of two operands of equal distance the gradient is the later's."""
+    d, paint, turn = folded(np, TOKENS[op], k, a.d, b.d)
     near = None if a.near is None or b.near is None else np.minimum(a.near, b.near)
-    paint: Any = None
-    side = 1.0
-    if op == "union":
-        d, paint, turn = np.minimum(a.d, b.d), b.d < np.maximum(a.d, 0.0), b.d <= a.d
-    elif op == "smooth":
-        h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0.0, 1.0)
-        d, paint, turn = (1.0 - h) * a.d + h * b.d - k * h * (1.0 - h), h, h
-        near = None if near is None else np.minimum(near, abs(a.d - b.d) / 2.0)
-    else:
-        side = -1.0 if op == "subtract" else 1.0
-        cut = side * b.d
-        d, turn = np.maximum(a.d, cut), cut >= a.d
-        if k:
-            h = np.clip(0.5 + 0.5 * (cut - a.d) / k, 0.0, 1.0)
-            d, turn = (1.0 - h) * a.d + h * cut + k * h * (1.0 - h), h
+    if near is not None and op == "smooth":
+        near = np.minimum(near, abs(a.d - b.d) / 2.0)
+    side = -1.0 if op == "subtract" else 1.0
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
         return State(d, a.medium, near, a.rgb, slope, a.owner)
@@ -273,7 +265,7 @@ class Field:
 
     def __init__(self, root: Fold, brought: Brought | None = None) -> None:
         self.root = root
-        result = list(_leaves(root))
+        result = list(placed_leaves(root))
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
@@ -338,18 +330,6 @@ def _fold(node: Node, known: Callable[[], State]) -> State:
     for link in node.links[1:]:
         state = join(link.op, link.width, state, _fold(link.node, known))
     return state
-
-
-def _leaves(
-    node: Node, outer: tuple[Step, ...] = (), taken: bool = False
-) -> Iterator[tuple[Leaf, tuple[Step, ...], bool]]:
-    """Leaves in order with all their steps, and whether a `subtract` takes them away."""
-    steps = (*(move.step for move in node.moves), *outer)
-    if isinstance(node, Leaf):
-        yield node, steps, taken
-    else:
-        for at, link in enumerate(node.links):
-            yield from _leaves(link.node, steps, taken or (at > 0 and link.op == "subtract"))
 
 
 def _blends(fold: Fold) -> Iterator[float]:
@@ -495,7 +475,11 @@ def radiance(field: Field, stage: Stage, d: Array) -> Array:
     o, end, changes = seen_along(field, stage, d)
     if stage.ground:
         seen = np.nonzero((end < np.inf) & (changes.last != OPAQUE))[0]
-        behind[:3, seen] = _ground(field, stage, stage.ground, o[:, seen] + end[seen] * d[:, seen])
+        p = o[:, seen] + end[seen] * d[:, seen]
+        upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
+        shade = np.reshape(stage.ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
+        clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
+        behind[:3, seen] = clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
         behind[3, seen] = 1.0
     hit = changes.after == OPAQUE
     seen, end[changes.ray[hit]] = changes.ray[hit], changes.t[hit]
@@ -544,14 +528,6 @@ def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
     state = field.at(p + _INSIDE * d, gradient=True)
     normal = state.slope / np.maximum(length(state.slope), 1e-12)
     return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
-
-
-def _ground(field: Field, stage: Stage, ground: Ground, p: Array) -> Array:
-    """Light from points of the ground, faded into the horizon."""
-    upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
-    shade = np.reshape(ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
-    clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
-    return clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
 
 
 def _received(field: Field, light: Light, p: Array, normal: Array) -> Array:

@@ -92,14 +92,15 @@ class Lighting:
         Textures are looked up four times for pixels of a side px, of a picture that is 2 wide; once for 0.
         """
         xp, stage = self.xp, self.stage
-        seen, limit = self._sky(way), self.limit(way)
+        high, limit = (way[1] * 2).clip(0.0, 1.0), self.limit(way)
+        seen = self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
         alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
         if stage.transparent:
             seen = seen * 0
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both, result = xp.concat([surface, floor], 0), []
-        work = Work(way.shape[1], 0, trail.near, trail.steps, trail.met + len(surface), lost=trail.lost)
+        work = trail.work + Work(rays=way.shape[1], met=len(surface))
         if len(surface):
             result.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
         if len(floor):
@@ -161,10 +162,6 @@ class Lighting:
         down = way[1] < 0
         return xp.select(down, (ground.y - eye[1]) / xp.select(down, way[1], way[1] * 0 - 1), never)
 
-    def _sky(self, way: Array) -> Array:
-        high = (way[1] * 2).clip(0.0, 1.0)
-        return self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
-
     def _reflecting(self, p: Array, n: Array, colour: Array, haze: Array) -> Points:
         """Surface points (3, K) with unit normals and colours, and light that joins in before."""
         to = self.lamp[:, None] - p
@@ -212,7 +209,7 @@ class Lighting:
         edge = 0 * p[0]
         edge[: len(soft)] = soft
         edge = xp.take(edge, lit) > 0
-        limit, steps = r - CLEAR * ~edge, HASTY if seen.lost else STEPS
+        limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
         trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, True, steps)
         clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
@@ -223,7 +220,7 @@ class Lighting:
         xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
         free = 0 * p[0] > 1
         xp.put(free, lit, clear > 0)
-        return light, free, Work(0, len(lit), trail.near, trail.steps, trail.met, lost=trail.lost)
+        return light, free, trail.work + Work(lights=len(lit))
 
     def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
         """Points where rays meet solids, normals (3, K), colours, and light from before them (R, K)."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -49,8 +49,139 @@ from scenelang.drawing.solid.passes import (
 TAGS = np.array([[0.618034], [0.754878], [0.569840]])  # parts of whole numbers times these lie apart
 
 
-class Objects:
-    """A program's objects with their weights: their distances and colours, each alone.
+class Closing(NamedTuple):
+    """Groups that end, k of them."""
+
+    inner: Array  # entries (k,): the point's number and, for each state below it, the number of points
+    outer: Array  # those of the states that take them in
+    which: Array  # numbers of the groups, behind those of the objects
+
+
+class Stacks:
+    """The groups that are open at each object, as bits: the outermost is 1, one in that 2, and so on."""
+
+    def __init__(self, xp: Arrays, groups: Groups, like: Array) -> None:
+        def placed(values: np.ndarray) -> Array:
+            return xp.array(np.ascontiguousarray(values), like)
+
+        self._xp, self._groups, self._count = xp, groups.deepest, len(groups.tokens)
+        bits = 1 << np.arange(groups.deepest)
+        there = groups.path >= 0
+        self._path = placed(groups.path.T)  # (D, N)
+        self._open = placed(there @ bits)
+        self._cuts = placed((there & (groups.joins[groups.path] >= SUBTRACT)) @ bits)
+        self._ways = placed(np.unique(groups.path, axis=0, return_inverse=True)[1].reshape(-1))
+        self._states = placed(np.array([bin(i).count("1") for i in range(2 << groups.deepest)]))
+
+    def followed(
+        self, places: list[Array | None], rays: Array, objects: Array, every: Array
+    ) -> tuple[list[Array | None], list[list[Closing]], int]:
+        """Places, closings and depth of `Pairs`, by places without states and all points' numbers."""
+        xp, count = self._xp, len(every)
+        ways, begun = xp.take(self._ways, objects), 0 * every
+        met = count if places[0] is None else len(places[0])
+        xp.put(begun, rays[:met], ways[:met])
+        if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
+            return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
+        result: list[Array | None] = []
+        closings: list[list[Closing]] = []
+        stacks, paths = 0 * every, xp.take(self._path, 0 * every)
+        start, deepest = 0, 1
+        for place in places:
+            points = every if place is None else place
+            which = objects[start : start + len(points)]
+            stack, path, last = xp.take(stacks, points), xp.take(self._path, which), xp.take(paths, points)
+            opened = xp.take(self._open, which)
+            common, same = 0 * stack, points == points
+            for depth in range(self._groups):
+                same = same & (path[depth] == last[depth]) & (path[depth] >= 0)
+                common = common + same * (1 << depth)
+            # what begins in what is not empty, or cuts it, has a state of its own
+            begun = opened & ~common & (xp.take(self._cuts, which) | (common + 1) * (start > 0))
+            closing, stack = self._closed(points, stack, common, last, count)
+            stack = stack | begun
+            states = xp.take(self._states, stack)
+            deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
+            closings.append(closing)
+            result.append(place if place is None and not start else points + count * states)
+            xp.put(stacks, points, stack)
+            xp.put(paths, points, path)
+            start += len(points)
+        closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
+        if deepest > 1 and result[0] is None:
+            result[0] = every
+        return result, closings, deepest
+
+    def _closed(
+        self, points: Array, stack: Array, common: Array, path: Array, count: int
+    ) -> tuple[list[Closing], Array]:
+        """End the groups of stacks (k,) but for what they have in common with what follows."""
+        xp, result = self._xp, list[Closing]()
+        ending = stack & ~common
+        for depth in reversed(range(self._groups)):
+            bit = 1 << depth
+            some = xp.where((ending & bit) > 0)
+            if len(some):
+                inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
+                result.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                stack = stack - (ending & bit)
+        return result, stack
+
+
+NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
+
+
+class Meeting(NamedTuple):
+    """Answers of the field, of an object or of a group at points (M,); None where not asked for."""
+
+    distance: Array  # D
+    register: (
+        Array  # colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing
+    )
+    gradient: Array = None  # of D (3, M)
+    change: Array = None  # a bound on D and on how far another object's material may begin
+    owner: Array = None  # number of the object whose material holds, from 1
+    met: int = 0  # pairs of points and objects that met
+
+
+class Pairs(NamedTuple):
+    """Points of M rays and the objects that they meet: P pairs.
+
+    Args:
+        places: the points (k,) that meet an object, those that meet a second, and so on; None where all do.
+            Of points in groups they are those of their states, as `Closing` has them.
+        rays: (P,), place by place.
+        objects: their numbers (P,).
+        at: where the rays begin behind the objects' maps (3, P).
+        way: how that changes along the rays (3, P).
+        closings: of the groups that end before each place, and behind the last.
+        depth: how many states a point has.
+    """
+
+    places: list[Array | None]
+    rays: Array
+    objects: Array
+    at: Array
+    way: Array
+    closings: list[list[Closing]]
+    depth: int = 1
+
+
+@dataclass(slots=True)
+class States:
+    """Distances and registers of states, and optional values, as of `Meeting`.
+
+    Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
+    """
+
+    memory: Array
+    slope: Array
+    bound: Array
+    owner: Array
+
+
+class SolidField:
+    """A program's objects with their weights, ready to be met by points of rays.
 
     Args:
         network: trained parameters, on any device.
@@ -74,6 +205,7 @@ class Objects:
         none = [None] * len(vectors)
         parts = network.layout.unpack(vectors)
         widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
+        self.stacks = Stacks(self.xp, self.tree, network.codes) if self.tree.deepest else None
         with self.xp.inference():
             self.solids = read_solids(network, vectors, self.tree, widths)
             self._tables(parts)
@@ -340,145 +472,6 @@ class Objects:
             return decoder.field(q, gradient)
         return self.network.field(q, decoder, gradient)
 
-
-class Closing(NamedTuple):
-    """Groups that end, k of them."""
-
-    inner: Array  # entries (k,): the point's number and, for each state below it, the number of points
-    outer: Array  # those of the states that take them in
-    which: Array  # numbers of the groups, behind those of the objects
-
-
-class Stacks:
-    """The groups that are open at each object, as bits: the outermost is 1, one in that 2, and so on."""
-
-    def __init__(self, xp: Arrays, groups: Groups, like: Array) -> None:
-        def placed(values: np.ndarray) -> Array:
-            return xp.array(np.ascontiguousarray(values), like)
-
-        self._xp, self._groups, self._count = xp, groups.deepest, len(groups.tokens)
-        bits = 1 << np.arange(groups.deepest)
-        there = groups.path >= 0
-        self._path = placed(groups.path.T)  # (D, N)
-        self._open = placed(there @ bits)
-        self._cuts = placed((there & (groups.joins[groups.path] >= SUBTRACT)) @ bits)
-        self._ways = placed(np.unique(groups.path, axis=0, return_inverse=True)[1].reshape(-1))
-        self._states = placed(np.array([bin(i).count("1") for i in range(2 << groups.deepest)]))
-
-    def followed(
-        self, places: list[Array | None], rays: Array, objects: Array, every: Array
-    ) -> tuple[list[Array | None], list[list[Closing]], int]:
-        """Places, closings and depth of `Pairs`, by places without states and all points' numbers."""
-        xp, count = self._xp, len(every)
-        ways, begun = xp.take(self._ways, objects), 0 * every
-        met = count if places[0] is None else len(places[0])
-        xp.put(begun, rays[:met], ways[:met])
-        if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
-            return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
-        result: list[Array | None] = []
-        closings: list[list[Closing]] = []
-        stacks, paths = 0 * every, xp.take(self._path, 0 * every)
-        start, deepest = 0, 1
-        for place in places:
-            points = every if place is None else place
-            which = objects[start : start + len(points)]
-            stack, path, last = xp.take(stacks, points), xp.take(self._path, which), xp.take(paths, points)
-            opened = xp.take(self._open, which)
-            common, same = 0 * stack, points == points
-            for depth in range(self._groups):
-                same = same & (path[depth] == last[depth]) & (path[depth] >= 0)
-                common = common + same * (1 << depth)
-            # what begins in what is not empty, or cuts it, has a state of its own
-            begun = opened & ~common & (xp.take(self._cuts, which) | (common + 1) * (start > 0))
-            closing, stack = self._closed(points, stack, common, last, count)
-            stack = stack | begun
-            states = xp.take(self._states, stack)
-            deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
-            closings.append(closing)
-            result.append(place if place is None and not start else points + count * states)
-            xp.put(stacks, points, stack)
-            xp.put(paths, points, path)
-            start += len(points)
-        closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
-        if deepest > 1 and result[0] is None:
-            result[0] = every
-        return result, closings, deepest
-
-    def _closed(
-        self, points: Array, stack: Array, common: Array, path: Array, count: int
-    ) -> tuple[list[Closing], Array]:
-        """End the groups of stacks (k,) but for what they have in common with what follows."""
-        xp, result = self._xp, list[Closing]()
-        ending = stack & ~common
-        for depth in reversed(range(self._groups)):
-            bit = 1 << depth
-            some = xp.where((ending & bit) > 0)
-            if len(some):
-                inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
-                result.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
-                stack = stack - (ending & bit)
-        return result, stack
-
-
-NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
-
-
-class Meeting(NamedTuple):
-    """Answers of the field, of an object or of a group at points (M,); None where not asked for."""
-
-    distance: Array  # D
-    register: (
-        Array  # colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing
-    )
-    gradient: Array = None  # of D (3, M)
-    change: Array = None  # a bound on D and on how far another object's material may begin
-    owner: Array = None  # number of the object whose material holds, from 1
-    met: int = 0  # pairs of points and objects that met
-
-
-class Pairs(NamedTuple):
-    """Points of M rays and the objects that they meet: P pairs.
-
-    Args:
-        places: the points (k,) that meet an object, those that meet a second, and so on; None where all do.
-            Of points in groups they are those of their states, as `Closing` has them.
-        rays: (P,), place by place.
-        objects: their numbers (P,).
-        at: where the rays begin behind the objects' maps (3, P).
-        way: how that changes along the rays (3, P).
-        closings: of the groups that end before each place, and behind the last.
-        depth: how many states a point has.
-    """
-
-    places: list[Array | None]
-    rays: Array
-    objects: Array
-    at: Array
-    way: Array
-    closings: list[list[Closing]]
-    depth: int = 1
-
-
-@dataclass(slots=True)
-class States:
-    """Distances and registers of states, and optional values, as of `Meeting`.
-
-    Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
-    """
-
-    memory: Array
-    slope: Array
-    bound: Array
-    owner: Array
-
-
-class SolidField(Objects):
-    """A program's objects, ready to be met by points of rays."""
-
-    @cached_property
-    def _stacks(self) -> Stacks:
-        return Stacks(self.xp, self.tree, self.network.codes)
-
     def passes(self, origin: Array, way: Array, limit: Array, tight: bool = True) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
         origins = (self.linear * origin[:, None]).sum(1) + self.shift
@@ -547,7 +540,8 @@ class SolidField(Objects):
         for closing in closings[-1]:
             self._close(states, closing, wanted)
         parts = states.memory, states.slope, states.bound, states.owner
-        memory, slope, bound, owner = (part if part is None else part[..., :count] for part in parts)
+        first: list[Any] = [part if part is None else part[..., :count] for part in parts]
+        memory, slope, bound, owner = first
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
@@ -573,16 +567,17 @@ class SolidField(Objects):
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
         result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
-        if most < 2 or not self.tree.deepest:
+        if most < 2 or self.stacks is None:
             return result
-        places, closings, depth = self._stacks.followed(places, rays, objects, every)
+        places, closings, depth = self.stacks.followed(places, rays, objects, every)
         return result._replace(places=places, closings=closings, depth=depth)
 
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
         parts = states.memory, states.slope, states.bound, states.owner
-        memory, *others = (part if part is None else xp.take(part, inner) for part in parts)
+        ended: list[Any] = [part if part is None else xp.take(part, inner) for part in parts]
+        memory, *others = ended
         d = memory[0].clip(-EMPTY, NOTHING)
         xp.put(states.memory[:1], inner, 0 * memory[:1] + EMPTY)
         if states.bound is not None:

@@ -42,6 +42,22 @@ Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, len
 
 
 @dataclass(slots=True)
+class Work:
+    """Counts of the work of drawing."""
+
+    rays: int = 0  # from the eye
+    lights: int = 0  # rays from the light
+    near: int = 0  # rays of both kinds that came near an object; the others took no step
+    steps: int = 0  # points of space on them at which the field was asked
+    met: int = 0  # (object, point) pairs that went through the network
+    refined: int = 0  # pixels that were sampled four times
+    lost: int = 0  # rays that took all the steps there are without coming to an end
+
+    def __add__(self, other: Work) -> Work:
+        return Work(*map(add, astuple(self), astuple(other)))
+
+
+@dataclass(slots=True)
 class Trail:
     """Surfaces and media that M rays met."""
 
@@ -51,10 +67,7 @@ class Trail:
     place: Array  # (M,) of rays in `passes`, -1 where they pass none
     passes: Passes
     pieces: list[Piece] = field(default_factory=list)
-    near: int = 0  # these as of `Work`
-    steps: int = 0
-    met: int = 0
-    lost: int = 0
+    work: Work = field(default_factory=Work)
 
     def at(self, xp: Arrays, index: Array) -> Passes:
         """The balls that some of the rays pass."""
@@ -114,7 +127,7 @@ class Rays:
             elif not self.between:
                 break
         else:
-            self.trail.lost = sum(batch.left + batch.more for batch in self.batches)
+            self.trail.work.lost = sum(batch.left + batch.more for batch in self.batches)
         if self.struck:
             places, rows, frees = zip(*self.struck, strict=True)
             hit = self._root(xp.concat(rows, 1), xp.concat(frees, 0))
@@ -212,14 +225,14 @@ class Rays:
     def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
         """Masks of points at t (n,) inside media and inside opaque solids, and how far both hold."""
         solids, rows = self.solids, batch.rows
-        self.trail.steps += len(t)
+        self.trail.work.steps += len(t)
         if batch.pairs is None:
-            self.trail.met += len(t)
+            self.trail.work.met += len(t)
             d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
             free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
         else:
             result = solids.meet(batch.pairs, t, self.wanted, change=solids.mixed)
-            self.trail.met += result.met
+            self.trail.work.met += result.met
             d, free, dense = result.distance, abs(result.distance), None
             if solids.mixed:
                 dense = result.register[0] > 0.5
@@ -294,7 +307,7 @@ class Rays:
         for _ in range(halvings):
             half = (low + high) / 2
             result = self.solids.meet(passes, half, self.wanted)
-            self.trail.met += result.met
+            self.trail.work.met += result.met
             still = (result.distance < 0) & (result.register[0] > 0.5)
             low, high = xp.select(still, half, low), xp.select(still, high, half)
         xp.put(self.trail.hit, ray, high)
@@ -369,22 +382,6 @@ class Pace(NamedTuple):
 CAREFUL = Pace()
 
 
-@dataclass(frozen=True, slots=True)
-class Work:
-    """Counts of the work of drawing."""
-
-    rays: int = 0  # from the eye
-    lights: int = 0  # rays from the light
-    near: int = 0  # rays of both kinds that came near an object; the others took no step
-    steps: int = 0  # points of space on them at which the field was asked
-    met: int = 0  # (object, point) pairs that went through the network
-    refined: int = 0  # pixels that were sampled four times
-    lost: int = 0  # rays that took all the steps there are without coming to an end
-
-    def __add__(self, other: Work) -> Work:
-        return Work(*map(add, astuple(self), astuple(other)))
-
-
 def march(
     solids: SolidField,
     origin: Array,
@@ -408,12 +405,13 @@ def march(
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
     ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
-    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
+    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes)
+    trail.work.near = len(ids)
     if whole and solids.segments and len(ids):
         sure = known(solids, passes)
         some, rest = xp.where(sure), xp.where(~sure)
         if len(some):
-            answers, trail.met = lengths(solids, passes.at(xp, some))
+            answers, trail.work.met = lengths(solids, passes.at(xp, some))
             xp.put(length, xp.take(ids, some), answers)
         ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):

@@ -226,7 +226,11 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     solids: list[Solid] = []
     frames = [read_solid_frame(vector, layout) for vector in vectors]
     deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
-    matters, seen = felt(groups, widths), showing(groups)
+    matters = felt(groups, widths)
+    # rows (1 + D, N) that may show something where it was empty: at all, and in their groups
+    shows = np.isin(groups.tokens, (UNION, SMOOTH))
+    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
+    seen = np.logical_and.accumulate([shows, *inner])[::-1]
     # rows that a subtract joins, or a group around them: these say how deep points inside others lie
     taken = (groups.tokens == SUBTRACT) | ((groups.path >= 0) & (groups.joins[groups.path] == SUBTRACT)).any(
         1
@@ -254,13 +258,6 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
             )
         )
     return _widened(xp, solids, frames, groups, seen) if groups.deepest else solids
-
-
-def showing(groups: Groups) -> Mask:
-    """A mask (1 + D, N) of rows that may show something where it was empty: at all, and in their groups."""
-    shows = np.isin(groups.tokens, (UNION, SMOOTH))
-    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
-    return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
 
 
 def _widened(
