@@ -174,15 +174,14 @@ def test_pictures_are_those_of_the_reference(first: str, last: str) -> None:
     assert psnr_db(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
 
 
-@pytest.mark.parametrize("samples", ["adaptive", "quick"])
-def test_tiles_and_threads_leave_no_trace(samples: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tiles_and_threads_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing but what products of matrices round, whose sizes differ."""
     mist = Object("torus", (scaled(0.8, 0.6, 0.8), moved(0.3, 0.2, 0.5)), "volumetric", (0.2, 0.4, 0.9))
     solids = field([*MIXED, mist, Object("sphere", (scaled(0.3), moved(0.8, 0, 0)), "volumetric")])
-    whole, work = draw_solids(solids, Stage(), (48, 40), samples=samples)
-    for tile, threads in ((48 * 7, 1), (48 * 11, 3), (draw.TILE, 5)):
+    whole, work = draw_solids(solids, Stage(), (48, 40))
+    for tile, threads in ((48 * 7, 1), (48 * 11, 3)):
         monkeypatch.setattr(draw, "TILE", tile)
-        found, parts = draw_solids(solids, Stage(), (48, 40), threads=threads, samples=samples)
+        found, parts = draw_solids(solids, Stage(), (48, 40), threads=threads)
         assert abs(found - whole).max() < 2e-4
         assert parts.refined == work.refined
 

@@ -13,39 +13,18 @@ from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.drawing.exact import solid
 from scenelang.drawing.exact.solid import Body, Turn, solid_image
 from tests.drawing import solid_oracle
-from tests.drawing.solids import GOLD, RED, SKY, USUAL, fold, leaf, moved, one_ball, scaled, sheared, turned
+from tests.drawing.solids import GOLD, RED, SKY, fold, leaf, moved, one_ball, scaled, sheared, turned
+from tests.drawing.test_povray import SCENES as POVRAY
 from tests.pictures import psnr_db
 
 SIDE = Camera(eye=(-2.0, 2.0, 4.5), target=(0.1, 0.2, 0.0), fov_rad=0.5)
-TWIRL, BEND = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.8, 0.0))
 AXES = np.eye(3)[:, :, None]
 
 SCENES: dict[str, tuple[Fold, Stage]] = {
-    "diffuse": (
-        USUAL,
-        Stage(),
-    ),
-    "media": (
-        fold(
-            leaf("sphere", "volumetric", SKY, scaled(0.9, 0.7, 0.8)),
-            leaf("sphere", "diffuse", GOLD, scaled(0.35), moved(0.22, 0.13, 0.3)),
-            leaf("torus", "volumetric", RED, turned(0.9, 1, 0, 1), moved(-0.3, 0.2, 0.1)),
-        ),
-        Stage(light=Light(position=(1.0, 3.0, 2.0), power=12.0, rgb=(1.0, 0.8, 0.5))),
-    ),
-    "warped": (
-        fold(
-            leaf(
-                "sphere", "diffuse", GOLD, Displace(0.06, 7), TWIRL, BEND, Twist(0.8), scaled(0.8, 0.5, 0.6)
-            ),
-            (
-                "smooth",
-                leaf("torus", "diffuse", SKY, BEND, scaled(0.7), TWIRL, moved(0.5, 0.3, 0), Twist(1.2)),
-            ),
-            ("subtract", leaf("sphere", "diffuse", RED, scaled(0.4), moved(0.2, 0.5, 0.4))),
-        ),
-        Stage(camera=SIDE),
-    ),
+    **{
+        name: (POVRAY[name][0], POVRAY[name][1])
+        for name in ("usual", "booleans", "media", "warped", "blended")
+    },
     "folds": (
         fold(
             fold(
