@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,14 +121,3 @@ def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
     assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
     alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
     assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"
-
-
-@pytest.mark.parametrize("device", ["auto", "cpu"])
-def test_what_is_loaded(device: str) -> None:
-    code = (
-        "import sys, scenelang as nsg\n"
-        f"nsg.render(nsg.loads('star;'), device={device!r})\n"
-        "print('torch' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == f"{device == 'cpu'}\n"

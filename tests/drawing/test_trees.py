@@ -267,9 +267,13 @@ LEFT = {
 }
 
 
+def scene_of(name: str) -> nsg.Scene:
+    return nsg.loads(f"canvas(64, 48); camera(eye = [0, 1.2, 4]); {LEFT[name]}")
+
+
 @pytest.mark.parametrize("name", LEFT)
 def test_steps_end_where_groups_may_add(name: str) -> None:
     """Rays meet what groups leave where nothing is left of all that the rays have met before."""
-    scene = nsg.loads(f"canvas(64, 48); camera(eye = [0, 1.2, 4]); {LEFT[name]}")
+    scene = scene_of(name)
     exact = np.asarray(nsg.render(scene, backend="reference"))
     assert psnr_db(np.asarray(nsg.render(scene)), exact) > 45
