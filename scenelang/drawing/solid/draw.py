@@ -258,6 +258,7 @@ class Lighting:
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
         towards = _dot(g, way)
+        # along a surface, at a cosine over -0.02, the distance says nothing of how far ahead it is
         return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
 
     def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
@@ -349,7 +350,7 @@ class Lighting:
             n = field.normals(objects, self.eye[:, None] + seen)
         off = self._four * (px * t * (self._forward @ way))
         towards = (n * seen).sum(0)
-        towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)
+        towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)  # of planes seen from the side
         ratio = ((n[:, None] * off).sum(0) / towards).clip(-GRAZING, GRAZING)
         off = (off - seen[:, None] * ratio) / (1 + ratio)
         p = (self.eye[:, None] + way * (t + INTO))[:, None] + off

@@ -333,6 +333,7 @@ class SolidField:
     def _alone(self) -> None:
         """Prepare the answers for points that meet one object alone, or meet it first."""
         xp, like, solids = self.xp, self.network.codes, self.solids
+        # the diameter of what an object changes: no distance in it is greater
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
         cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
         # factors of distances (N,) of objects that are met first; 0: the cell has to be asked

@@ -237,6 +237,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     )
     deep = matters.everywhere & taken
     for i, frame in enumerate(frames):
+        # a blend reaches as far as its width, and each lowers the distance by a quarter of that at most
         blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
         if deep[i]:
             blends += deepest
