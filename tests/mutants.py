@@ -55,11 +55,11 @@ COMPILING = (
 )  # fmt: skip
 SOLIDS = (
     "tests/drawing/test_closed.py", "tests/drawing/test_renderers_solids.py",
-    "tests/drawing/trees/test_solid.py", "tests/drawing/test_solids.py",
+    "tests/drawing/test_trees.py", "tests/drawing/test_solids.py",
 )  # fmt: skip
 TREES = (
     "tests/drawing/test_groups.py", "tests/compiler/test_flatten.py", "tests/drawing/test_fold.py",
-    "tests/drawing/trees/test_solid.py",
+    "tests/drawing/test_trees.py",
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/drawing/solid/*.py": SOLIDS,

@@ -82,11 +82,7 @@ class ExactSectors(ExactShape):
 
 
 class ClosedPlane(FramedArrays):
-    """`FramedArrays` by formulas: distances, albedo, and a cell whose weights are those of the fold.
-
-    Args:
-        model: whose Programs are drawn.
-    """
+    """`FramedArrays` by formulas: distances, albedo, and a cell whose weights are those of the fold."""
 
     def __init__(self, model: str) -> None:
         self.__dict__.update(vars(load_arrays(model).network))
@@ -119,11 +115,7 @@ class ClosedPlane(FramedArrays):
 
 
 class ClosedSolids(SolidArrays):
-    """`SolidArrays` by formulas: distances, their gradients, looks and the fold.
-
-    Args:
-        model: whose Programs are drawn.
-    """
+    """`SolidArrays` by formulas: distances, their gradients, looks and the fold."""
 
     def __init__(self, model: str) -> None:
         self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": []})
@@ -191,8 +183,7 @@ def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
     """Source of a Program's distances and colours: formulas, or its network.
 
     Raises:
-        KeyError: there is no such model.
-        ModelError, ProgramError: its weights are missing, or others than it was compiled for.
+        KeyError, ModelError, ProgramError: no such model, no weights, or others than it was compiled for.
         RenderError: no formulas do.
     """
     formulas = closed_forms(program.model) if exact else None

@@ -191,8 +191,7 @@ class Outputs:
             path: of the picture, ``STEM.png``, which is not written, or of the EXR.
 
         Raises:
-            ValueError: a format that cannot hold them, or what writes it is not installed.
-            OSError: a file cannot be written.
+            ValueError, OSError: a format cannot hold them, or a file cannot be written.
         """
         path = Path(path)
         contents = self.packed(path)  # all, before any is written
@@ -330,11 +329,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
 
 def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
-    """Contents of the files of a picture and of its outputs, the picture's first.
-
-    Raises:
-        ValueError: their format cannot hold them.
-    """
+    """Contents of the files of a picture and of its outputs, its own first; raises as `save_outputs`."""
     contents = outputs.packed(path, image.layers())
     return contents if path in contents else {path: image.encode(image_format(path)), **contents}
 
@@ -343,8 +338,7 @@ def save_outputs(image: Image, outputs: Outputs, path: Path) -> list[Path]:
     """Write a picture and its outputs, each file whole or not at all; the files of the outputs.
 
     Raises:
-        ValueError: their format cannot hold them.
-        OSError: a file cannot be written.
+        ValueError, OSError: their format cannot hold them, or a file cannot be written.
     """
     for file, data in packed(image, outputs, path).items():
         (write_output if file == path else write_whole)(file, data)
@@ -352,11 +346,7 @@ def save_outputs(image: Image, outputs: Outputs, path: Path) -> list[Path]:
 
 
 def image_format(path: str | os.PathLike[str]) -> str:
-    """Pillow's name for the format that a file's suffix names, or ``"EXR"``.
-
-    Raises:
-        ValueError: no format has that suffix, or what writes it is not installed.
-    """
+    """Pillow's name for the format of a file's suffix, or ``"EXR"``; raises as `Image.save`."""
     suffix = Path(path).suffix.lower()
     if suffix == ".exr":
         check_exr()

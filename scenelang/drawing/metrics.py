@@ -87,9 +87,6 @@ def compare(picture: Array, reference: Array) -> dict[str, float]:
     return {"psnr": psnr(a, b), "ssim": ssim(a, b), "flip": flip(a, b)}
 
 
-# ---------------------------------------------------------------- side by side
-
-
 def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
     """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3).
 

@@ -1,9 +1,8 @@
 """Bounds, proved pixel by pixel, of how far a picture of the plane may differ from the exact one.
 
 A region of the picture has a distance to each object: the exact one at its centre, enclosed in an interval,
-widened by the region's radius in the leaf's own coordinates, as exact distances change by no more. Intervals
-pass through the exact fold, by the formulas of `exact/field.py`; its state is monotonic in both distances, so
-the ends of its interval come from theirs. Where the result is one colour, all samples of the region have it.
+widened by the region's radius in the leaf's own coordinates. Intervals pass through the exact fold, whose
+state is monotonic in both distances. Where the result is one colour, all samples of the region have it.
 Elsewhere objects that are certain to change nothing are dropped, and the region's quarters are asked, down to
 single samples. All bounds are of the scene as written, so that they cover the compiler's passes too.
 
@@ -16,7 +15,7 @@ of the largest angle between the ways from the origin and from a point of the di
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, reduce
 from math import hypot, inf, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +25,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
-from scenelang.compiler.graph import Fold, Graph, Leaf, Look, Node
+from scenelang.compiler.graph import Graph, Look
 from scenelang.compiler.groups import (
     INTERSECT,
     SMOOTH,
@@ -42,7 +41,7 @@ from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
-from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance
+from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -68,12 +67,7 @@ EPS = 32 * 2.0**-52  # relative error of one step: a few dozen roundings of floa
 
 
 class Written(NamedTuple):
-    """An object as written.
-
-    Args:
-        look: before it was folded.
-        steps: into the world, nearest the leaf first.
-    """
+    """An object as written: its look before it was folded, and its steps, nearest the leaf first."""
 
     look: Look
     steps: tuple[Step, ...]
@@ -95,20 +89,6 @@ class Written(NamedTuple):
             else:  # shares clamp nothing and tear no colours apart
                 off *= 1 + 2 * max(0.0, max(numbers) - 1.0, -min(numbers))
         return off
-
-
-def written(root: Fold) -> dict[int, Written]:
-    """All objects of a lowered graph, by number."""
-    result: dict[int, Written] = {}
-    todo: list[tuple[Node, tuple[Step, ...]]] = [(root, ())]
-    while todo:
-        node, outer = todo.pop()
-        steps = (*[move.step for move in node.moves], *outer)
-        if isinstance(node, Leaf):
-            result[node.number] = Written(node.look, steps)
-        else:
-            todo += [(link.node, steps) for link in node.links]
-    return result
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
@@ -164,30 +144,12 @@ Floats = npt.NDArray[np.float64]
 NOTHING = 1e200  # world units: the distance before the first object, beyond all blends
 
 
-class Enclosed(NamedTuple):
-    """Facts that are certain of regions.
-
-    Args:
-        shown: channels (K, B).
-        left: (P,) objects that may change what is shown.
-    """
-
-    shown: Interval
-    left: Mask
-
-
 class Joins(NamedTuple):
-    """Ways in which P operands join.
+    """Ways in which P operands join."""
 
-    Args:
-        tokens: operators.
-        widths: of their blends, 0 for sharp edges.
-        free: whether no blend follows: what is outside, and how deep inside the rest, is all one.
-    """
-
-    tokens: Index
-    widths: Floats
-    free: Mask
+    tokens: Index  # operators
+    widths: Floats  # of their blends, 0 for sharp edges
+    free: Mask  # no blend follows: what is outside, and how deep inside the rest, is all one
 
     def some(self, which: slice | Index) -> Joins:
         """Select some of them."""
@@ -202,16 +164,13 @@ def enclosed(
     behind: Floats,
     nest: Nesting | None = None,
     groups: Joins | None = None,
-) -> Enclosed:
-    """Fold the enclosed distances of the objects that regions meet.
+) -> tuple[Interval, Mask]:
+    """Channels (K, B) that regions show, and which objects (P,) may change them.
 
     Args:
-        distance: world distances of the pairs (P,), wherever in the region.
-        colour: of the pairs (3, P).
-        joins: of the pairs.
+        distance, colour: of the pairs, (P,) and (3, P): world distances wherever in the region.
         behind: (K,) what is shown where nothing is: a background, or four zeros.
-        nest: of a stream with groups.
-        groups: how these join.
+        nest, groups: of a stream with groups, and how these join.
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
@@ -237,7 +196,7 @@ def enclosed(
         np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
         np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
     )
-    return Enclosed(shown, ~shut)
+    return shown, ~shut
 
 
 class _Exact(State):
@@ -307,12 +266,7 @@ _CHUNK = 2048  # points that go through a decoder at once
 
 
 class Errors:
-    """Learned less exact distance of a leaf.
-
-    Args:
-        layers: of the decoder, in float64.
-        low, high: bounds (CELLS, CELLS), leaf units, rows from the least y up.
-    """
+    """Bounds (CELLS, CELLS) of a leaf's learned less exact distance, leaf units, rows from the least y up."""
 
     def __init__(self, layers: Layers, low: npt.NDArray[Any], high: npt.NDArray[Any]) -> None:
         self._layers = layers
@@ -336,11 +290,7 @@ def errors_path(name: str) -> Path:
 
 @lru_cache(maxsize=4)
 def load_errors(name: str = PROVER) -> dict[str, Errors]:
-    """By geometry; none where the file is missing or of other weights.
-
-    Raises:
-        ModelError: it is damaged.
-    """
+    """By geometry; none where the file is missing or of other weights. Raises `ModelError` if damaged."""
     network, digest = load_arrays(name)
     assert isinstance(network, FramedNetwork)
     names = load_manifest(name).geometries
@@ -355,24 +305,15 @@ def load_errors(name: str = PROVER) -> dict[str, Errors]:
 def layers_of(network: FramedNetwork, geometry: int) -> Layers:
     """The decoder of a geometry in float64, so that every machine computes the same distances."""
     one = np.append(network.codes[geometry].astype(np.float64), 1.0)
-    parts = [
-        [part.astype(np.float64) for part in result] for result in (network.decoder_w, network.decoder_b)
-    ]
-    return [(np.tensordot(one, w, 1).T, one @ b) for w, b in zip(*parts, strict=True)]
+    parts = zip(network.decoder_w, network.decoder_b, strict=True)
+    return [(np.tensordot(one, w.astype(np.float64), 1).T, one @ b.astype(np.float64)) for w, b in parts]
 
 
 class Stream:
-    """N objects.
-
-    Args:
-        lowered: the scene as written.
-        graph: its stream of leaves.
-        manifest: of the model that it was compiled for.
-        known: of geometries, by their names.
+    """The N objects of a scene as written, ``lowered``, and of its stream of leaves, ``graph``.
 
     Attributes:
         frames: ways from the world to the leaves, in float64.
-        groups: of the stream.
         joins, group_joins: how objects and groups join; a blend that is free of others is not known here.
         rounds: (N,) which objects join by a blend, or begin a group that does.
         reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
@@ -392,8 +333,9 @@ class Stream:
         widths = widths_of(raw, np.array([row.k for row in rows]))
         seen = felt(groups, widths)
         reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
-        objects, far = written(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
-        leaves = [objects[leaf.number] for leaf in self._leaves]
+        objects, far = placed_leaves(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
+        written = {leaf.number: Written(leaf.look, steps) for leaf, steps, _ in objects}
+        leaves = [written[leaf.number] for leaf in self._leaves]
         own = list(zip(leaves, reach.tolist(), strict=True))
         self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])
         self.rounding += EPS * widths.sum() / self.frames.scale
@@ -420,11 +362,7 @@ class Stream:
         return float((sides[0] * sides[1]).sum())
 
     def distance(self, which: Index, q: Floats, exactly: bool) -> Interval:
-        """Exact distances (P,) of objects (P,) at leaf coordinates (2, P), leaf units.
-
-        Args:
-            exactly: by the language's formulas, not by learned distances.
-        """
+        """Distances (P,) of objects (P,) at leaf coordinates (2, P), by learned distances or ``exactly``."""
         low, high = np.full(len(which), -NOTHING), np.full(len(which), NOTHING)
         finite = np.isfinite(q).all(0)
         for name, own in self._shapes.items():
@@ -459,15 +397,7 @@ FLAT = 5e-4  # of a channel: a region that is known so well is not cut
 
 
 class Band:
-    """Some rows of pixels.
-
-    Args:
-        canvas: width and height, pixels.
-        behind: (K,) what is shown where nothing is.
-
-    Attributes:
-        shown: by pixels (rows, width, K).
-    """
+    """Some rows of pixels, and what is ``shown`` there (rows, width, K), ``behind`` (K,) where nothing is."""
 
     def __init__(self, stream: Stream, canvas: tuple[int, int], rows: range, behind: Floats) -> None:
         self._stream, self._behind, self._reach = stream, behind, stream.reach
@@ -482,7 +412,10 @@ class Band:
         for side in SIDES[:-1]:
             columns, shown, pairs = self._looked(pairs, side)
             known = (shown.high - shown.low).max(0) <= FLAT
-            self._write(columns[known], Interval(shown.low[:, known], shown.high[:, known]), side)
+            x, y = grid.place(columns[known], side)
+            for every, values in zip(self._every, shown, strict=True):
+                blocks = every.reshape(grid.high // side, side // 2, -1, side // 2, len(behind))
+                blocks[y // side, :, x // side] = values.T[known, None, None]
             done = np.zeros(grid.wide * grid.high // side**2, bool)
             done[columns[known]] = True
             pairs = pairs.take(~done[pairs.block])
@@ -520,16 +453,10 @@ class Band:
             nest = nesting(meetings, stream.groups)
         else:
             joins = joins._replace(free=~blended(meetings, stream.rounds[thing]))
-        result = enclosed(meetings, world_distance, colour, joins, self._behind, nest, stream.group_joins)
-        left = np.empty(len(pairs), bool)
-        left[source] = result.left
-        return meetings.columns, result.shown, pairs.take(left)
-
-    def _write(self, region: Index, shown: Interval, side: int) -> None:
-        x, y = self._grid.place(region, side)
-        for every, values in zip(self._every, shown, strict=True):
-            shape = self._grid.high // side, side // 2, -1, side // 2, len(self._behind)
-            every.reshape(shape)[y // side, :, x // side] = values.T[:, None, None]
+        behind, changing = self._behind, np.empty(len(pairs), bool)
+        shown, left = enclosed(meetings, world_distance, colour, joins, behind, nest, stream.group_joins)
+        changing[source] = left
+        return meetings.columns, shown, pairs.take(changing)
 
     def _sampled(self, *, exactly: bool) -> None:
         """Ask for the samples of pixels that they have to tell, and take their means."""
@@ -557,8 +484,7 @@ def prove_image(
     """Prove by how much each pixel of a picture, whoever drew it, differs from the exact one at most.
 
     Args:
-        lowered: the scene as written.
-        graph: its stream of leaves.
+        lowered, graph: the scene as written, and its stream of leaves.
         manifest: of the model that it was compiled for.
         image: (H, W, 3), or (H, W, 4) where the background is none.
         redraw: draw again what is not proved right to `PROVED`: by what is known of it, and where that is not
@@ -604,9 +530,7 @@ def prove_image(
 def _off(drawn: Floats, shown: Interval) -> Floats:
     """Greatest difference of pixels (H, W, K) from an enclosed picture, over their channels."""
     far = np.maximum(shown.high - drawn, drawn - shown.low)
-    worst: Floats = far[..., 0]
-    for channel in range(1, far.shape[-1]):
-        worst = np.maximum(worst, far[..., channel])
+    worst: Floats = reduce(np.maximum, np.moveaxis(far, -1, 0))  # faster than `far.max(-1)`
     return worst + ROUNDING
 
 

@@ -202,7 +202,6 @@ def prove(
             is of another size, or it cannot be drawn.
     """
     from scenelang.compiler.compile import compile_scene
-    from scenelang.language.diagnostics import Diagnostics
     from scenelang.language.evaluation import opened
 
     way = How(**how).checked()

@@ -1,15 +1,14 @@
 """Small pictures, drawn by numpy without waiting for torch to be imported.
 
-Numpy on one core draws as fast as torch on one core. Torch has more cores and devices, and takes one to two
-seconds to import, which pays from some amount of work on. That amount is counted from the Program and never
-measured while drawing: the same Program is always drawn by the same library.
+Torch has more cores and devices, and takes one to two seconds to import, which pays from some amount of work
+on. That amount is counted from the Program, so that the same one is always drawn by the same library.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Literal, NamedTuple, Unpack
 
 import numpy as np
@@ -29,25 +28,17 @@ from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
 
-PROBE: Final = 16
-"""Pixels along a side of a picture of as many pixels that solids are drawn in, to count evaluations."""
+PROBE: Final = 16  # the root of the pixels that solids are drawn in to count evaluations
 
 
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Numbers that a frame's time depends on.
+class Load(NamedTuple):
+    """Numbers that a frame's time depends on."""
 
-    Args:
-        objects: rows of the Program.
-        pixels: of the canvas.
-        meetings: pixels within objects' bounds, summed over objects; of solids, evaluations of the network.
-        outline: pixels around those bounds, summed likewise; of solids, evaluations for a pixel times pixels
-            of the canvas's shorter side, as outlines and shadows grow with both.
-    """
-
-    objects: int
-    pixels: int
-    meetings: float
+    objects: int  # rows of the Program
+    pixels: int  # of the canvas
+    meetings: float  # pixels within objects' bounds, summed over objects; of solids, network evaluations
+    # pixels around those bounds, summed likewise; of solids, evaluations for a pixel times pixels of the
+    # canvas's shorter side, as outlines and shadows grow with both
     outline: float
 
     def row(self, skip: bool) -> tuple[float, float, float, float, float]:
@@ -59,10 +50,7 @@ class Load:
 def load_of(program: Program) -> Load:
     """The load of a compiled scene: in the plane from its bounds, of solids from a very small picture.
 
-    How far rays go near solids, and how many of them meet the light, bounds do not tell.
-
-    Raises:
-        ModelError: the weights of a model of solids are missing.
+    Raises `ModelError` where the weights of a model of solids are missing.
     """
     width, height = program.canvas
     if program.stage is not None:
@@ -100,11 +88,7 @@ class Drawer(NamedTuple):
 def choose_drawer(
     program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
 ) -> Drawer:
-    """Choose the library for a single picture, from the Program and the caller's device alone.
-
-    Args:
-        device, samples: as of `How`.
-        exact: whether formulas take the network's place.
+    """Choose the library for a single picture, from the Program and options of `How` alone.
 
     Raises:
         RenderError: there is no such model.
@@ -134,7 +118,7 @@ def work_ms(program: Program, samples: Samples = "adaptive") -> float:
 
 
 def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:
-    """Draw a Program by numpy, on one core, or solids, if they are large, on several.
+    """Draw a Program by numpy: the plane on one core, solids, if they are large, on several.
 
     Args:
         program: of any size, for a model with a framed or a solids' network.

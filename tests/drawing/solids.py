@@ -1,23 +1,57 @@
-"""Scenes of solids that are lifted by hand, after the solid layout's description."""
+"""Scenes of solids by hand: graphs, streams of objects, trees of booleans, and slow folds of these."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import torch
 
+from scenelang.compiler import steps as affine
 from scenelang.compiler.graph import Fold, Leaf, Link, Look, Move, Node
+from scenelang.compiler.groups import BEGINS, ENDS
 from scenelang.compiler.lifting import SOLID_LAYOUT as LAYOUT
 from scenelang.compiler.lifting import Parts, inverse_frame
 from scenelang.compiler.program import Paint
+from scenelang.compiler.spaces import Stage, Triple
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed
 from scenelang.compiler.weights import shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
-from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.network import SolidArrays, SolidNetwork
-from scenelang.language.words import BLEND, TOKENS, Combine
+from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.solid.field import Meeting, SolidField
+from scenelang.drawing.solid.network import SolidArrays, SolidNetwork, Wanted
+from scenelang.drawing.solid.passes import END, INF, OBJECT, SLOT, WAY, Passes
+from scenelang.language.words import BLEND, COMBINE, TOKENS, Combine
+
+
+def leaf(geometry: str, material: str, rgb: Triple, *steps: Step) -> Leaf:
+    """An object of one linear colour."""
+    return Leaf(geometry, Look(material, rgb=rgb), tuple(map(Move, steps)))
+
+
+def fold(*links: Node | tuple[str, Node] | tuple[str, Node, float], steps: tuple[Step, ...] = ()) -> Fold:
+    """Children with their words, a union where there is none, and widths of blends."""
+    whole = [link if isinstance(link, tuple) else ("union", link) for link in links]
+    return Fold("scene", tuple(Link(*link) for link in whole), tuple(map(Move, steps)))
+
+
+def scaled(x: float, y: float | None = None, z: float | None = None) -> Affine:
+    return Affine(affine.scaling(x, x if y is None else y, x if z is None else z))
+
+
+def moved(x: float, y: float, z: float) -> Affine:
+    return Affine(affine.translation(x, y, z))
+
+
+def turned(angle_rad: float, x: float = 1.0, y: float = 2.0, z: float = 3.0) -> Affine:
+    return Affine(affine.rotation(angle_rad, (x, y, z)))
+
+
+def sheared(axes: str, k: float) -> Affine:
+    return Affine(affine.shearing(axes, k))
+
 
 LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
 
@@ -53,20 +87,11 @@ def weights() -> dict[str, np.ndarray]:
     return named | {f"{group}.{i}": getattr(net, group)[i] for group in groups for i in range(3)}
 
 
-def moved(x: float, y: float, z: float) -> Affine:
-    return Affine((1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z))
-
-
-def scaled(x: float, y: float, z: float) -> Affine:
-    return Affine((x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0))
-
-
-def turned(angle: float) -> Affine:
-    """About the direction (1, 2, 3)."""
-    a = np.array([1.0, 2.0, 3.0]) / 14**0.5
-    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-    matrix = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return Affine(tuple(np.column_stack([matrix, np.zeros(3)]).ravel().tolist()))
+def torch_network() -> Solids:
+    """The shipped network in torch."""
+    net = Solids(network().config, 2, 2)
+    net.load_state_dict({name: torch.from_numpy(value) for name, value in weights().items()})
+    return net.requires_grad_(False)
 
 
 def vector(o: Object, net: SolidNetwork) -> np.ndarray:
@@ -113,6 +138,19 @@ def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidFi
     return SolidField(net, vectors, tokens, paints=[o.paint for o in objects])
 
 
+def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
+    """What a field answers where every object is met."""
+    xp, like, count = solids.xp, solids.network.codes, len(solids.solids)
+    slots = np.zeros((SLOT, count, p.shape[1]), np.float32)
+    drawn = np.array([solid.draws for solid in solids.solids])
+    slots[OBJECT] = np.where(drawn, np.arange(count), -1 - np.arange(count))[::-1, None]
+    slots[WAY] = np.einsum("ijn,jp->inp", xp.to_numpy(solids.linear), p)[:, ::-1]
+    slots[END] = INF
+    passes = Passes(xp.array(slots, like), solids.shift)
+    with xp.inference():
+        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient)
+
+
 MIXED = (
     Object(
         "torus",
@@ -124,7 +162,7 @@ MIXED = (
         token="smooth",
         k=0.3,
     ),
-    Object("torus", (scaled(0.5, 0.5, 0.5), turned(2.0), moved(0.0, 0.4, 0.3)), token="subtract"),
+    Object("torus", (scaled(0.5), turned(2.0), moved(0.0, 0.4, 0.3)), token="subtract"),
     Object("sphere", (scaled(1.1, 1.0, 1.2),), token="intersect"),
 )
 """Objects of every kind about the origin."""
@@ -132,10 +170,10 @@ MIXED = (
 
 def graph(objects: Sequence[Object]) -> Fold:
     """The same stream as a graph, for the reference."""
-    return Fold("scene", tuple(link(o.token, o.k, leaf(o)) for o in objects))
+    return Fold("scene", tuple(link(o.token, o.k, leaf_of(o)) for o in objects))
 
 
-def leaf(o: Object) -> Leaf:
+def leaf_of(o: Object) -> Leaf:
     """An object as a graph has it."""
     return Leaf(o.leaf, look(o), tuple(map(Move, o.steps)))
 
@@ -152,6 +190,178 @@ def look(o: Object) -> Look:
     return Look(o.material, o.paint.steps, element=o.paint.element, texture=o.texture)
 
 
-def psnr(a: np.ndarray, b: np.ndarray) -> float:
-    """In dB."""
-    return float(-10 * np.log10(np.square(np.asarray(a, float) - b).mean() + 1e-12))
+GOLD, SKY, RED = (0.8, 0.53, 0.12), (0.07, 0.21, 1.0), (0.7, 0.05, 0.04)
+USUAL = fold(
+    leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
+    leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
+    leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
+)
+
+
+class Join(NamedTuple):
+    """An operand of a tree with the operator and width by which it joins those before it."""
+
+    op: Combine
+    node: Tree | Object
+    k: float = 0.0
+
+
+class Tree(tuple[Join, ...]):
+    """Operands from the left."""
+
+
+class Row(NamedTuple):
+    """An object of a stream."""
+
+    o: Object
+    op: Combine
+    k: float
+    begins: bool = False
+    ends: int = 0
+
+    @property
+    def token(self) -> int:
+        return TOKENS[self.op] | BEGINS * self.begins | self.ends << ENDS
+
+
+def rows(node: Tree | Object) -> list[Row]:
+    """The stream of a tree: operands that are trees are groups, but for the first, which goes on."""
+    if isinstance(node, Object):
+        return [Row(node, "union", 0.0)]
+    found = rows(node[0].node)
+    for op, operand, k in node[1:]:
+        more = rows(operand)
+        more[0] = more[0]._replace(op=op, k=k)
+        if isinstance(operand, Tree):
+            more[0], last = more[0]._replace(begins=True), more[-1]
+            more[-1] = more[-1]._replace(ends=last.ends + 1)
+        found += more
+    return found
+
+
+def tree_field(tree: Tree | Sequence[Row], net: SolidNetwork | None = None) -> SolidField:
+    """The field of a tree, or of its rows."""
+    net, stream = net or network(), rows(tree) if isinstance(tree, Tree) else tree
+    vectors = np.array([vector(row.o._replace(k=0.0), net) for row in stream])
+    vectors[:, LAYOUT.places.width] = [row.k for row in stream]
+    return SolidField(net, vectors, np.array([row.token for row in stream], np.int8))
+
+
+def tree_graph(node: Tree) -> Fold:
+    """The same as a graph, for the reference."""
+    nodes = [leaf_of(at) if isinstance(at := join.node, Object) else tree_graph(at) for join in node]
+    return Fold("scene", tuple(link(join.op, join.k, at) for join, at in zip(node, nodes, strict=True)))
+
+
+class Answer(NamedTuple):
+    """Distance (M,), whether the material is a medium (M,), colour (3, M) and gradient (3, M)."""
+
+    d: np.ndarray
+    medium: np.ndarray
+    rgb: np.ndarray
+    slope: np.ndarray
+
+
+def folded(node: Tree | Object, known: Callable[[Object], Answer]) -> Answer:
+    """What a tree comes to, from the language's formulas."""
+    if isinstance(node, Object):
+        return known(node)
+    state = folded(node[0].node, known)
+    for op, operand, k in node[1:]:
+        state = joined(op, k, state, folded(operand, known))
+    return state
+
+
+def joined(op: Combine, k: float, a: Answer, b: Answer) -> Answer:
+    """One step."""
+    if op == "union":
+        paint, later = b.d < np.maximum(a.d, 0), b.d < a.d
+        d, slope = np.minimum(a.d, b.d), np.where(later, b.slope, a.slope)
+    elif op == "smooth":
+        k = k or BLEND
+        paint = h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0, 1)
+        d, slope = a.d + (b.d - a.d) * h - k * h * (1 - h), a.slope + h * (b.slope - a.slope)
+    else:
+        side = -1.0 if op == "subtract" else 1.0
+        paint, e, edge = 0.0 * a.d, side * b.d, side * b.slope
+        h = np.clip(0.5 - 0.5 * (e - a.d) / k, 0, 1) if k else 1.0 * (a.d > e)
+        d, slope = h * a.d + (1 - h) * e + k * h * (1 - h), edge + h * (a.slope - edge)
+    medium = np.where(paint > 0.5, b.medium, a.medium)
+    return Answer(d, medium, a.rgb + paint * (b.rgb - a.rgb), slope)
+
+
+def random_tree(rng: np.random.Generator, depth: int, media: float = 0.0) -> Tree:
+    """Up to so deep; operators are equally likely, and a third of all cuts have rounded edges."""
+
+    def node(left: int) -> Tree | Object:
+        if left == 0 or (left < depth and rng.random() < 0.4):
+            steps = (
+                scaled(*rng.uniform(0.35, 0.75, 3)),
+                turned(rng.uniform(0, 6)),
+                moved(*rng.uniform(-0.5, 0.5, 3)),
+            )
+            kind = MATERIALS[int(rng.random() < media)]
+            return Object(str(rng.choice(LEAVES)), steps, kind, tuple(rng.uniform(0.1, 0.9, 3).tolist()))
+        joins = []
+        for at in range(int(rng.integers(2, 4))):
+            op: Combine = "union" if at == 0 else COMBINE[rng.integers(4)]
+            wide = op != "union" and rng.random() < 1 / 3
+            joins.append(Join(op, node(left - 1), float(np.float32(rng.uniform(0.05, 0.5))) if wide else 0.0))
+        return Tree(joins)
+
+    found = node(depth)
+    assert isinstance(found, Tree)
+    return found
+
+
+def one_ball(
+    centre: Triple, radius: float, medium: bool, rgb: Triple, stage: Stage, canvas: tuple[int, int]
+) -> np.ndarray:
+    """The picture of one ball over the ground in closed form, sample by sample; of a medium a sum."""
+    (width, height), unit = canvas, min(canvas)
+    eye, light = np.array(stage.camera.eye), np.array(stage.light.position)
+    forward, right, up = np.array(stage.camera.axes())
+    x, y = ((np.arange(2 * side) + 0.5 - side) / unit for side in canvas)
+    d = forward / np.tan(stage.camera.fov_rad / 2) + x[:, None] * right - y[:, None, None] * up
+    d /= np.linalg.norm(d, axis=2, keepdims=True)
+
+    def chord(o, d):
+        """Where rays enter and leave the ball, both 0 where they miss it."""
+        o = o - centre
+        b = (o * d).sum(-1)
+        root = b * b - (o * o).sum(-1) + radius**2
+        enter, leave = -b - np.sqrt(np.maximum(root, 0)), -b + np.sqrt(np.maximum(root, 0))
+        met = (root > 0) & (leave > 0)
+        return np.where(met, np.maximum(enter, 0), 0), np.where(met, leave, 0)
+
+    def received(p, n):
+        way = light - p
+        r = np.linalg.norm(way, axis=-1, keepdims=True)
+        enter, leave = chord(p + 1e-4 * n, way / r)
+        through = np.exp(-3.0 * (leave - enter)) if medium else leave == enter
+        facing = np.maximum(0, (n * way / r).sum(-1))
+        direct = stage.light.power * facing / r[..., 0] ** 2 * through
+        return direct[..., None] * stage.light.rgb + 0.12 + 0.06 * n[..., 1:2]
+
+    horizon, zenith = np.array(stage.horizon), np.array(stage.zenith)
+    behind = horizon + (zenith - horizon) * np.clip(2 * d[..., 1:2], 0, 1)
+    p = eye + (stage.ground.y - eye[1]) / d[..., 1:2] * d
+    fade = np.exp(-(p[..., :1] ** 2 + p[..., 2:] ** 2) / 64)
+    shade = np.array(stage.ground.rgb) * received(p, np.array([0.0, 1.0, 0.0]))
+    behind = np.where(d[..., 1:2] < 0, fade * shade + (1 - fade) * horizon, behind)
+    enter, leave = (v[..., None] for v in chord(eye, d))
+    if medium:
+        behind = behind * np.exp(-3.0 * (leave - enter))
+        dt = (leave - enter) / 2000
+        for i in range(2000):
+            p = eye + (enter + (i + 0.5) * dt) * d
+            way = light - p
+            r = np.linalg.norm(way, axis=2, keepdims=True)
+            through = np.exp(-3.0 * chord(p, way / r)[1][..., None])
+            direct = stage.light.power / (4 * r * r) * through * stage.light.rgb
+            behind = behind + np.exp(-3.0 * (i + 0.5) * dt) * 3.0 * dt * np.array(rgb) * (direct + 0.12)
+    else:
+        p = eye + enter * d
+        behind = np.where(leave > 0, np.array(rgb) * received(p, (p - centre) / radius), behind)
+    pixels = np.clip(behind.reshape(height, 2, width, 2, 3).mean((1, 3)), 0, 1)
+    return np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * pixels ** (1 / 2.4) - 0.055)

@@ -52,7 +52,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
     nest = nesting(meetings, groups) if deepest else None
     if not deepest:
         joins = joins._replace(free=~blended(meetings, (widths > 0)[source]))
-    told = enclosed(
+    shown, changing = enclosed(
         meetings,
         some,
         Interval(colours[:, source], colours[:, source]),
@@ -62,7 +62,7 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
         Joins(groups.joins, widths[first], np.concatenate(free)[first]),
     )
     left = np.empty(len(block), bool)
-    left[source] = told.left
+    left[source] = changing
     sure = 0
     for column, number in enumerate(meetings.columns):
         pairs = np.flatnonzero(block == number)
@@ -70,11 +70,11 @@ def test_no_sample_leaves_its_interval(seed: int, kind: str, behind: Array) -> N
         d = middle[pairs, None] + rise[pairs, None] * share * rng.choice([-1, 1], share.shape)
         c = [np.tile(colours[:, pair], (60, 1)) for pair in pairs]
         rows = list(d), c, tokens[pairs].tolist(), widths[pairs].tolist()
-        shown = shown_by(folded(*rows), behind)
-        assert (shown - told.shown.high[:, column]).max() < 1e-9
-        assert (told.shown.low[:, column] - shown).max() < 1e-9
+        seen = shown_by(folded(*rows), behind)
+        assert (seen - shown.high[:, column]).max() < 1e-9
+        assert (shown.low[:, column] - seen).max() < 1e-9
         # what is left shows the same where nothing was
         alone = shown_by(folded(*rows, left[pairs].tolist()), behind)
-        np.testing.assert_allclose(np.broadcast_to(alone, shown.shape), shown, atol=1e-9)
-        sure += bool((told.shown.high - told.shown.low)[:, column].max() < 1e-9)
+        np.testing.assert_allclose(np.broadcast_to(alone, seen.shape), seen, atol=1e-9)
+        sure += bool((shown.high - shown.low)[:, column].max() < 1e-9)
     assert sure > 0.4 * blocks

@@ -1,4 +1,4 @@
-"""The reference of solid scenes, and the slow loop, against POV-Ray 3.7."""
+"""The reference of solid scenes against POV-Ray 3.7."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.drawing.exact.solid import solid_image
 from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import flip
-from tests.drawing import solid_oracle
 from tests.drawing.povray import MESHES, mesh, povray, povray_picture
-from tests.drawing.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
+from tests.drawing.solids import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
 from tests.pictures import psnr_db
 
 pytestmark = [
@@ -117,18 +116,6 @@ def test_the_reference(name: str) -> None:
     print(f"PSNR {decibels:.1f} dB, FLIP {difference:.5f}")
     assert decibels > least
     assert difference < 0.002
-
-
-@pytest.mark.parametrize("name", ["usual", "booleans", "media"])
-def test_the_slow_loop(name: str) -> None:
-    root, stage, (width, height), _ = SCENES[name]
-    canvas = 12 * width // height, 12
-    ours = np.array(solid_oracle.draw(root, stage, canvas, 20))
-    theirs = encoded(povray_picture(root, stage, canvas))
-    decibels, difference = psnr_db(theirs, ours), flip(theirs, ours)
-    print(f"PSNR {decibels:.1f} dB, FLIP {difference:.5f}")
-    assert decibels > 42
-    assert difference < 0.015
 
 
 def test_meshes() -> None:

@@ -1,62 +1,49 @@
-"""Solids: frames, field and pictures against closed forms, differences and the other library."""
+"""Solids: frames, field, rays, media and pictures against closed forms, differences and the reference."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
-import torch
 
+from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.drawing.exact.field import combine, leaf_distance
 from scenelang.drawing.exact.solid import solid_image
-from scenelang.drawing.neural.torch_networks import Solids
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
-from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted, element_box, surrounding
 from scenelang.drawing.solid.passes import (
     BEGIN,
     END,
-    INF,
-    OBJECT,
     RATE,
     SLACK,
-    SLOT,
-    WAY,
-    Passes,
     read_solid_frame,
 )
 from scenelang.language.words import TOKENS
+from tests.assets.shapes import element, torus
 from tests.drawing.solids import (
     LEAVES,
     MIXED,
     Object,
+    everywhere,
     field,
     graph,
     moved,
     network,
-    psnr,
+    one_ball,
     scaled,
     turned,
     vector,
     weights,
 )
+from tests.pictures import psnr_db
 
 rng = np.random.default_rng(7)
-
-
-def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
-    """What a field answers where every object is met."""
-    xp, like, count = solids.xp, solids.network.codes, len(solids.solids)
-    slots = np.zeros((SLOT, count, p.shape[1]), np.float32)
-    drawn = np.array([solid.draws for solid in solids.solids])
-    slots[OBJECT] = np.where(drawn, np.arange(count), -1 - np.arange(count))[::-1, None]
-    slots[WAY] = np.einsum("ijn,jp->inp", xp.to_numpy(solids.linear), p)[:, ::-1]
-    slots[END] = INF
-    passes = Passes(xp.array(slots, like), solids.shift)
-    with xp.inference():
-        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient)
 
 
 def test_frames_lead_back_step_by_step() -> None:
@@ -131,7 +118,7 @@ def test_gradients_are_those_of_the_distance() -> None:
 
 def test_objects_change_nothing_out_of_their_reach() -> None:
     """Signs, colours and kinds are those of the whole fold; so no surface is missed."""
-    small = (scaled(0.3, 0.3, 0.3), moved(0.9, 0, 0))
+    small = (scaled(0.3), moved(0.9, 0, 0))
     solids = field([*MIXED, Object("sphere", small, "volumetric", token="smooth")])
     origin = np.array([0.3, 1.0, 4.0], np.float32)
     p = rng.uniform(-1.5, 1.5, (3, 20000)).astype(np.float32)
@@ -163,50 +150,15 @@ def test_steps_pass_no_surface() -> None:
     assert (abs(a - b) / 0.02 <= bound + 1e-3)[bound > 0].all()
 
 
-def sphere_picture(canvas: tuple[int, int], radius: float, stage: Stage) -> np.ndarray:
-    """A grey sphere at the origin over the ground, in closed form."""
-    width, height = canvas
-    y, x = np.mgrid[0 : 2 * height, 0 : 2 * width] / 2 + 0.25
-    forward, right, up = np.array(stage.camera.axes())
-    way = 3 * forward[:, None, None] + np.multiply.outer(right, (x - width / 2) * 2 / min(canvas))
-    way = way - np.multiply.outer(up, (y - height / 2) * 2 / min(canvas))
-    way /= np.linalg.norm(way, axis=0)
-    eye, lamp = np.array(stage.camera.eye)[:, None, None], np.array(stage.light.position)[:, None, None]
-
-    def first(o: np.ndarray, d: np.ndarray) -> np.ndarray:
-        b, c = (o * d).sum(0), (o * o).sum(0) - radius**2
-        root = b * b - c
-        t = -b - np.sqrt(np.maximum(root, 0))
-        return np.where((root > 0) & (t > 1e-6), t, np.inf)
-
-    high = np.clip(2 * way[1], 0, 1)
-    sky = np.array(stage.horizon)[:, None, None] * (1 - high) + np.array(stage.zenith)[:, None, None] * high
-    t = first(eye + 0 * way, way)
-    down = np.where(way[1] < 0, (-1 - eye[1]) / np.minimum(way[1], -1e-9), np.inf)
-    ball = t < down
-    p = eye + way * np.where(ball, t, np.where(down < np.inf, down, 0))
-    n = np.where(ball, p / radius, np.array([0.0, 1, 0])[:, None, None])
-    to = lamp - p
-    r = np.linalg.norm(to, axis=0)
-    shadow = first(p + 1e-4 * n, to / r) < r
-    light = stage.light.power * np.maximum((n * to).sum(0) / r, 0) / r**2 * ~shadow + 0.12 + 0.06 * n[1]
-    fade = np.exp(-(p[0] ** 2 + p[2] ** 2) / 64)
-    floor = np.array([0.5, 0.48, 0.45])[:, None, None] * light
-    floor = fade * floor + (1 - fade) * np.array(stage.horizon)[:, None, None]
-    seen = np.where(ball, 0.5 * light, np.where(down < np.inf, floor, sky))
-    linear = np.clip(seen.reshape(3, height, 2, width, 2).mean((2, 4)), 0, 1)
-    return np.moveaxis(
-        np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055), 0, 2
-    )
-
-
-@pytest.mark.parametrize("canvas", [(96, 96), (120, 60)])
-def test_a_sphere_is_drawn_as_in_closed_form(canvas: tuple[int, int]) -> None:
-    stage = Stage(light=Light((2.0, 3.0, 2.5), 20.0))
-    solids = field([Object("sphere", (scaled(0.8, 0.8, 0.8),), rgb=(0.5, 0.5, 0.5))])
-    exact = sphere_picture(canvas, 0.8, stage)
-    assert psnr(draw_solids(solids, stage, canvas, samples="four")[0], exact) > 50
-    assert psnr(draw_solids(solids, stage, canvas)[0], exact) > 48
+@pytest.mark.parametrize(
+    ("material", "canvas"), [("diffuse", (64, 64)), ("diffuse", (90, 45)), ("volumetric", (20, 16))]
+)
+def test_a_ball_is_drawn_as_in_closed_form(material: str, canvas: tuple[int, int]) -> None:
+    stage, rgb = Stage(light=Light((2.0, 3.0, 2.5), 20.0)), (0.5, 0.5, 0.5)
+    solids = field([Object("sphere", (scaled(0.8),), material, rgb)])
+    exact = one_ball((0.0, 0.0, 0.0), 0.8, material == "volumetric", rgb, stage, canvas)
+    assert psnr_db(draw_solids(solids, stage, canvas, samples="four")[0], exact) > 50
+    assert psnr_db(draw_solids(solids, stage, canvas)[0], exact) > 48
 
 
 @pytest.mark.parametrize("first", ["diffuse", "volumetric"])
@@ -216,60 +168,44 @@ def test_pictures_are_those_of_the_reference(first: str, last: str) -> None:
     small = Object(
         "torus", (scaled(0.5, 0.4, 0.5), turned(0.7), moved(0.4, 0.2, 0.4)), "volumetric", token=last
     )
-    objects = [MIXED[0]._replace(material=first), MIXED[1], small, Object("sphere", (scaled(0.3, 0.3, 0.3),))]
+    objects = [MIXED[0]._replace(material=first), MIXED[1], small, Object("sphere", (scaled(0.3),))]
     stage = Stage(light=Light((1.0, 2.5, 2.0), 12.0, (1.0, 0.9, 0.8)))
     exact = solid_image(graph(objects), stage, (48, 40))
-    assert psnr(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
+    assert psnr_db(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
 
 
-def test_both_libraries_draw_the_same() -> None:
-    net = network()
-    other = Solids(net.config, 2, 2)
-    names = dict(other.named_parameters())
-    with torch.no_grad():
-        for name, parameter in names.items():
-            group, _, index = name.partition(".")
-            value = getattr(net, group)
-            parameter.copy_(torch.from_numpy(value[int(index)] if index else value))
-    objects = [*MIXED[:2], Object("sphere", (scaled(0.4, 0.4, 0.4), moved(-0.8, 0, 0.4)), "volumetric")]
-    mine, *_ = draw_solids(field(objects), Stage(), (48, 48))
-    theirs, *_ = draw_solids(field(objects, other), Stage(), (48, 48))
-    assert psnr(mine, theirs) > 60
-
-
-@pytest.mark.parametrize("samples", ["adaptive", "quick"])
-def test_tiles_and_threads_leave_no_trace(samples: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tiles_and_threads_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing but what products of matrices round, whose sizes differ."""
     mist = Object("torus", (scaled(0.8, 0.6, 0.8), moved(0.3, 0.2, 0.5)), "volumetric", (0.2, 0.4, 0.9))
-    solids = field([*MIXED, mist, Object("sphere", (scaled(0.3, 0.3, 0.3), moved(0.8, 0, 0)), "volumetric")])
-    whole, work = draw_solids(solids, Stage(), (48, 40), samples=samples)
-    for tile, threads in ((48 * 7, 1), (48 * 11, 3), (draw.TILE, 5)):
+    solids = field([*MIXED, mist, Object("sphere", (scaled(0.3), moved(0.8, 0, 0)), "volumetric")])
+    whole, work = draw_solids(solids, Stage(), (48, 40))
+    for tile, threads in ((48 * 7, 1), (48 * 11, 3)):
         monkeypatch.setattr(draw, "TILE", tile)
-        found, parts = draw_solids(solids, Stage(), (48, 40), threads=threads, samples=samples)
+        found, parts = draw_solids(solids, Stage(), (48, 40), threads=threads)
         assert abs(found - whole).max() < 2e-4
         assert parts.refined == work.refined
 
 
 def test_what_is_drawn_is_in_codes_and_cell() -> None:
     """Swapped codes swap shapes; random weights of the cell draw noise."""
-    step = (scaled(0.8, 0.8, 0.8),)
+    step = (scaled(0.8),)
     ball, ring = (draw_solids(field([Object(leaf, step)]), Stage(), (32, 32))[0] for leaf in LEAVES)
     g = vector(Object("sphere", step), network())
     g[:4] = network().codes[1]
     swapped, *_ = draw_solids(SolidField(network(), g[None], np.zeros(1, np.int8)), Stage(), (32, 32))
-    assert psnr(swapped, ring) > 90
-    assert psnr(swapped, ball) < 40
+    assert psnr_db(swapped, ring) > 90
+    assert psnr_db(swapped, ball) < 40
     noise = SolidArrays(network().config, weights())
     noise.cell_lines = rng.normal(size=noise.cell_lines.shape).astype(np.float32)
     noise.cell_gain = noise.cell_gain * 0
     drawn, good = (draw_solids(field(MIXED, net), Stage(), (32, 32))[0] for net in (noise, network()))
-    assert psnr(drawn, good) < 30
+    assert psnr_db(drawn, good) < 30
 
 
 def test_objects_meet_in_the_cell_alone() -> None:
     """A cell that takes nothing in leaves nothing, one that always does the last; tokens choose weights."""
     p = rng.uniform(-1, 1, (3, 500)).astype(np.float32)
-    ball, ring = Object("sphere", (scaled(0.8, 0.8, 0.8),)), Object("torus", (moved(0.3, 0, 0),))
+    ball, ring = Object("sphere", (scaled(0.8),)), Object("torus", (moved(0.3, 0, 0),))
     for bias in (-1.0, 2.0):
         net = SolidArrays(network().config, weights())
         net.cell_lines, net.cell_bias = 0 * net.cell_lines, 0 * net.cell_bias + np.float32(bias)
@@ -279,7 +215,7 @@ def test_objects_meet_in_the_cell_alone() -> None:
         assert found == pytest.approx(last if bias > 0 else np.full(500, EMPTY), abs=1e-5)
         if bias < 0:
             empty, *_ = draw_solids(field([]), Stage(), (24, 24))
-            assert psnr(draw_solids(field([ball, ring], net), Stage(), (24, 24))[0], empty) > 100
+            assert psnr_db(draw_solids(field([ball, ring], net), Stage(), (24, 24))[0], empty) > 100
     net = SolidArrays(network().config, weights())
     for name in ("cell_lines", "cell_gain", "cell_bias", "candidate", "bump"):
         setattr(net, name, getattr(net, name)[[0, 1, 3, 2]])
@@ -319,3 +255,124 @@ def test_displacement_moves_the_surface() -> None:
     )
     wanted = 0.1 * np.sin(1.5) ** 2 * np.sin(3 * 0.7071)
     assert bumpy - plain == pytest.approx(wanted, abs=1e-5)
+
+
+APART = [
+    Object("torus", (scaled(0.9, 0.6, 0.9), turned(0.7), moved(-0.8, 0.2, 0))),
+    Object("sphere", (Displace(0.05, 5.0), scaled(0.5), moved(0.9, 0.3, 0.4)), "volumetric"),
+    Object("torus", (Twist(0.8), scaled(0.6), moved(0.2, -0.4, 0.9)), rgb=(0.2, 0.5, 0.8)),
+]
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+def test_boxes_are_those_of_the_leaf(leaf: str) -> None:
+    net = network()
+    found = net.box(net.decoder(net.codes[LEAVES.index(leaf)]))
+    half = [1.0, 0.3 if leaf == "torus" else 1.0, 1.0]
+    assert (abs(found) >= np.array(half) - 0.002).all()
+    assert (abs(found) <= np.array(half) + 0.03).all()
+
+
+def test_boxes_hold_what_lies_apart_and_askew() -> None:
+    centres = np.array([[0.4, -0.6, 0.3], [-0.5, 0.1, 0.35], [0.0, 0.7, 0.0]])
+    radii = np.array([0.2, 0.15, 0.1])
+    low, high = surrounding(
+        lambda q: (np.linalg.norm(q.T[:, None] - centres, axis=2) - radii).min(1).astype(np.float32)
+    )
+    for box, sides in ((low, centres.T - radii), (-high, -centres.T - radii)):
+        assert (box <= sides.min(1)).all()
+        assert (box >= sides.min(1) - 0.03).all()
+
+
+def test_boxes_of_elements_hold_all_nodes_inside() -> None:
+    ring = element(torus, levels=3)
+    grid, box = unpacked(ring), element_box(ring)
+    places = np.stack(np.nonzero(grid <= 0)) * (2 / (len(grid) - 1)) - 1
+    assert (places.min(1) >= box[0]).all()
+    assert (places.max(1) <= box[1]).all()
+    assert (box[1] - box[0]).min() < 1.5
+
+
+@pytest.mark.parametrize("objects", [APART, MIXED])
+def test_asking_a_decoder_alone_is_asking_the_cell(objects: list[Object]) -> None:
+    """Pictures are the same where nothing is known of the cell, so that it is asked for each object."""
+    alone, asked = field(objects), field(objects)
+    assert alone.open
+    assert (alone.group >= 0).any()
+    asked.open, asked.group = False, 0 * asked.group - 1
+    (mine, work), (other, more) = (draw_solids(solids, Stage(), (64, 48)) for solids in (alone, asked))
+    assert abs(mine - other).max() < 2e-4
+    assert work.met == pytest.approx(more.met, rel=0.05)
+
+
+def test_gates_that_may_not_be_open_are_asked() -> None:
+    net, reach = network(), np.ones(1, np.float32)
+    cell = net.cell(0, 0.15)[Wanted.ALL]
+    assert net.alone(reach, cell) > 0
+    for gates in (slice(0, 1), slice(1, 3), slice(3, 5)):  # of distance, colour and medium
+        bias = cell.bias.copy()
+        bias[gates] -= 1e9
+        assert net.alone(reach, cell._replace(bias=bias)) == 0
+    assert net.alone(1e9 * reach, cell) == 0
+
+
+@pytest.mark.parametrize(
+    ("radius", "away", "power"), [(0.5, 3.0, 40.0), (1.0, 2.0, 300.0), (1.4, 3.0, 1500.0)]
+)
+def test_a_medium_glows_where_the_light_is_behind_it(radius: float, away: float, power: float) -> None:
+    """Along the axis: the deeper a point lies, the more light arrives and the less of it gets out."""
+    camera, dark = Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0)
+    light = Light((0.0, 0.0, -away), power)
+    stage = Stage(camera=camera, light=light, ground=None, horizon=dark, zenith=dark)
+    step = scaled(radius)
+    image, *_ = draw_solids(
+        field([Object("sphere", (step,), "volumetric", (1.0, 1.0, 1.0))]), stage, (65, 65)
+    )
+    z = np.linspace(-radius, radius, 20_001)
+    arrived, left = np.exp(-3 * (z + radius)), np.exp(-3 * (radius - z))
+    sent = 2 * radius * np.mean(3 * left * (power / (4 * (z + away) ** 2) * arrived + 0.12))
+    linear = ((image[32, 32] + 0.055) / 1.055) ** 2.4
+    assert linear == pytest.approx(sent, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("other", "least"),
+    [
+        (Object("torus", (scaled(0.9), moved(0, 0, -0.4)), "volumetric", (0, 0.1, 0.9)), 57),
+        (Object("sphere", (scaled(0.5, 0.9, 0.5), moved(0.5, 0.2, 0)), "volumetric", (0, 0.1, 0.9)), 57),
+        (Object("torus", (scaled(0.6), turned(0.7), moved(0.9, 1.2, 0.9))), 52.5),
+    ],
+)  # fmt: skip
+def test_colours_and_shadows_change_within_media(other: Object, least: float) -> None:
+    """A later medium in another, and a shadow that falls into one: three nodes a ray do not tell where."""
+    objects = [Object("sphere", (scaled(0.9),), "volumetric", (0.9, 0.5, 0.1)), other]
+    exact = solid_image(graph(objects), Stage(), (40, 40))
+    assert psnr_db(draw_solids(field(objects), Stage(), (40, 40))[0], exact) > least
+
+
+def test_what_is_cut_out_of_a_medium_is_not_in_it() -> None:
+    """Ways in a ball that two others cut, from outside and from inside it, against intervals."""
+    cuts = [((-0.2, 0.0, 0.3), 0.6), ((0.3, 0.0, -0.2), 0.5)]
+    ball = Object("sphere", (scaled(1),), "volumetric")
+    holes = [Object("sphere", (scaled(r), moved(*c)), token="subtract") for c, r in cuts]
+    solids = field([ball, *holes])
+    for eye in ([0.0, 0.5, 5.0], [0.0, 0.95, 0.0]):
+        origin = np.array(eye, np.float32)
+        way = np.random.default_rng(1).normal(0, 0.4, (3, 400)).astype(np.float32) - origin[:, None]
+        way /= np.linalg.norm(way, axis=0)
+        trail = march(solids, origin, way, np.full(400, 9.0, np.float32))
+        t = np.linspace(0, 7, 7001)
+        inside = _within(origin, way, (0, 0, 0), 1.0, t)
+        for centre, radius in cuts:
+            inside &= ~_within(origin, way, centre, radius, t)
+        assert trail.length == pytest.approx(inside.sum(1) * 1e-3, abs=0.02)  # ends to within 0.009
+
+
+def _within(
+    origin: np.ndarray, way: np.ndarray, centre: Sequence[float], radius: float, t: np.ndarray
+) -> np.ndarray:
+    """Whether points of rays are in a ball, (M, len(t))."""
+    to = np.array(centre) - origin
+    along = to @ way
+    half = np.sqrt(np.maximum(radius**2 - (to @ to - along**2), 0))
+    return abs(t - along[:, None]) < half[:, None]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +53,7 @@ def test_examples_look_the_same(path: Path) -> None:
 def test_random_scenes_look_the_same() -> None:
     """All tokens, deformations, transparency, odd canvases, every way to sample."""
     seen: set[int] = set()
-    for seed in range(60):
+    for seed in range(30):
         scene = (random_scene if seed % 3 else blob_scene)(seed)
         try:
             canvas = (33 + seed % 7, 29 + seed % 5)
@@ -67,19 +66,11 @@ def test_random_scenes_look_the_same() -> None:
     assert seen == {0, 1, 2, 3}
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "background(none);",
-        "star { scale(3e9); }",
-        "star { scale(1, 1e-3); rotate(1rad); }",
-        f"smooth {{ {STAR} {STAR} }}",
-    ],
-)
-@pytest.mark.parametrize("model", ["shapes2d", "shapes2d-w8"])
-def test_odd_scenes_look_the_same(text: str, model: str) -> None:
-    assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text), model=model))
+def test_odd_scenes_look_the_same() -> None:
+    texts = "", "background(none);", "star { scale(3e9); }", "star { scale(1, 1e-3); rotate(1rad); }"
+    for text in (*texts, f"smooth {{ {STAR} {STAR} }}"):
+        for model in ("shapes2d", "shapes2d-w8"):
+            assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text), model=model))
 
 
 def test_the_same_bytes_each_time_and_in_any_company() -> None:
@@ -115,11 +106,7 @@ def test_networks_of_whole_pictures_are_torch_s() -> None:
     scene = nsg.loads("canvas(32, 32); star;")
     assert choose_drawer(compile_scene(scene, model="shapes2d-streaming")).library == "torch"
     with pytest.raises(RenderError, match="unknown model `none`"):
-        choose_drawer(Program(**{**_fields(program(STAR)), "model": "none"}))
-
-
-def _fields(p: Program) -> dict[str, object]:
-    return {name: getattr(p, name) for name in p.__dataclass_fields__}
+        choose_drawer(replace(program(STAR), model="none"))
 
 
 def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
@@ -134,14 +121,3 @@ def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
     assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
     alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
     assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"
-
-
-@pytest.mark.parametrize("device", ["auto", "cpu"])
-def test_what_is_loaded(device: str) -> None:
-    code = (
-        "import sys, scenelang as nsg\n"
-        f"nsg.render(nsg.loads('star;'), device={device!r})\n"
-        "print('torch' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == f"{device == 'cpu'}\n"

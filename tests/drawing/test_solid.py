@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, tan
+from math import exp
 
 import numpy as np
 import pytest
@@ -11,42 +11,20 @@ from scenelang.compiler.graph import Fold
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage
 from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.drawing.exact import solid
-from scenelang.drawing.exact import solid as image
 from scenelang.drawing.exact.solid import Body, Turn, solid_image
 from tests.drawing import solid_oracle
-from tests.drawing.solid_scenes import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
+from tests.drawing.solids import GOLD, RED, SKY, fold, leaf, moved, one_ball, scaled, sheared, turned
+from tests.drawing.test_povray import SCENES as POVRAY
 from tests.pictures import psnr_db
 
 SIDE = Camera(eye=(-2.0, 2.0, 4.5), target=(0.1, 0.2, 0.0), fov_rad=0.5)
-TWIRL, BEND = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.8, 0.0))
 AXES = np.eye(3)[:, :, None]
 
 SCENES: dict[str, tuple[Fold, Stage]] = {
-    "diffuse": (
-        USUAL,
-        Stage(),
-    ),
-    "media": (
-        fold(
-            leaf("sphere", "volumetric", SKY, scaled(0.9, 0.7, 0.8)),
-            leaf("sphere", "diffuse", GOLD, scaled(0.35), moved(0.22, 0.13, 0.3)),
-            leaf("torus", "volumetric", RED, turned(0.9, 1, 0, 1), moved(-0.3, 0.2, 0.1)),
-        ),
-        Stage(light=Light(position=(1.0, 3.0, 2.0), power=12.0, rgb=(1.0, 0.8, 0.5))),
-    ),
-    "warped": (
-        fold(
-            leaf(
-                "sphere", "diffuse", GOLD, Displace(0.06, 7), TWIRL, BEND, Twist(0.8), scaled(0.8, 0.5, 0.6)
-            ),
-            (
-                "smooth",
-                leaf("torus", "diffuse", SKY, BEND, scaled(0.7), TWIRL, moved(0.5, 0.3, 0), Twist(1.2)),
-            ),
-            ("subtract", leaf("sphere", "diffuse", RED, scaled(0.4), moved(0.2, 0.5, 0.4))),
-        ),
-        Stage(camera=SIDE),
-    ),
+    **{
+        name: (POVRAY[name][0], POVRAY[name][1])
+        for name in ("usual", "booleans", "media", "warped", "blended")
+    },
     "folds": (
         fold(
             fold(
@@ -90,61 +68,11 @@ def test_picture_equals_the_slow_loop(name: str) -> None:
     assert abs(fast - slow).mean() < 3e-4
 
 
-def one_ball(centre: np.ndarray, radius: float, medium: bool, rgb: np.ndarray, stage: Stage, size: int):
-    """The picture of one ball of the world, sample by sample in closed form; in a medium a sum of 2,000."""
-    eye, light = np.array(stage.camera.eye), np.array(stage.light.position)
-    forward, right, up = np.array(stage.camera.axes())
-    x = (np.arange(2 * size) + 0.5) / size - 1.0
-    d = forward / tan(stage.camera.fov_rad / 2) + x[None, :, None] * right - x[:, None, None] * up
-    d /= np.linalg.norm(d, axis=2, keepdims=True)
-
-    def chord(o, d):
-        """Where rays enter and leave the ball, both 0 where they miss it; what lies behind is cut off."""
-        o = o - centre
-        b = (o * d).sum(-1)
-        root = b * b - (o * o).sum(-1) + radius**2
-        enter, leave = -b - np.sqrt(np.maximum(root, 0)), -b + np.sqrt(np.maximum(root, 0))
-        met = (root > 0) & (leave > 0)
-        return np.where(met, np.maximum(enter, 0), 0), np.where(met, leave, 0)
-
-    def received(p, n):
-        way = light - p
-        r = np.linalg.norm(way, axis=-1, keepdims=True)
-        enter, leave = chord(p + 1e-4 * n, way / r)
-        through = np.exp(-3.0 * (leave - enter)) if medium else leave == enter
-        facing = np.maximum(0, (n * way / r).sum(-1))
-        direct = stage.light.power * facing / r[..., 0] ** 2 * through
-        return direct[..., None] * stage.light.rgb + 0.12 + 0.06 * n[..., 1:2]
-
-    horizon, zenith = np.array(stage.horizon), np.array(stage.zenith)
-    behind = horizon + (zenith - horizon) * np.clip(2 * d[..., 1:2], 0, 1)
-    p = eye + (stage.ground.y - eye[1]) / d[..., 1:2] * d
-    fade = np.exp(-(p[..., :1] ** 2 + p[..., 2:] ** 2) / 64)
-    shade = np.array(stage.ground.rgb) * received(p, np.array([0.0, 1.0, 0.0]))
-    behind = np.where(d[..., 1:2] < 0, fade * shade + (1 - fade) * horizon, behind)
-    enter, leave = (v[..., None] for v in chord(eye, d))
-    if medium:
-        behind = behind * np.exp(-3.0 * (leave - enter))
-        dt = (leave - enter) / 2000
-        for i in range(2000):
-            p = eye + (enter + (i + 0.5) * dt) * d
-            way = light - p
-            r = np.linalg.norm(way, axis=2, keepdims=True)
-            through = np.exp(-3.0 * chord(p, way / r)[1][..., None])
-            direct = stage.light.power / (4 * r * r) * through * stage.light.rgb
-            behind = behind + np.exp(-3.0 * (i + 0.5) * dt) * 3.0 * dt * rgb * (direct + 0.12)
-    else:
-        p = eye + enter * d
-        behind = np.where(leave > 0, rgb * received(p, (p - centre) / radius), behind)
-    pixels = np.clip(behind.reshape(size, 2, size, 2, 3).mean((1, 3)), 0, 1)
-    return np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * pixels ** (1 / 2.4) - 0.055)
-
-
 @pytest.mark.parametrize("material", ["diffuse", "volumetric"])
 def test_one_ball_is_as_closed_forms_have_it(material: str) -> None:
     stage = Stage(camera=SIDE, light=Light((1.0, 2.5, 2.0), 11.0, (1.0, 0.9, 0.6)), ground=Ground(-0.7))
     ball = leaf("sphere", material, GOLD, scaled(0.8), moved(0.2, 0.1, 0.0))
-    exact = one_ball(np.array([0.2, 0.1, 0.0]), 0.8, material == "volumetric", np.array(GOLD), stage, 32)
+    exact = one_ball((0.2, 0.1, 0.0), 0.8, material == "volumetric", GOLD, stage, (32, 32))
     np.testing.assert_allclose(solid_image(fold(ball), stage, (32, 32)), exact, atol=2e-4)
 
 
@@ -215,8 +143,8 @@ def test_finer_steps_change_nothing_to_be_seen(monkeypatch: pytest.MonkeyPatch) 
     """By more than 60 dB: what the language asks of light in media."""
     root, stage = SCENES["media"]
     usual = np.asarray(solid_image(root, stage, (32, 24)))
-    monkeypatch.setattr(image, "TOLERANCE", image.TOLERANCE / 20)
-    monkeypatch.setattr(image, "HALVINGS", image.HALVINGS + 3)
+    monkeypatch.setattr(solid, "TOLERANCE", solid.TOLERANCE / 20)
+    monkeypatch.setattr(solid, "HALVINGS", solid.HALVINGS + 3)
     monkeypatch.setattr(solid, "STEP", solid.STEP / 2)
     assert psnr_db(usual, np.asarray(solid_image(root, stage, (32, 24)))) > 60
 
@@ -241,20 +169,12 @@ def test_the_ground_is_not_drawn_from_below_and_casts_no_shadow() -> None:
     )
 
 
-def test_an_empty_scene_is_sky_and_ground() -> None:
-    image = np.asarray(solid_image(fold(), Stage(ground=None, transparent=True), (4, 4)))
-    assert not image.any()
-    assert np.asarray(solid_image(fold(), Stage(camera=Camera(eye=(0.0, 3.0, 0.0))), (4, 4))).min() > 0.3
-
-
-@pytest.mark.parametrize(
-    "turn", [Turn(1, 0.0, (0.8, 0.0, 0.0)), Turn(2, 0.0, (0.0, 1.5, 0.0)), Turn(1, 1.2, (0, 0, 0))]
-)
-def test_a_turn_stretches_no_more_than_it_says(turn: Turn) -> None:
+def test_a_turn_stretches_no_more_than_it_says() -> None:
     """And about as much somewhere in the ball."""
     p = np.random.default_rng(7).normal(size=(3, 20000))
     p *= 0.7 / np.linalg.norm(p, axis=0)
     h = 1e-6
-    columns = [(turn(p + h * e) - turn(p - h * e)) / (2 * h) for e in AXES]
-    most = np.linalg.norm(np.moveaxis(np.array(columns), 2, 0), 2, axis=(1, 2)).max()
-    assert most <= turn.stretch(0.7) + 1e-6 <= 1.01 * most
+    for turn in (Turn(1, 0.0, (0.8, 0.0, 0.0)), Turn(2, 0.0, (0.0, 1.5, 0.0)), Turn(1, 1.2, (0, 0, 0))):
+        columns = [(turn(p + h * e) - turn(p - h * e)) / (2 * h) for e in AXES]
+        most = np.linalg.norm(np.moveaxis(np.array(columns), 2, 0), 2, axis=(1, 2)).max()
+        assert most <= turn.stretch(0.7) + 1e-6 <= 1.01 * most, turn

@@ -10,24 +10,25 @@ from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Affine, Warp
 from scenelang.drawing.exact.solid import Field, solid_image
-from scenelang.drawing.neural.torch_networks import Solids
-from scenelang.drawing.solid import light
+from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
 from tests.assets.shapes import noise
-from tests.drawing.solids import MIXED, Object, field, graph, moved, network, psnr, scaled, turned, weights
-from tests.drawing.test_renderers_solids import everywhere
+from tests.drawing.solids import (
+    MIXED,
+    Object,
+    everywhere,
+    field,
+    graph,
+    moved,
+    scaled,
+    torch_network,
+    turned,
+)
+from tests.pictures import psnr_db
 
 STEPS = (("hue", 0.2), ("grayscale", 0.3), ("color", 0.9, 0.6, 1.0))
 COARSE, FINE, SPACE = noise(7, 5), noise(96, 96, seed=1), noise(5, 5, 5)
 MOVED = (Affine((0.5, 0.3, 0, 0.2, -0.4, 0.7, 0, 0.1, 0, 0, 1, 0)),)
-
-
-def torch_network() -> Solids:
-    import torch
-
-    net = Solids(network().config, 2, 2)
-    net.load_state_dict({name: torch.tensor(value) for name, value in weights().items()})
-    return net
 
 
 @pytest.mark.parametrize("library", ["numpy", "torch"])
@@ -58,9 +59,9 @@ def test_the_field_has_the_colours_of_the_reference(library: str, element) -> No
 SCENES = {
     "surfaces": (
         [
-            Object("torus", (scaled(1.1, 1.1, 1.1), turned(0.8)), paint=Paint(COARSE, STEPS), texture=MOVED),
+            Object("torus", (scaled(1.1), turned(0.8)), paint=Paint(COARSE, STEPS), texture=MOVED),
             Object("sphere", (scaled(0.6, 0.4, 0.6), moved(1, 0, 0.6)), token="smooth", paint=Paint(SPACE)),
-            Object("sphere", (scaled(0.4, 0.4, 0.4), moved(-0.8, 0.5, 0.4)), token="subtract"),
+            Object("sphere", (scaled(0.4), moved(-0.8, 0.5, 0.4)), token="subtract"),
         ],
         44,
     ),
@@ -71,15 +72,15 @@ SCENES = {
     "media": (
         [
             Object("sphere", (turned(0.5),), "volumetric", paint=Paint(COARSE, STEPS)),
-            Object("torus", (scaled(0.5, 0.5, 0.5), moved(1.3, 0, 0.5)), "volumetric", paint=Paint(SPACE)),
-            Object("sphere", (scaled(0.5, 0.5, 0.5), moved(-1.2, 0, 0.5)), "volumetric", (0.1, 0.3, 0.9)),
+            Object("torus", (scaled(0.5), moved(1.3, 0, 0.5)), "volumetric", paint=Paint(SPACE)),
+            Object("sphere", (scaled(0.5), moved(-1.2, 0, 0.5)), "volumetric", (0.1, 0.3, 0.9)),
         ],
         46,
     ),
     "solids in media": (
         [
             Object("sphere", (), "volumetric", (0.9, 0.9, 1.0)),
-            Object("torus", (scaled(0.94, 0.94, 0.94), turned(0.6)), paint=Paint(COARSE)),
+            Object("torus", (scaled(0.94), turned(0.6)), paint=Paint(COARSE)),
         ],
         40,
     ),
@@ -91,9 +92,9 @@ def test_pictures_are_those_of_the_reference(name: str) -> None:
     objects, least = SCENES[name]
     exact = solid_image(graph(objects), Stage(), (48, 48))
     found, _ = draw_solids(field(objects), Stage(), (48, 48))
-    assert psnr(found, exact) > least
+    assert psnr_db(found, exact) > least
     plain, _ = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (48, 48))
-    assert psnr(plain, exact) < psnr(found, exact) - 6
+    assert psnr_db(plain, exact) < psnr_db(found, exact) - 6
     other, _ = draw_solids(field(objects, torch_network()), Stage(), (48, 48))
     assert abs(np.asarray(other) - found).max() < 2 / 255
 
@@ -104,8 +105,8 @@ def test_textures_are_looked_up_four_times_without_four_rays() -> None:
     four, _ = draw_solids(solids, Stage(), (64, 64), samples="four")
     some, work = draw_solids(solids, Stage(), (64, 64))
     one, _ = draw_solids(solids, Stage(), (64, 64), samples="one")
-    assert psnr(one, four) < 25
-    assert psnr(some, four) > 38
+    assert psnr_db(one, four) < 25
+    assert psnr_db(some, four) > 38
     plain = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (64, 64))[1]
     assert work.refined < 1.2 * plain.refined
 
@@ -114,7 +115,7 @@ def test_many_lookups_are_made_in_parts(monkeypatch: pytest.MonkeyPatch) -> None
     objects = [Object("sphere", paint=Paint(FINE)), Object("torus", (), "volumetric", paint=Paint(COARSE))]
     whole, _ = draw_solids(field(objects), Stage(), (32, 32))
     for name in ("PIXELS", "CHUNK"):
-        monkeypatch.setattr(light, name, 17)
+        monkeypatch.setattr(draw, name, 17)
     np.testing.assert_allclose(draw_solids(field(objects), Stage(), (32, 32))[0], whole, rtol=0, atol=1e-5)
 
 

@@ -26,7 +26,7 @@ from scenelang.web.arrays import script
 from scenelang.web.export import view_of
 from tests.assets.shapes import element, noise, torus
 from tests.browser import watched
-from tests.drawing.test_group_steps import LEFT, scene_of
+from tests.drawing.test_trees import LEFT, scene_of
 
 pytestmark = pytest.mark.browser
 

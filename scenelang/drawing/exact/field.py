@@ -1,11 +1,7 @@
 """The exact field of the plane in float64: samples, textures, leaves and folds, part by part.
 
-Works on numpy arrays and torch tensors alike: only names that both offer are used, so that training makes its
-data on any device by the formulas of the reference image. Points are one array (d, …), or a sequence of its d
-coordinates.
-
-A disc of points is carried back to each leaf. As a leaf's distance changes by no more than a point moves, the
-distance at the centre tells whether all of the disc is outside.
+Leaves and folds take numpy arrays and torch tensors alike, as training makes its data by them on any device.
+Points are one array (d, …), or a sequence of its d coordinates.
 """
 
 from __future__ import annotations
@@ -24,9 +20,13 @@ from scenelang.assets.element import Element
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
+from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.drawing.image import decoded
 from scenelang.language.words import BLEND, TOKENS
+
+Floats = npt.NDArray[np.float64]
+Array = Any  # numpy array or torch tensor
 
 
 def sample_points(
@@ -42,15 +42,10 @@ def sample_points(
     return np.stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
-Values = npt.NDArray[np.float64]
+def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
+    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M).
 
-
-def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
-    """Colours (M, 3) of a look with an element.
-
-    Args:
-        q: its own coordinates (d, M): those of the leaf, through the moves of the texture.
-        light: whether they are linear, decoded before anything is mixed.
+    They are linear if ``light``, decoded before anything is mixed.
     """
     assert look.element is not None
     values = _values(look.element, light)
@@ -63,7 +58,7 @@ def colour_at(look: Look, q: Sequence[Values], light: bool = False) -> Values:
 
 
 @lru_cache(maxsize=16)
-def _values(element: Element, light: bool) -> Values:
+def _values(element: Element, light: bool) -> Floats:
     """Colours (h, w, 3) or (n, n, n, 3)."""
     result = texels(element).astype(np.float64)
     if element.form == "picture":  # of 8 bits
@@ -71,9 +66,9 @@ def _values(element: Element, light: bool) -> Values:
     return np.asarray(decoded(result), np.float64) if light else result
 
 
-def _mixed(values: Values, places: list[Values]) -> Values:
+def _mixed(values: Floats, places: list[Floats]) -> Floats:
     """Colours between the nearest nodes along each axis, where the first follows the last."""
-    total: Values = np.zeros((len(places[0]), 3))
+    total: Floats = np.zeros((len(places[0]), 3))
     first = [np.floor(place).astype(int) for place in places]
     for corner in np.ndindex(*(2,) * len(places)):
         share, index = np.ones(len(places[0])), []
@@ -84,7 +79,7 @@ def _mixed(values: Values, places: list[Values]) -> Values:
     return total
 
 
-def _stepped(rgb: Values, steps: Iterable[ColourStep]) -> Values:
+def _stepped(rgb: Floats, steps: Iterable[ColourStep]) -> Floats:
     """Colours behind operations, clamped after each."""
     for kind, *numbers in steps:
         if kind == "color":
@@ -97,7 +92,7 @@ def _stepped(rgb: Values, steps: Iterable[ColourStep]) -> Values:
     return rgb
 
 
-def _turned(rgb: Values, turns: float) -> Values:
+def _turned(rgb: Floats, turns: float) -> Floats:
     """The same S and V of HSV, and H further by so many turns."""
     most, least = rgb.max(1), rgb.min(1)
     first = rgb.argmax(1)
@@ -109,20 +104,13 @@ def _turned(rgb: Values, turns: float) -> Values:
     return np.stack([least + (most - least) * np.clip(2 - 6 * a, 0, 1) for a in away], 1)
 
 
-Array = Any  # numpy array or torch tensor
-
 Brought = Mapping[str, Any]
 """True shapes of elements by geometry: each answers points (M, d) of the leaf's own space with signed
 ``distances`` (M,), and in space with their gradients ``slopes`` (M, 3)."""
 
 
 def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Array:
-    """Exact Euclidean signed distance of a leaf in its own space; raises KeyError if unknown.
-
-    Args:
-        p: points in leaf units, (d, …).
-        brought: shapes of elements, whose points are (d, M).
-    """
+    """Exact signed distance of a leaf at points (d, …), leaf units, those of elements (d, M)."""
     if brought and geometry in brought:
         return brought[geometry].distances(np.transpose(p))
     return GEOMETRIES[geometry].distance(p)
@@ -131,12 +119,9 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object.
+    """Yield (D, C) after each object, of a distance of shape S.
 
-    Args:
-        distances: world distances d of the objects, each of shape S.
-        colours: colours c, each of a shape that broadcasts against (*S, 3).
-        tokens: each a number, or an array that broadcasts against S.
+    Colours broadcast against (*S, 3); tokens are numbers, or arrays that broadcast against S.
     """
     big_d = c_now = None
     for d, c, token in zip(distances, colours, tokens, strict=True):
@@ -153,48 +138,33 @@ def combine(
     """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one."""
     xp = namespace(d)
     if isinstance(token, int):
-        return _STEPS[token](xp, big_d, big_c, d, c, k)
+        out_d, share, _ = folded(xp, token, k or BLEND * (token == SMOOTH), big_d, d)
+        if share is None:
+            return out_d, big_c
+        share = share[..., None]
+        return out_d, big_c + (c - big_c) * share if token == SMOOTH else xp.where(share, c, big_c)
     out_d, out_c = big_d, big_c
-    for value, step in enumerate(_STEPS):
-        new_d, new_c = step(xp, big_d, big_c, d, c, k)
+    for value in TOKENS.values():
+        new_d, new_c = combine(big_d, big_c, d, c, value, k)
         chosen = token == value
         out_d = xp.where(chosen, new_d, out_d)
         out_c = xp.where(chosen[..., None], new_c, out_c)
     return out_d, out_c
 
 
-def _union(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    over = d < xp.clip(big_d, 0.0, None)
-    return xp.minimum(big_d, d), xp.where(over[..., None], c, big_c)
-
-
-def _smooth(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    k = k or BLEND
-    h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
-    mixed = big_c + (c - big_c) * h[..., None]
-    # each side by its own share: a difference of the two would swallow the nearer one's digits
-    return big_d * (1 - h) + d * h - k * h * (1 - h), mixed
-
-
-def _subtract(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return _cut(xp, big_d, -d, k), big_c
-
-
-def _intersect(xp: Any, big_d: Array, big_c: Array, d: Array, c: Array, k: float) -> tuple[Array, Array]:
-    return _cut(xp, big_d, d, k), big_c
-
-
-def _cut(xp: Any, big_d: Array, d: Array, k: float) -> Array:
+def folded(xp: Any, token: int, k: float, big_d: Array, d: Array) -> tuple[Array, Array, Array]:
+    """The distance behind an operand, its shares in the colour, None for none, and in the gradient."""
+    if token == UNION:
+        return xp.minimum(big_d, d), d < xp.clip(big_d, 0.0, None), d <= big_d
+    if token == SMOOTH:
+        h = xp.clip(0.5 + 0.5 * (big_d - d) / k, 0.0, 1.0)
+        # each side by its own share: a difference of the two would swallow the nearer one's digits
+        return big_d * (1 - h) + d * h - k * h * (1 - h), h, h
+    d = -d if token == SUBTRACT else d
     if not k:
-        return xp.maximum(big_d, d)
-    h = xp.clip(0.5 - 0.5 * (d - big_d) / k, 0.0, 1.0)  # the share of what is cut
-    return d + (big_d - d) * h + k * h * (1 - h)
-
-
-_STEPS = (_union, _smooth, _subtract, _intersect)
-
-
-Floats = npt.NDArray[np.float64]
+        return xp.maximum(big_d, d), None, d >= big_d
+    h = xp.clip(0.5 + 0.5 * (d - big_d) / k, 0.0, 1.0)
+    return big_d * (1 - h) + d * h + k * h * (1 - h), None, h
 
 
 def map_back(frame: Array, p: Array) -> list[Array]:
@@ -224,13 +194,9 @@ def carry_back(steps: Sequence[Step], p: Array) -> Array:
 @lru_cache(maxsize=1 << 12)
 def frame_back(step: Affine, dimension: int) -> Floats:
     """The inverse of an affine map, as d rows of d factors and a shift."""
-    inverse = np.linalg.inv(_linear(step, dimension))
-    shift = -inverse @ np.reshape(step.rows, (3, 4))[:dimension, 3]
-    return np.column_stack([inverse, shift])
-
-
-def _linear(step: Affine, dimension: int) -> Floats:
-    return np.reshape(step.rows, (3, 4))[:dimension, :dimension]
+    rows = np.reshape(step.rows, (3, 4))[:dimension]
+    inverse = np.linalg.inv(rows[:, :dimension])
+    return np.column_stack([inverse, -inverse @ rows[:, 3]])
 
 
 @lru_cache(maxsize=1 << 12)
@@ -239,7 +205,7 @@ def distance_scale(steps: tuple[Step, ...], dimension: int = 2) -> float:
     linear = np.eye(dimension)
     for step in steps:
         if isinstance(step, Affine):
-            linear = _linear(step, dimension) @ linear
+            linear = np.reshape(step.rows, (3, 4))[:dimension, :dimension] @ linear
     return float(np.linalg.svd(linear, compute_uv=False)[-1])
 
 
@@ -251,13 +217,11 @@ def evaluate(
     owners: bool = False,
     brought: Brought | None = None,
 ) -> tuple[Any, Any]:
-    """Distance D (M,) and colour C (M, 3) of a node at world points.
+    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64.
 
     Args:
-        p: world points (d, M), float64.
         outer: steps of the folds around it, nearest first.
         owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
-        brought: shapes of elements.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
@@ -286,6 +250,18 @@ def evaluate(
     return big_d, big_c
 
 
+def placed_leaves(
+    node: Node, outer: tuple[Step, ...] = (), taken: bool = False
+) -> Iterator[tuple[Leaf, tuple[Step, ...], bool]]:
+    """Leaves in order with all their steps, and whether a `subtract` takes them away."""
+    steps = (*(move.step for move in node.moves), *outer)
+    if isinstance(node, Leaf):
+        yield node, steps, taken
+    else:
+        for at, link in enumerate(node.links):
+            yield from placed_leaves(link.node, steps, taken or (at > 0 and link.op == "subtract"))
+
+
 _MOST, _LEAST = 1 << 16, 1 << 10  # pixels of a part that is halved whatever it holds, and of one that is not
 _FEW = 4  # objects that are no reason to go on halving
 _DIGITS = 1e-12  # of a coordinate: more than float64 loses in a step
@@ -306,12 +282,8 @@ def parts(
         if len(rows) * len(columns) <= (_MOST if few else _LEAST):
             yield Fold("scene", ()) if low > 0 else node, rows, columns
         else:
-            todo += [(node, *half) for half in product(_halves(rows), _halves(columns))]
-
-
-def _halves(side: range) -> list[range]:
-    middle = len(side) // 2
-    return [half for half in (side[:middle], side[middle:]) if half]
+            halves = [(side[: len(side) // 2], side[len(side) // 2 :]) for side in (rows, columns)]
+            todo += [(node, tall, wide) for tall, wide in product(*halves) if tall and wide]
 
 
 def within(
@@ -325,12 +297,8 @@ def within(
 ) -> tuple[float, Node]:
     """A bound below the distance of a node in a disc of world points, and the node without what is outside.
 
-    Args:
-        centre, radius: of the disc, (2, 1) and world units.
-        outer: steps of the folds around the node, nearest first.
-        signed: whether no more is asked for than the sign of the distance, and the colour where it is
-            negative. Else nothing is left out: a blend wants the distance itself.
-        brought: shapes of elements.
+    Nothing is left out unless ``signed``: then no more is asked for than the sign of the distance, and the
+    colour where it is negative. A blend wants the distance itself.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
@@ -369,5 +337,5 @@ def _carried(steps: tuple[Step, ...], centre: Array, radius: float) -> tuple[Arr
 
 @lru_cache(maxsize=1 << 12)
 def _stretch(step: Affine) -> float:
-    """Greatest factor by which the way back through an affine map lengthens."""
+    """Greatest factor by which the way back lengthens."""
     return float(np.linalg.norm(frame_back(step, 2)[:, :2], 2))

@@ -1,9 +1,6 @@
-"""Triangle meshes as solids: read, put into the unit ball, asked for distances and colours.
+"""Triangle meshes as solids: read, put into the unit ball, asked for distances and colours of sRGB.
 
-Colours are in sRGB. The colours of a glTF are linear, its textures aside, and are converted.
-
-Needs trimesh, which reads, and libigl, which measures. No mesh is trusted: meshes that would crash libigl are
-refused here.
+No mesh is trusted: those that would crash libigl are refused here.
 """
 
 from __future__ import annotations
@@ -34,21 +31,13 @@ Rows = npt.NDArray[Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """The colours of F triangles.
+    """The colours of F triangles."""
 
-    Args:
-        tint: (F, 3, 3): at corners; of a texture what multiplies it.
-        linear: whether tints are linear.
-        uv: (F, 3, 2): at corners, v up.
-        image: (F,) which texture, -1 for none.
-        images: textures (h, w, 3), 0 to 255.
-    """
-
-    tint: npt.NDArray[np.float32]
-    linear: npt.NDArray[np.bool_]
-    uv: npt.NDArray[np.float32]
-    image: npt.NDArray[np.int32]
-    images: tuple[npt.NDArray[np.uint8], ...] = ()
+    tint: npt.NDArray[np.float32]  # (F, 3, 3), at corners; of a texture what multiplies it
+    linear: npt.NDArray[np.bool_]  # whether tints are, as those of glTF
+    uv: npt.NDArray[np.float32]  # (F, 3, 2), at corners, v up
+    image: npt.NDArray[np.int32]  # (F,) which texture, -1 for none
+    images: tuple[npt.NDArray[np.uint8], ...] = ()  # textures (h, w, 3), 0 to 255
 
     def of(self, chosen: Rows) -> Look:
         """The look of some of the triangles."""
@@ -88,12 +77,7 @@ def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
 
 
 def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:
-    """Colours of a mesh as trimesh reads it; None where its file has none.
-
-    Args:
-        linear: whether the numbers of its file are, as those of glTF.
-        textures: those that were read before, by `id`.
-    """
+    """Colours of a mesh as trimesh reads it, None where its file has none; ``textures`` were read before."""
     visual, faces = mesh.visual, np.asarray(mesh.faces)
     tint = np.ones((len(faces), 3, 3), np.float32)
     uv = np.zeros((len(faces), 3, 2), np.float32)
@@ -180,29 +164,23 @@ class Shape(Protocol):
         """Signed distances (M,) of points (M, d), negative inside."""
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, d) of the surface, ``count`` at most, outward normals, and what share is too thin."""
+        """Points (K, d) spread evenly on the outside, ``count`` at most, and outward normals there.
+
+        Also the share of the surface that has no inside on either side.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1.
+    """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1."""
 
-    Args:
-        vertices: (V, 3).
-        triangles: (F, 3) indices.
-        closed: tell inside by the nearest surface's normal, otherwise by winding numbers.
-        centre, size: of the ball in the file's own coordinates.
-        notes: what was found and mended.
-        look: the colours of its triangles, where they have any.
-    """
-
-    vertices: Points
-    triangles: npt.NDArray[np.int64]
-    closed: bool
-    centre: tuple[float, float, float]
+    vertices: Points  # (V, 3)
+    triangles: npt.NDArray[np.int64]  # (F, 3) indices
+    closed: bool  # tell inside by the nearest surface's normal, otherwise by winding numbers
+    centre: tuple[float, float, float]  # of the ball in the file's own coordinates
     size: float
-    notes: tuple[str, ...] = ()
-    look: Look | None = None
+    notes: tuple[str, ...] = ()  # what was found and mended
+    look: Look | None = None  # the colours of its triangles, where they have any
     dimension: ClassVar[int] = 3
 
     @cached_property
@@ -264,13 +242,7 @@ class Mesh:
         return triangle, share / share.sum(1, keepdims=True)
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, 3) spread evenly on the outside of the solid, K at most ``count``, and normals there.
-
-        Also the share of the surface that has no inside on either side.
-
-        Raises:
-            FitError: most of the surface has no inside.
-        """
+        """As `Shape.surface`; raises `FitError` where most of the surface has no inside."""
         at, share = self.spread(count, 1)
         a, b, c = self.vertices[self.triangles[at]].swapaxes(0, 1)
         normals = np.cross(b - a, c - a)
@@ -292,27 +264,11 @@ class Mesh:
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
 ) -> tuple[Points, Points, float]:
-    """Select points of surfaces (M, d) that have an inside on one side alone (K, d), with outward normals.
-
-    Also returns the share of points that have none on either side.
-
-    Args:
-        distances: signed, of points.
-        normals: (M, d), to either side.
-        beside: how far from a surface its sides are asked.
-    """
+    """`Shape.surface` of points and normals to either side (M, d), whose sides are asked at ``beside``."""
     sides = [distances(points + way * beside * normals) < 0 for way in (1, -1)]
     chosen = sides[0] != sides[1]
     turned = np.where(sides[0], -1.0, 1.0)[:, None]
     return points[chosen], (normals * turned)[chosen], float((~(sides[0] | sides[1])).mean())
-
-
-def _once(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """A mask (F,) of triangles (F, 3) that are the first with their corners in their order round."""
-    from trimesh.grouping import unique_rows
-
-    turned = np.take_along_axis(triangles, (triangles.argmin(1)[:, None] + np.arange(3)) % 3, 1)
-    return np.isin(np.arange(len(triangles)), unique_rows(turned)[0])
 
 
 def _igl() -> Any:
@@ -345,6 +301,7 @@ def mesh_of(
     """
     with needed("trimesh"):
         import trimesh
+        from trimesh.grouping import unique_rows
     notes = []
     if vertices.shape[1:] != (3,) or triangles.shape[1:] != (3,) or not len(triangles):
         raise FitError("it holds no triangles")
@@ -369,7 +326,11 @@ def mesh_of(
         notes.append(f"{plural((~sound).sum(), 'flat triangle')} left out")
         mesh.update_faces(sound)
         look = look and look.of(sound)
-    if not (once := _once(mesh.faces)).all():  # many at one place would all be asked, for each point
+    # triangles that are the first with their corners in their order round; of many at one place all would be
+    # asked, for each point
+    turned = (mesh.faces.argmin(1)[:, None] + np.arange(3)) % 3
+    first, _ = unique_rows(np.take_along_axis(mesh.faces, turned, 1))
+    if not (once := np.isin(np.arange(len(turned)), first)).all():
         notes.append(f"{plural((~once).sum(), 'repeated triangle')} left out")
         mesh.update_faces(once)
         look = look and look.of(once)
@@ -405,18 +366,12 @@ _IGNORED: Final = ("animations", "cameras", "skins")
 
 
 class Solid(NamedTuple):
-    """A named mesh of a file.
-
-    Args:
-        vertices: (V, 3), where they lie in the whole.
-        triangles: (F, 3) indices.
-        look: None where the file says nothing of it.
-    """
+    """A named mesh of a file."""
 
     name: str
-    vertices: Points
-    triangles: npt.NDArray[np.int64]
-    look: Look | None = None
+    vertices: Points  # (V, 3), where they lie in the whole
+    triangles: npt.NDArray[np.int64]  # (F, 3) indices
+    look: Look | None = None  # None where the file says nothing of it
 
 
 def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
@@ -432,11 +387,8 @@ def read_solids(
 ) -> tuple[list[Solid], list[str]]:
     """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it.
 
-    Args:
-        files: materials and textures by the names that it has for them; if left out, looks are not read.
-
-    Raises:
-        FitError: it is damaged or too large, or has what cannot be read.
+    Materials and textures are in ``files`` by the names that it has for them; without, looks are not read.
+    Raises `FitError` where it is damaged or too large, or has what cannot be read.
     """
     with needed("trimesh"):
         import trimesh
@@ -446,8 +398,11 @@ def read_solids(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             notes = _notes(data) if suffix == ".glb" else []
-            if suffix == ".obj":
-                _few(data)
+            if suffix == ".obj":  # what trimesh would read for minutes
+                if len(re.findall(rb"^[ \t]*(?:o|g|usemtl)\b", data, re.M)) > _MOST_PIECES:
+                    raise FitError(f"more than {_MOST_PIECES:,} objects, groups and changes of material")
+                if re.search(rb"^[ \t]*f(?:[ \t]+[^\s]+){%d}" % (_MOST_CORNERS + 1), data, re.M):
+                    raise FitError(f"a face of more than {_MOST_CORNERS:,} corners")
             objects = {"split_objects": True} if re.search(rb"^o ", data, re.M) else {"split_groups": True}
             kind = {"file_type": suffix[1:], "resolver": beside, **(objects if suffix == ".obj" else {})}
             result = trimesh.load_scene(io.BytesIO(data), skip_materials=files is None, **kind)
@@ -459,24 +414,8 @@ def read_solids(
     return solids, [*notes, *(f"`{name}` not found beside it" for name in sorted(beside.missing))]
 
 
-def _few(data: bytes) -> None:
-    """Refuse an OBJ that trimesh would read for minutes.
-
-    Raises:
-        FitError: it has too many pieces, or a face of too many corners.
-    """
-    if len(re.findall(rb"^[ \t]*(?:o|g|usemtl)\b", data, re.M)) > _MOST_PIECES:
-        raise FitError(f"more than {_MOST_PIECES:,} objects, groups and changes of material")
-    if re.search(rb"^[ \t]*f(?:[ \t]+[^\s]+){%d}" % (_MOST_CORNERS + 1), data, re.M):
-        raise FitError(f"a face of more than {_MOST_CORNERS:,} corners")
-
-
 def _notes(data: bytes) -> list[str]:
-    """Notes on parts of a glTF that are left out.
-
-    Raises:
-        FitError: it cannot be read without an extension.
-    """
+    """Notes on parts of a glTF that are left out; raises `FitError` where it cannot be read."""
     header = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     strange = [name for name in header.get("extensionsRequired", ()) if not _UNDERSTOOD.match(name)]
     if strange:
@@ -495,14 +434,13 @@ def _notes(data: bytes) -> list[str]:
         raise FitError(f"nodes within nodes, more than {_MOST_DEPTH} deep")
     if sum(accessor.get("count", 0) for accessor in header.get("accessors", ())) > _MOST_NUMBERS:
         raise FitError(f"accessors of more than {_MOST_NUMBERS:,} elements")
-    if any("targets" in part for part in primitives):
-        notes.append("morph targets left out")
-    if any(part.get("mode", 4) not in (4, 5) for part in primitives):
-        notes.append("points, lines and fans left out")
-    if "KHR_lights_punctual" in header.get("extensions", {}):
-        notes.append("lights left out")
-    if "KHR_texture_transform" in header.get("extensionsUsed", ()):
-        notes.append("moves of textures left out")
+    others = {
+        "morph targets": any("targets" in part for part in primitives),
+        "points, lines and fans": any(part.get("mode", 4) not in (4, 5) for part in primitives),
+        "lights": "KHR_lights_punctual" in header.get("extensions", {}),
+        "moves of textures": "KHR_texture_transform" in header.get("extensionsUsed", ()),
+    }
+    notes += [f"{name} left out" for name, there in others.items() if there]
     if len(header.get("scenes", ())) > 1:
         notes.append(f"{len(header['scenes'])} scenes, of which it takes number {header.get('scene', 0) + 1}")
     return notes
@@ -512,25 +450,15 @@ def _beside(files: Mapping[str, bytes] | None) -> Any:
     """A resolver, for trimesh, of the files that a file names; it notes the missing ones."""
     import trimesh
 
-    class Beside(trimesh.resolvers.Resolver):
-        def __init__(self) -> None:
-            self.missing: set[str] = set()
+    class Beside(trimesh.resolvers.ZipResolver):  # of an empty archive
+        missing: ClassVar[set[str]] = set()
 
         def get(self, name: str) -> bytes:
             if files is not None and name not in files:
                 self.missing.add("".join(c for c in name if c.isprintable())[:80])
             return (files or {})[name]
 
-        def keys(self) -> tuple[str, ...]:
-            return ()
-
-        def namespaced(self, namespace: str) -> Any:
-            return self
-
-        def write(self, name: str, data: Any) -> None:
-            raise PermissionError(f"`{name}` is only read")
-
-    return Beside()
+    return Beside({})
 
 
 def _solids(scene: Any, suffix: str, looks: bool) -> list[Solid]:

@@ -18,48 +18,40 @@ import numpy as np
 from scenelang.assets.element import MOST_PARTS, Element, Group, Painted, Part
 from scenelang.assets.files import read_regular
 from scenelang.compiler.graph import Graph, leaves
-from scenelang.drawing.exact import mesh as solids
+from scenelang.drawing.exact import mesh as meshes
 from scenelang.drawing.exact import outline
 from scenelang.drawing.exact.mesh import FitError, Look, Mesh, Points, Shape, Sign, Solid
 from scenelang.drawing.exact.outline import Outline
 from scenelang.language import library
 from scenelang.language.scene import Scene
 
-MOST_OF: Final = {**solids.MOST_OF_MESH, **outline.MOST_OF_DRAWING, **outline.MOST_OF_PICTURE}
+MOST_OF: Final = {**meshes.MOST_OF_MESH, **outline.MOST_OF_DRAWING, **outline.MOST_OF_PICTURE}
 """Bytes of a file, by the suffixes that are read."""
 _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those of a copy
 
 
 class Brought(NamedTuple):
-    """The shapes of a file.
+    """The shapes of a file."""
 
-    Args:
-        shapes: what each element is made of, by its name; the whole comes last.
-        numbers: of the parts in the file, from 1, by the names of their elements.
-        group: the parts that it has, none where nothing is known of them but their shape.
-        notes: what there is to say of the file.
-    """
-
-    shapes: dict[str, Shape]
-    numbers: dict[str, int]
-    group: Group
-    notes: tuple[str, ...]
+    shapes: dict[str, Shape]  # what each element is made of, by its name; the whole comes last
+    numbers: dict[str, int]  # of the parts in the file, from 1, by the names of their elements
+    group: Group  # the parts, none where nothing is known of them but their shape
+    notes: tuple[str, ...]  # what there is to say of the file
 
 
 def brought(
     data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
 ) -> Brought:
-    """Read shapes from the bytes of a file.
+    """Read shapes from the bytes of a file with a suffix of `MOST_OF`.
 
     Args:
-        suffix: one that `scenelang.drawing.exact.mesh` or `scenelang.drawing.exact.outline` reads.
         name: of the whole.
-        files: those that it names, as `scenelang.inverse.sandbox` finds them.
+        files: those that it names, by the names that it has for them.
         apart: whether its parts are elements of their own; if left out, those of drawings are.
     """
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
-    result, notes = solids.read_solids(data, suffix, files)
+    result, notes = meshes.read_solids(data, suffix, files)
     shapes = solid_parts(result, name, sign, bool(apart))
     return shapes._replace(notes=(*shapes.notes, *notes))
 
@@ -74,9 +66,9 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
         if layers:
             return Outline(layers[0])
     else:
-        result, _ = solids.read_solids(data, suffix)
+        result, _ = meshes.read_solids(data, suffix)
         if number <= len(result):
-            return solids.whole(result[number - 1 : number] if number else result, sign)
+            return meshes.whole(result[number - 1 : number] if number else result, sign)
     raise FitError(f"it has no part {number}")
 
 
@@ -86,22 +78,18 @@ def said(text: str) -> str:
 
 
 def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
-    """Shapes of a file of meshes.
-
-    Args:
-        name: of the whole.
-        apart: whether its solids are elements of their own.
-    """
-    whole = solids.whole(parts, sign)
+    """Shapes of a file of meshes, ``apart`` if its solids are elements of their own."""
+    whole = meshes.whole(parts, sign)
     if not apart or len(parts) < 2:
-        return Brought({name: whole}, {}, _alone(name, whole), whole.notes)
+        alone = Part(name, (0.0, 0.0, 0.0), 1.0, (), *_worn(whole.look, name))
+        return Brought({name: whole}, {}, () if whole.look is None else (alone,), whole.notes)
     _few(len(parts))
     shapes: dict[str, Shape] = {}
     numbers = {}
     firsts: list[tuple[Solid, Mesh, str]] = []
     group = []
     for number, solid in enumerate(parts, 1):
-        mesh = solids.whole([solid], sign)
+        mesh = meshes.whole([solid], sign)
         rows, centre, size = np.eye(3), np.array(mesh.centre), mesh.size
         for first, like, called in firsts:  # noqa: B007, a copy goes by the first one's name
             if (copy := _copy(first, solid)) is not None:
@@ -118,11 +106,6 @@ def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Broug
         place = tuple(((centre - whole.centre) / whole.size).tolist())
         group.append(Part(called, place, size / whole.size, turn, *_worn(mesh.look, called)))
     return Brought({**shapes, name: whole}, numbers, tuple(group), whole.notes)
-
-
-def _alone(name: str, mesh: Mesh) -> Group:
-    colour, material = _worn(mesh.look, name)
-    return (Part(name, (0.0, 0.0, 0.0), 1.0, (), colour, material),) if mesh.look is not None else ()
 
 
 def _worn(look: Look | None, name: str) -> tuple[Painted, str]:
@@ -187,10 +170,6 @@ def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
     """The true shapes of the elements that a scene shows, by geometry.
 
     Their files lie in the folder that the environment's `FOLDER` names, or beside the file of elements.
-
-    Args:
-        scene: where the elements are from.
-        graph: of the scene.
 
     Raises:
         FitError: a file is not there or another, or what reads it is not installed.

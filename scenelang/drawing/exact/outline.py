@@ -2,9 +2,7 @@
 
 A shape is a union of layers: filled areas, and strokes of their drawn width with round joins and ends. A
 texture is stored as lossless WebP, which suits drawings, or as an AV1 still picture, whose quality is
-searched by halving. Other formats were measured and are larger (docs/training-log.md, Textures).
-
-Needs svgelements, which reads drawings, contourpy, which traces pictures, and scipy.
+searched by halving.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
 
@@ -37,36 +35,25 @@ _PROFILED: Final = "CMYK", "RGB", "L"  # modes whose colours a profile tells of
 
 
 class Picture(NamedTuple):
-    """A picture that is to be a texture.
+    """A picture that is to be a texture."""
 
-    Args:
-        colours: (h, w, 3), sRGB-encoded, 8 bits, the first row at the top.
-        notes: what was found and changed.
-    """
-
-    colours: npt.NDArray[np.uint8]
-    notes: tuple[str, ...] = ()
+    colours: npt.NDArray[np.uint8]  # (h, w, 3), sRGB-encoded, the first row at the top
+    notes: tuple[str, ...] = ()  # what was found and changed
 
 
 class Coded(NamedTuple):
-    """A form that was tried.
+    """A form that was tried."""
 
-    Args:
-        form: what it is called.
-        error: root mean square off, of channels in [0, 1].
-    """
-
-    form: str
+    form: str  # its name
     bytes: int
-    error: float
+    error: float  # root mean square off, of channels in [0, 1]
 
 
 @contextmanager
 def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
     """A picture of at most so many pixels (.png, .jpg), which it says before anything is decoded.
 
-    Raises:
-        FitError: it is damaged, another kind of file or too large; also of what is done with it.
+    Raises `FitError` where it is damaged, another kind of file or too large; also of what is done with it.
     """
     try:
         with warnings.catch_warnings():
@@ -87,11 +74,7 @@ def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
 
 
 def read_picture(data: bytes, side: int = TEXELS) -> Picture:
-    """Read a picture (.png, .jpg): turned as its EXIF says, in sRGB, laid over white, made smaller.
-
-    Args:
-        side: most texels along the longer side.
-    """
+    """Read a picture (.png, .jpg): turned as its EXIF says, in sRGB, laid over white, of at most a side."""
     with opened(data) as file:
         notes = [f"{file.width} × {file.height} pixels"]
         image = ImageOps.exif_transpose(file)
@@ -169,7 +152,10 @@ def fit_picture(
             ended = "steps"
             break
         quality = (low + high) // 2
-        element = _still(name, picture.colours, quality)
+        file = io.BytesIO()  # an AV1 still picture, with as many samples of colour as of light
+        still = {"quality": quality, "subsampling": "4:4:4", "speed": 6, "max_threads": 1}
+        Image.fromarray(picture.colours).save(file, "AVIF", **still)
+        element = Element(name, "picture", best.sizes, "av1", frame_of(file.getvalue()))
         if (off := measured(element, f"quality {quality}")) > asked:
             low = quality + 1
             if len(element.data) >= len(best.data):
@@ -180,14 +166,6 @@ def fit_picture(
                 best, error = element, off
     said = {**(about or {}), "error": error, "steps": len(tried), "ended": ended}
     return Element(name, "picture", best.sizes, best.coding, best.data, said), tried
-
-
-def _still(name: str, colours: npt.NDArray[np.uint8], quality: int) -> Element:
-    """An AV1 still picture, with as many samples of colour as of light."""
-    file = io.BytesIO()
-    image = Image.fromarray(colours)
-    image.save(file, "AVIF", quality=quality, subsampling="4:4:4", speed=6, max_threads=1)
-    return Element(name, "picture", colours.shape[:2], "av1", frame_of(file.getvalue()))
 
 
 MOST_EDGES: Final = 200_000
@@ -202,27 +180,21 @@ Inside = Callable[[Points], npt.NDArray[np.bool_]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """The area on one side of edges, or near them.
-
-    Args:
-        edges: (E, 2, 2).
-        inside: tells of points (M, 2) whether the layer covers them; None of a stroke.
-        half: of a stroke's width.
-        color: sRGB, 0 to 1; empty where it has none.
-    """
+    """The area on one side of edges, or near them."""
 
     edges: Edges
-    inside: Inside | None
-    half: float = 0.0
-    color: Painted = ()
+    inside: Inside | None  # tells of points (M, 2) whether the layer covers them; None of a stroke
+    half: float = 0.0  # of a stroke's width
+    color: Painted = ()  # sRGB, 0 to 1; empty where it has none
+
+    def box(self) -> tuple[Points, Points]:
+        """The least and the greatest coordinates."""
+        return self.edges.min((0, 1)) - self.half, self.edges.max((0, 1)) + self.half
 
     def touches(self, other: Layer) -> bool:
         """True where the boxes around both share a point."""
-        boxes = [
-            (layer.edges.min((0, 1)) - layer.half, layer.edges.max((0, 1)) + layer.half)
-            for layer in (self, other)
-        ]
-        return bool((boxes[0][0] <= boxes[1][1]).all() and (boxes[1][0] <= boxes[0][1]).all())
+        (a, b), (c, d) = self.box(), other.box()
+        return bool((a <= d).all() and (c <= b).all())
 
     def pieces(self) -> Edges:
         """Edges cut to `PIECE`, of a filled area those with just one side in it."""
@@ -276,12 +248,8 @@ class Outline:
             raise FitError("all of it lies at one point")
         self._layers = []
         for layer in layers:
-            moved = replace(
-                layer,
-                edges=(layer.edges - middle) / self.size,
-                inside=None if layer.inside is None else _moved(layer.inside, middle, self.size),
-                half=layer.half / self.size,
-            )
+            inside = None if layer.inside is None else _moved(layer.inside, middle, self.size)
+            moved = Layer((layer.edges - middle) / self.size, inside, layer.half / self.size)
             if len(pieces := moved.pieces()):
                 self._layers.append((moved, pieces, cKDTree(pieces.mean(1))))
         if not self._layers:
@@ -322,18 +290,11 @@ class Outline:
         return result
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, 2) spread evenly on the outline, K at most ``count``, and outward normals.
-
-        Also the share of the outline that has no inside on either side.
-
-        Raises:
-            FitError: nothing is thick enough to have an outline.
-        """
+        """As `Shape.surface`; raises `FitError` where nothing is thick enough to have an outline."""
         random, points, normals = np.random.default_rng(1), [], []
         for layer, pieces, _ in self._layers:
             way = _normals(pieces)
-            sides = (1, -1) if layer.inside is None else (1,)
-            for side in sides:
+            for side in (1, -1) if layer.inside is None else (1,):
                 points.append(pieces.mean(1) + side * layer.half * way)
                 normals.append(side * way)
         all_points, all_normals = np.concatenate(points), np.concatenate(normals)
@@ -401,10 +362,7 @@ def read_outline(data: bytes, suffix: str) -> Outline:
 
 
 def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
-    """The layers of a drawing in the order of painting, y up, and what there is to say of it.
-
-    Gradients are their mean colours, what is not opaque is mixed with white.
-    """
+    """The layers of a drawing in the order of painting, y up, and what there is to say of it."""
     with needed("svgelements"):
         import svgelements
     try:  # a reader of a large format, which a stranger's file may break in many ways
@@ -435,22 +393,17 @@ def _simplified(root: Any, svg: Any) -> list[str]:
         raise FitError(f"paths and styles of more than {_MOST_SAID:,} letters")
     if _drawn(root, named) > _MOST_DRAWN:
         raise FitError(f"a drawing of more than {_MOST_DRAWN:,} elements")
-    means = {
-        element.get("id"): _mean(element, named, svg) for element, tag in result if tag.endswith("Gradient")
-    }
+    gradients = [element for element, tag in result if tag.endswith("Gradient")]
+    means = {element.get("id"): _mean(element, named, svg) for element in gradients}
     notes = [f"{said} left out" for tag, said in _UNSEEN.items() if any(tag == t for _, t in result)]
     notes += ["gradients in their mean colours"] if means else []
     notes += ["patterns left out"] if any(tag == "pattern" for _, tag in result) else []
-
-    def meant(match: re.Match[str]) -> str:
-        return means.get(match[1], "none")
-
     for element, _ in result:
         for key in ("fill", "stroke", "style"):
             if key in element.attrib:
-                element.set(key, _PAINT.sub(meant, element.get(key)))
+                element.set(key, _PAINT.sub(lambda match: means.get(match[1], "none"), element.get(key)))
         if element.text and "url(" in element.text:
-            element.text = _PAINT.sub(meant, element.text)
+            element.text = _PAINT.sub(lambda match: means.get(match[1], "none"), element.text)
     for element, _ in result:
         opacity = _opacity(element)
         for child in list(element):
@@ -468,10 +421,7 @@ def _simplified(root: Any, svg: Any) -> list[str]:
 
 
 def _drawn(root: Any, named: dict[str, Any]) -> int:
-    """Number of elements that svgelements visits; one that is used twice counts twice.
-
-    A use of itself counts as too many.
-    """
+    """Number of elements that svgelements visits; a use of itself counts as too many."""
     counts: dict[Any, int] = {}
     waiting = [(root, False)]
     while waiting:

@@ -1,7 +1,6 @@
 """The exact picture of a scene and its outputs, in float64: the definition that accuracy is measured against.
 
-It is drawn from the graph as written (`scenelang.compiler.lower`), before any pass, so that it checks the
-compiler too. No renderer imports it.
+It is drawn from the graph as written, before any pass, so that it checks the compiler too.
 """
 
 from __future__ import annotations
@@ -70,14 +69,7 @@ def check_shapes(graph: Graph, brought: Brought | None) -> None:
 
 
 def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
-    """All outputs that a lowered graph has.
-
-    Args:
-        brought: shapes of elements.
-
-    Raises:
-        ValueError: as `reference_image`.
-    """
+    """All outputs that a lowered graph has; raises as `reference_image`."""
     check_shapes(graph, brought)
     width, height = graph.canvas
     result = np.zeros((6, height, width))  # depth, normal, object and alpha

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Ground, Light, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Stage
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp
 from scenelang.drawing.exact.field import (
     Array,
@@ -26,10 +26,13 @@ from scenelang.drawing.exact.field import (
     carry_back,
     colour_at,
     distance_scale,
+    folded,
     leaf_distance,
+    placed_leaves,
     sample_points,
 )
 from scenelang.drawing.image import Image, from_light
+from scenelang.language.words import TOKENS
 
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by
@@ -48,21 +51,15 @@ class Map(NamedTuple):
     shift: Array
     grows: float
 
-    @staticmethod
-    def back(matrix: Array) -> Map:
-        """The way back through a 4 x 4 matrix."""
-        inverse: Array = np.linalg.inv(matrix[:3, :3])
-        return Map(inverse, -inverse @ matrix[:3, 3:], float(np.linalg.norm(inverse, 2)))
-
     def __call__(self, p: Array) -> Array:
         return self.inverse @ p + self.shift
 
     def stretch(self, most: Array | float) -> float:
-        """The largest stretch; it is the same everywhere."""
+        """As `Turn.stretch`."""
         return self.grows
 
     def pull(self, p: Array, g: Array) -> Array:
-        """A gradient after the map as the one before it, at p."""
+        """As `Turn.pull`."""
         return self.inverse.T @ g
 
 
@@ -115,26 +112,27 @@ def way_back(steps: Sequence[Step]) -> Any:
     """Maps and turns, the world's first, which is a map; neighbouring affine maps are one."""
     back: list[Map | Turn] = []
     pending = np.eye(4)
+
+    def affine() -> Map:
+        inverse: Array = np.linalg.inv(pending[:3, :3])
+        return Map(inverse, -inverse @ pending[:3, 3:], float(np.linalg.norm(inverse, 2)))
+
     for step in reversed(steps):
         if isinstance(step, Affine):
             pending = pending @ np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)])
         elif not isinstance(step, Displace):
             if not back or (pending != np.eye(4)).any():
-                back.append(Map.back(pending))
+                back.append(affine())
                 pending = np.eye(4)
             slope = (0.0, step.twist, 0.0) if isinstance(step, Twist) else (*step.bend, 0.0)
             back.append(Turn(1, step.twirl, slope) if isinstance(step, Warp) else Turn(2, 0.0, slope))
-    return back if back and (pending == np.eye(4)).all() else [*back, Map.back(pending)]
+    return back if back and (pending == np.eye(4)).all() else [*back, affine()]
 
 
 class Body:
-    """A leaf with all steps into the world.
+    """A leaf of linear colours with all steps into the world, nearest the leaf first.
 
-    Args:
-        leaf: its own look and geometry; colours are linear.
-        steps: nearest the leaf first.
-        margin: the ball holds every point whose distance is below it, in world units.
-        brought: shapes of elements.
+    Its ball holds every point whose distance is below a margin, in world units.
     """
 
     def __init__(
@@ -228,23 +226,14 @@ _MARGIN = 2e-2
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """State of a fold: distance (M,), whether the material is a medium, and optional values.
+    """State of a fold, and optional values."""
 
-    Args:
-        d: distance.
-        medium: a bool, or an array (M,).
-        near: no nearer than this does the kind of material change inside.
-        rgb: linear colour, (3, 1) or (3, M).
-        slope: gradient of d, (3, M).
-        owner: number of the object whose material holds, from 1.
-    """
-
-    d: Any
-    medium: Any
-    near: Any = None
-    rgb: Any = None
-    slope: Any = None
-    owner: Any = None
+    d: Any  # distance (M,)
+    medium: Any  # whether the material is one: a bool, or an array (M,)
+    near: Any = None  # no nearer than this does the kind of material change inside
+    rgb: Any = None  # linear colour, (3, 1) or (3, M)
+    slope: Any = None  # gradient of d, (3, M)
+    owner: Any = None  # number of the object whose material holds, from 1
 
     def kind(self) -> npt.NDArray[np.int8]:
         """`OUT`, `MEDIUM` or `OPAQUE`, (M,)."""
@@ -257,22 +246,11 @@ NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), n
 
 def join(op: str, k: float, a: State, b: State) -> State:
     """One step of the fold; of two operands of equal distance the gradient is the later's."""
+    d, paint, turn = folded(np, TOKENS[op], k, a.d, b.d)
     near = None if a.near is None or b.near is None else np.minimum(a.near, b.near)
-    paint: Any = None
-    side = 1.0
-    if op == "union":
-        d, paint, turn = np.minimum(a.d, b.d), b.d < np.maximum(a.d, 0.0), b.d <= a.d
-    elif op == "smooth":
-        h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0.0, 1.0)
-        d, paint, turn = (1.0 - h) * a.d + h * b.d - k * h * (1.0 - h), h, h
-        near = None if near is None else np.minimum(near, abs(a.d - b.d) / 2.0)
-    else:
-        side = -1.0 if op == "subtract" else 1.0
-        cut = side * b.d
-        d, turn = np.maximum(a.d, cut), cut >= a.d
-        if k:
-            h = np.clip(0.5 + 0.5 * (cut - a.d) / k, 0.0, 1.0)
-            d, turn = (1.0 - h) * a.d + h * cut + k * h * (1.0 - h), h
+    if near is not None and op == "smooth":
+        near = np.minimum(near, abs(a.d - b.d) / 2.0)
+    side = -1.0 if op == "subtract" else 1.0
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
         return State(d, a.medium, near, a.rgb, slope, a.owner)
@@ -283,17 +261,11 @@ def join(op: str, k: float, a: State, b: State) -> State:
 
 
 class Field:
-    """The objects of a graph's root, with every step into the world.
-
-    Folds may nest; the boolean rule is not needed.
-
-    Args:
-        brought: shapes of elements.
-    """
+    """The objects of a graph's root, with every step into the world."""
 
     def __init__(self, root: Fold, brought: Brought | None = None) -> None:
         self.root = root
-        result = list(_leaves(root))
+        result = list(placed_leaves(root))
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
@@ -306,20 +278,13 @@ class Field:
         self.mixed = len(kinds) > 1
         self.media = True in kinds
 
-    def spans(self, o: Array, d: Array) -> Array:
-        """`Body.span` of all objects, (3, N, M)."""
-        spans = np.empty((3, len(self.bodies), o.shape[1]))
-        for index, body in enumerate(self.bodies):
-            spans[:, index] = body.span(o, d)
-        return spans
-
     def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
         """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each.
 
         Args:
             p: world points (3, M).
             met: (N, M), in which objects' balls they lie; the others count as far away.
-            speed: (N, M), as `spans` tells, of the rays on which they lie.
+            speed: (N, M), as `Body.span` tells, of the rays on which they lie.
         """
         count = p.shape[1]
         fastest, most = np.full(count, 1e-9), np.full(count, FAR)
@@ -367,18 +332,6 @@ def _fold(node: Node, known: Callable[[], State]) -> State:
     return state
 
 
-def _leaves(
-    node: Node, outer: tuple[Step, ...] = (), taken: bool = False
-) -> Iterator[tuple[Leaf, tuple[Step, ...], bool]]:
-    """Leaves in order with all their steps, and whether a `subtract` takes them away."""
-    steps = (*(move.step for move in node.moves), *outer)
-    if isinstance(node, Leaf):
-        yield node, steps, taken
-    else:
-        for at, link in enumerate(node.links):
-            yield from _leaves(link.node, steps, taken or (at > 0 and link.op == "subtract"))
-
-
 def _blends(fold: Fold) -> Iterator[float]:
     """Widths of all blends."""
     for at, link in enumerate(fold.links):
@@ -396,27 +349,17 @@ Kinds = npt.NDArray[np.int8]
 
 
 class Changes(NamedTuple):
-    """Changes of material along M rays, up to their end or the first opaque surface.
+    """Changes of material along M rays, up to their end or the first opaque surface."""
 
-    Args:
-        first, last: the kind where each starts and where it ends, (M,).
-        ray, t: of each change the ray and the place, (K,), in order along each ray.
-        before, after: kinds, (K,).
-    """
-
-    first: Kinds
-    last: Kinds
-    ray: Ints
-    t: Array
+    first: Kinds  # where each ray starts (M,)
+    last: Kinds  # where it ends
+    ray: Ints  # of each change (K,)
+    t: Array  # its place, in order along each ray
     before: Kinds
     after: Kinds
 
     def media(self, end: Array) -> tuple[Ints, Array, Array]:
-        """Stretches of rays inside media: ray, where it enters and where it leaves, in order along each ray.
-
-        Args:
-            end: where the rays end, (M,).
-        """
+        """Stretches in media of rays with ends (M,): ray, entry and exit, in order along each ray."""
 
         def sorted_(edge: Kinds, kinds: Kinds, at: Array) -> tuple[Ints, Array]:
             whole, part = np.nonzero(edge == MEDIUM)[0], kinds == MEDIUM
@@ -429,15 +372,13 @@ class Changes(NamedTuple):
 
 
 def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
-    """Follow rays o + t d, t from 0 to ``end``, until they end or meet something opaque.
+    """Follow rays o + t d, t from 0 to ``end`` (M,), until they end or meet something opaque.
 
-    Args:
-        field: of the scene.
-        o, d: origins and unit directions, (3, M).
-        end: (M,), may be infinite.
-        exact: places to 1e-9 or so; otherwise to about 1e-6.
+    Places are found to 1e-9 or so if ``exact``, otherwise to about 1e-6.
     """
-    enter, leave, speed = field.spans(o, d)
+    enter, leave, speed = spans = np.empty((3, len(field.bodies), o.shape[1]))
+    for index, body in enumerate(field.bodies):
+        spans[:, index] = body.span(o, d)
     leave = np.minimum(leave, end)
     enter = np.where(leave > np.maximum(enter, 0.0), enter, np.inf)
     first, last = np.full(o.shape[1], OUT, np.int8), np.full(o.shape[1], OUT, np.int8)
@@ -505,18 +446,7 @@ def solid_image(
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
-    """Draw the exact picture of a scene of solids.
-
-    Args:
-        root: of a lowered graph, its looks in linear colours.
-        stage: the rest of the scene.
-        canvas: width and height in pixels.
-        per_side: samples along each side of a pixel; 2 is the definition (4 spp).
-        brought: shapes of elements.
-        progress: called with the share done, in [0, 1].
-
-    Returns:
-        (H, W, 3), or (H, W, 4) with straight alpha where the stage is transparent.
+    """Draw the exact picture of a scene of solids, as `reference_image` does.
 
     Raises:
         ValueError: the stage has a fault, or the eye is inside something opaque.
@@ -537,15 +467,25 @@ def solid_image(
 
 def radiance(field: Field, stage: Stage, d: Array) -> Array:
     """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M)."""
-    behind = np.concatenate([_sky(stage, d), np.full((1, d.shape[1]), not stage.transparent)])
+    behind = np.zeros((4, d.shape[1]))
+    if not stage.transparent:
+        horizon, zenith = np.reshape(stage.horizon, (3, 1)), np.reshape(stage.zenith, (3, 1))
+        behind[:3] = horizon + (zenith - horizon) * np.clip(d[1] / 0.5, 0.0, 1.0)
+        behind[3] = 1.0
     o, end, changes = seen_along(field, stage, d)
     if stage.ground:
         seen = np.nonzero((end < np.inf) & (changes.last != OPAQUE))[0]
-        behind[:3, seen] = _ground(field, stage, stage.ground, o[:, seen] + end[seen] * d[:, seen])
+        p = o[:, seen] + end[seen] * d[:, seen]
+        upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
+        shade = np.reshape(stage.ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
+        clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
+        behind[:3, seen] = clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
         behind[3, seen] = 1.0
     hit = changes.after == OPAQUE
     seen, end[changes.ray[hit]] = changes.ray[hit], changes.t[hit]
-    behind[:3, seen] = _surface(field, stage.light, o[:, seen] + end[seen] * d[:, seen], d[:, seen])
+    p = o[:, seen] + end[seen] * d[:, seen]
+    state, normal = facing(field, p, d[:, seen])
+    behind[:3, seen] = state.rgb * _received(field, stage.light, p, normal)
     behind[3, seen] = 1.0
     if not field.media:
         return behind
@@ -590,27 +530,6 @@ def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
     return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
 
 
-def _sky(stage: Stage, d: Array) -> Array:
-    if stage.transparent:
-        return np.zeros(d.shape)
-    horizon, zenith = np.reshape(stage.horizon, (3, 1)), np.reshape(stage.zenith, (3, 1))
-    return horizon + (zenith - horizon) * np.clip(d[1] / 0.5, 0.0, 1.0)
-
-
-def _ground(field: Field, stage: Stage, ground: Ground, p: Array) -> Array:
-    """Light from points of the ground, faded into the horizon."""
-    upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
-    shade = np.reshape(ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
-    clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
-    return clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
-
-
-def _surface(field: Field, light: Light, p: Array, d: Array) -> Array:
-    """Light from points of solids to where the directions d come from."""
-    state, normal = facing(field, p, d)
-    return state.rgb * _received(field, light, p, normal)
-
-
 def _received(field: Field, light: Light, p: Array, normal: Array) -> Array:
     """Light (3, M) that surfaces of a normal receive, ambient and direct."""
     way = np.reshape(light.position, (3, 1)) - p
@@ -636,13 +555,9 @@ def _visible(field: Field, light: Light, p: Array) -> Array:
 def _scattered(
     field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
 ) -> Array:
-    """Light (3, K) that parts of rays inside media scatter to where the rays come from.
+    """Light (3, K) that parts of rays o + t d inside media scatter to where the rays come from.
 
-    Args:
-        o, d: the rays, (3, K).
-        enter: where each part begins.
-        depth: optical depth of each part.
-        weight: transmittance from the eye to where it begins.
+    Each begins at ``enter``, with an optical depth and the transmittance ``weight`` from the eye to there.
     """
     opaque = -np.expm1(-depth)
 

@@ -1,20 +1,419 @@
-"""Solids to pictures and outputs: bands of pixels, and samples where they are needed."""
+"""Light on solids: surfaces, ground, sky and media along rays, and pictures and outputs of them.
+
+The light is computed, as the language defines it; places and colours of solids are learned. Pictures are
+drawn in bands of pixels, with more samples where they are needed. Letters as in `network.py`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from scenelang.compiler.program import ProgramError
-from scenelang.compiler.spaces import EXTINCTION, Camera, Stage
-from scenelang.drawing.arrays import Array
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Camera, Stage
+from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light
-from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.light import INTO, Lighting
-from scenelang.drawing.solid.march import CAREFUL, Pace, Trail, Work, march
+from scenelang.drawing.solid.field import Meeting, SolidField
+from scenelang.drawing.solid.march import CAREFUL, STEPS, Pace, Piece, Trail, Work, march
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.passes import INF
+from scenelang.drawing.solid.passes import BEGIN, END, INF, Passes
+
+INTO = 3e-5  # world units behind a surface where its material is asked for
+EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
+BUSY = 8.0  # texels that a piece may cross with `FEW` panels of two points each
+FEW, MANY = 4, 12
+CHUNK = 1024  # pieces of which textures are looked up at once
+PIXELS = 4096  # on surfaces, likewise
+GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
+
+
+CLEAR = 2e-4  # world units before a surface where rays from the light end
+PARTS = 3  # of pieces of which nodes do not tell enough
+LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
+JUMP = 0.03  # linear: of colours that differ
+LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its colour is asked for
+HALVINGS = 8  # of the way between
+HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
+LONG = 2.0  # world units: longer pieces are cut
+STEEP = 1.2  # how much more light the last node may get than the first
+NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
+CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
+
+
+class Shade(NamedTuple):
+    """Light along M rays."""
+
+    radiance: Array  # premultiplied and linear (3, M)
+    plain: Array  # the same with plain colours for those of textures
+    alpha: Array  # (M,)
+    work: Work
+
+
+class Points(NamedTuple):
+    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it.
+
+    The latter two are (R, K), colours and, of fields with textures, plain colours.
+    """
+
+    p: Array
+    base: Array
+    more: Array
+
+
+class Lighting:
+    """A field under the light of its stage, drawn at a pace."""
+
+    def __init__(self, field: SolidField, stage: Stage, pace: Pace = CAREFUL) -> None:
+        self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
+        like = field.network.codes
+        twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
+        forward, right, up = np.asarray(stage.camera.axes())
+        # the samples of a pixel; the sides of pixels, px, are those of a picture that is 2 wide
+        four = [across * right + along * up for along in (0.25, -0.25) for across in (-0.25, 0.25)]
+        self.eye, self.lamp, self.power, self.horizon, self.zenith, self._forward, self._four = (
+            field.xp.array(np.asarray(value, np.float32), like)
+            for value in (
+                stage.camera.eye,
+                stage.light.position,
+                [stage.light.power * c for c in stage.light.rgb] * twice,
+                stage.horizon * twice,
+                stage.zenith * twice,
+                forward * np.tan(stage.camera.fov_rad / 2),
+                np.transpose(four)[:, :, None],
+            )
+        )
+
+    def shade(self, way: Array, px: float = 0.0) -> Shade:
+        """Light along rays from the eye, whose unit directions are (3, M).
+
+        Textures are looked up four times for pixels of a side px, of a picture that is 2 wide; once for 0.
+        """
+        xp, stage = self.xp, self.stage
+        high, limit = (way[1] * 2).clip(0.0, 1.0), self.limit(way)
+        seen = self.horizon[:, None] + (self.zenith - self.horizon)[:, None] * high
+        alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
+        if stage.transparent:
+            seen = seen * 0
+        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
+        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+        both, result = xp.concat([surface, floor], 0), []
+        work = trail.work + Work(rays=way.shape[1], met=len(surface))
+        if len(surface):
+            result.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
+        if len(floor):
+            result.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+        mist = None
+        if trail.pieces:
+            pieces = self._cut(way, self._parted(trail))
+            mist, share = self._scattering(way, trail, pieces, px)
+            result.append(mist)
+        if not result:
+            return Shade(seen[:3], seen[-3:], alpha, work)
+        points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
+        light, free, more = self._lit(points, xp.take(trail.soft, surface), trail)
+        work += more
+        xp.put(seen, both, light[:, : len(both)])
+        xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
+        if mist is not None:
+            lit = light[:, len(both) :], free[len(both) :]
+            glow, more = self._glow(way, trail, pieces, share, *lit, px)
+            clear = xp.exp(-EXTINCTION * trail.length)
+            seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
+        return Shade(seen[:3], seen[-3:], alpha, work)
+
+    def _glow(
+        self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array, px: float
+    ) -> tuple[Array, Work]:
+        """Light (R, M) that pieces of rays in media send towards the eye.
+
+        Those whose nodes do not tell how the light goes on between them are cut and asked again.
+
+        Args:
+            share: what pieces have of what is seen (P,).
+            light: what nodes on them send (R, K).
+            free: whether any light reaches those (K,).
+        """
+        xp, count, work = self.xp, self.pace.nodes, Work(met=light.shape[1])
+        glow = xp.full((len(light), way.shape[1]), 0.0, way)
+        sent, nodes = light.reshape(len(light), count, -1), free.reshape(count, -1)
+        shown = sent[-3:].sum(0)
+        edge = (nodes != nodes[:1]).sum(0) > 0
+        cut = (edge | (shown[-1] > STEEP * shown[0]) | (pieces[2] - pieces[1] > LONG)) & (share > LEAST)
+        whole, parts = xp.where(~cut), xp.where(cut)
+        xp.add(glow, xp.take(pieces[0], whole), xp.take(sent.sum(1), whole))
+        if len(parts):
+            ray, begin, end, before = (xp.take(part, parts) for part in pieces)
+            each = (end - begin) / PARTS
+            finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
+            pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
+            light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0], trail)
+            work += more + Work(met=light.shape[1])
+            xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
+        return glow, work
+
+    def limit(self, way: Array) -> Array:
+        """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
+        xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
+        if ground is None or eye[1] <= ground.y:
+            return never
+        down = way[1] < 0
+        return xp.select(down, (ground.y - eye[1]) / xp.select(down, way[1], way[1] * 0 - 1), never)
+
+    def _reflecting(self, p: Array, n: Array, colour: Array, haze: Array) -> Points:
+        """Surface points (3, K) with unit normals and colours, and light that joins in before."""
+        to = self.lamp[:, None] - p
+        r = _length(self.xp, to).clip(NEAREST)
+        facing = (_dot(n, to) / r).clip(0.0)
+        base = colour * (AMBIENT[0] + AMBIENT[1] * n[1]) + haze
+        return Points(p + LIFT * n, base, colour * self.power[:, None] * (facing / (r * r)))
+
+    def _scattering(self, way: Array, trail: Trail, pieces: Piece, px: float) -> tuple[Points, Array]:
+        """Nodes in media, whose light comes towards the eye, all pieces for each in turn, and shares (P,).
+
+        With u = 1 - T^(1 / EVEN), the integral over T sigma dt is one over EVEN (1 - u)^(EVEN - 1) du. Where
+        light fades as T does, three nodes are exact.
+        """
+        xp, (ray, begin, end, before) = self.xp, pieces
+        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
+        nodes, weights = (
+            xp.array(values[:, None].astype(np.float32), way)
+            for values in np.polynomial.legendre.leggauss(self.pace.nodes)
+        )
+        nodes, weights = (nodes + 1) / 2, weights / 2
+        left = 1 - nodes * taken
+        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (nodes, P)
+        weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before))
+        rays = xp.concat([ray] * self.pace.nodes, 0)
+        p = self.eye[:, None] + xp.take(way, rays) * t
+        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:-1] * weight.reshape(-1)
+        for index, node, woven in self._textured(way, trail, pieces, px):
+            xp.put(colour[:3], index + node * len(ray), woven)
+        r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
+        points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
+        return points, weight.sum(0)
+
+    def _lit(self, points: Points, soft: Array, seen: Trail) -> tuple[Array, Array, Work]:
+        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
+
+        Args:
+            soft: of the first points, 1 where they are not at a distance of 0 though something begins there.
+            seen: the trail of the rays from the eye that met the points.
+        """
+        xp, (p, light, more) = self.xp, points
+        lit = xp.where(abs(more).sum(0) > 0)
+        way = xp.take(p, lit) - self.lamp[:, None]
+        r = _length(xp, way)
+        edge = 0 * p[0]
+        edge[: len(soft)] = soft
+        edge = xp.take(edge, lit) > 0
+        limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
+        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, True, steps)
+        clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
+        inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
+        if len(inside):  # rays may have ended before they met what is opaque there
+            at = self.field.meet(trail.at(xp, inside), xp.take(r, inside), Wanted.KIND)
+            opaque = (at.distance < 0) & (at.register[0] < 0.5)
+            xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
+        xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
+        free = 0 * p[0] > 1
+        xp.put(free, lit, clear > 0)
+        return light, free, trail.work + Work(lights=len(lit))
+
+    def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
+        """Points where rays meet solids, normals (3, K), colours, and light from before them (R, K)."""
+        xp = self.xp
+        t = xp.take(trail.hit, index)
+        passes = trail.at(self.xp, index)
+        result = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
+        sharp = xp.take(trail.soft, index) == 0
+        off = xp.where(sharp & (abs(result.distance) > 3 * INTO))
+        if len(off):  # where the distances on both sides of the surface said little about it
+            t_off = xp.take(t, off) + INTO + self._ahead(result, way, off)
+            again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
+            there = xp.where(_dot(again.gradient, again.gradient) > 0.01)  # not past an edge
+            off = xp.take(off, there)
+            xp.put(t, off, xp.take(t_off, there) - INTO)
+            for name in ("distance", "register", "gradient"):
+                xp.put(getattr(result, name), off, xp.take(getattr(again, name), there))
+        g = result.gradient
+        towards = _dot(g, way)
+        t = t + sharp * (INTO + self._ahead(result, way, None))
+        p = self.eye[:, None] + way * t
+        n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
+        colour = result.register[:-1]
+        for soft in (False, True) if px and self.field.textures else ():
+            some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
+            if len(some):
+                ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
+                mean = self._mean(passes.at(xp, some), ways, ts, ns, soft, px)
+                xp.put(colour[:3], some, mean)
+        return p, n, colour, 0 * colour
+
+    def _ahead(self, met: Meeting, way: Array, index: Array | None) -> Array:
+        """Distance along rays from the points where the field was asked to the surface."""
+        xp, d, g = self.xp, met.distance, met.gradient
+        if index is not None:
+            d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
+        towards = _dot(g, way)
+        # along a surface, at a cosine over -0.02, the distance says nothing of how far ahead it is
+        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
+
+    def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
+        """As `surface`, of the ground at t (K,)."""
+        xp, ground = self.xp, self.stage.ground
+        assert ground is not None
+        p = self.eye[:, None] + way * t
+        n = p * 0
+        n[1] = 1.0
+        kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
+        rgb = np.tile(np.asarray(ground.rgb, np.float32), len(self.horizon) // 3)
+        colour = xp.array(rgb, p)[:, None]
+        return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
+
+    def _parted(self, trail: Trail) -> Piece:
+        """The ways of rays through media, cut where one medium's colour gives way to another's."""
+        xp, field = self.xp, self.field
+        ray, begin, end, before = piece = tuple(
+            xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True)
+        )
+        slots = trail.at(xp, ray).slots
+        several = ((slots[BEGIN] < end) & (slots[END] > begin)).sum(0) > 1
+        some = xp.where(several)
+        if not field.coloured or not len(some):
+            return piece
+        result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
+        ray, begin, end, before = (xp.take(part, some) for part in piece)
+        passes = trail.at(xp, ray)
+        places = [begin + (end - begin) * share for share in LOOKS]
+        seen = [field.meet(passes, t, Wanted.ALL).register[-4:] for t in places]
+        steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
+        which = xp.concat(steps, 0)
+        low, high, first, last = (
+            xp.concat([xp.take(part, step) for part, step in zip(parts, steps, strict=True)], -1)
+            for parts in (places[:-1], places[1:], seen[:-1], seen[1:])
+        )
+        passes = passes.at(xp, which)
+        for _ in range(HALVINGS):
+            half = (low + high) / 2
+            there = field.meet(passes, half, Wanted.ALL).register[-4:]
+            nearer = abs(there - first).sum(0) < abs(there - last).sum(0)
+            low, high = xp.select(nearer, half, low), xp.select(nearer, high, half)
+        start, done = begin, 0
+        for step in steps:  # a ray changes once in each
+            stop, done = low[done : done + len(step)], done + len(step)
+            rays, starts, befores = (xp.take(part, step) for part in (ray, start, before))
+            result.append((rays, starts, stop, befores))
+            start, before = 1 * start, 1 * before
+            xp.put(start, step, stop)
+            xp.put(before, step, befores + stop - starts)
+        result.append((ray, start, end, before))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
+
+    def _cut(self, way: Array, piece: Piece) -> Piece:
+        """The same pieces of rays, cut where the light falls unevenly along them."""
+        xp, (ray, begin, end, before) = self.xp, piece
+        ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
+        first, last = to - ways * begin, to - ways * end
+        narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
+        result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
+        wide = xp.where(~narrow)
+        if not len(wide):
+            return result[0]
+        ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
+        middle = _dot(ways, to)
+        aside = _length(xp, to - ways * middle).clip(NEAREST)
+        for low, high in pairwise(CUTS):
+            a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
+            some = xp.where(a < b)
+            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
+        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
+
+    def _mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
+        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n.
+
+        What a medium gives way to, if soft, has its own plane, and its own colours there.
+        """
+        xp, field = self.xp, self.field
+        if len(t) > PIXELS:
+            parts = [slice(at, at + PIXELS) for at in range(0, len(t), PIXELS)]
+            some = [
+                (Passes(passes.slots[:, :, at], passes.origins), way[:, at], t[at], n[:, at]) for at in parts
+            ]
+            return xp.concat([self._mean(*each, soft, px) for each in some], 1)
+        seen, objects = way * t, None
+        if soft:
+            owner = field.meet(passes, t + INTO, Wanted.KIND, owners=True).owner
+            objects = xp.whole(owner - 1).clip(0)
+            n = field.normals(objects, self.eye[:, None] + seen)
+        off = self._four * (px * t * (self._forward @ way))
+        towards = (n * seen).sum(0)
+        towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)  # of planes seen from the side
+        ratio = ((n[:, None] * off).sum(0) / towards).clip(-GRAZING, GRAZING)
+        off = (off - seen[:, None] * ratio) / (1 + ratio)
+        p = (self.eye[:, None] + way * (t + INTO))[:, None] + off
+        if objects is not None:
+            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
+        else:
+            four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
+            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
+        return result.reshape(3, 4, -1).mean(1)
+
+    def _textured(
+        self, way: Array, trail: Trail, pieces: Piece, px: float
+    ) -> Iterator[tuple[Array, int, Array]]:
+        """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there."""
+        xp, (ray, begin, end, _) = self.xp, pieces
+        if not self.field.textures:
+            return
+        texels = self.field.textured(trail.at(xp, ray)) * (end - begin).clip(0.0, 1 / EXTINCTION)
+        for some, panels in (((texels > 0) & (texels <= BUSY), FEW), (texels > BUSY, MANY)):
+            whole = xp.where(some)
+            for start in range(0, len(whole), CHUNK):
+                index = whole[start : start + CHUNK]
+                part = tuple(xp.take(each, index) for each in pieces)
+                for node, woven in enumerate(self._woven(way, trail, part, panels, px)):
+                    yield index, node, woven
+
+    def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
+        """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
+
+        Between the nodes the light goes as the polynomial through them does. What this makes of a colour is
+        summed up at many more points, which are in turn those of the pixel's samples.
+        """
+        xp, (ray, begin, end, before) = self.xp, pieces
+        gauss, count = np.polynomial.legendre.leggauss, 2 * panels
+        places = ((np.arange(panels)[:, None] + (gauss(2)[0] + 1) / 2) / panels).reshape(-1)
+        nodes = (gauss(self.pace.nodes)[0] + 1) / 2
+        bases = [
+            np.prod([(places - other) / (node - other) for other in nodes if other != node], 0)
+            for node in nodes
+        ]
+        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
+        left = 1 - xp.array(places[:, None].astype(np.float32), way) * taken
+        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (places, P)
+        weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before)
+        rays = xp.concat([ray] * count, 0)
+        ways = xp.take(way, rays)
+        p = self.eye[:, None] + ways * t
+        if px:
+            turns = np.resize((0, 1, 2, 3, 3, 2, 1, 0), count)
+            four = xp.stack([self._four[:, i] for i in turns.tolist()], 1)  # (3, places, 1)
+            p = p + (four * (px * t * (self._forward @ ways)).reshape(count, -1)).reshape(3, -1)
+        colours = self.field.colours(trail.at(xp, rays), t, p).reshape(3, count, -1) * weight
+        shares = [xp.array(base[:, None].astype(np.float32), way) for base in bases]
+        return [(colours * share).sum(1) for share in shares]
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _length(xp: Arrays, a: Array) -> Array:
+    return xp.sqrt(_dot(a, a))
+
 
 TILE = 1 << 16  # samples at a time
 QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
@@ -32,20 +431,15 @@ def draw_solids(
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
-    """Draw a field of solids.
+    """Draw a field of solids: the picture, and what it took.
 
     Args:
-        field: the solids.
-        stage: camera, light, ground and sky.
         canvas: width and height in pixels.
         threads: bands drawn at the same time.
         split: bands are as high as for so many threads; by default ``threads``.
         samples: of a pixel: ``"adaptive"``, four where something changes from pixel to pixel and one
             elsewhere, ``"quick"``, the same at another of `PACES`, ``"four"`` or ``"one"``.
         progress: called with the share done, from any thread.
-
-    Returns:
-        The picture and what it took.
 
     Raises:
         ProgramError: numbers out of all proportion, which no compiled scene has.
@@ -97,10 +491,7 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
 def _shade(
     lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray, px: float = 0.0
 ) -> tuple[np.ndarray, Work]:
-    """Radiance, alpha and plain radiance (7, …) at places in pixels from the picture's upper left corner.
-
-    With px as of `Lighting.shade`.
-    """
+    """Radiance, alpha and plain radiance (7, …) at places of the picture; px as of `Lighting.shade`."""
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
@@ -137,12 +528,6 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
     """Outputs of a field of solids; objects are numbered as the field has them, from 1.
 
     Alpha is the mean of four samples where it changes from pixel to pixel, the rest is of the centre.
-
-    Args:
-        field: the solids.
-        stage: camera and ground.
-        canvas: width and height in pixels.
-        threads: parts drawn at the same time.
     """
     width, height = canvas
     lighting = Lighting(field, stage)

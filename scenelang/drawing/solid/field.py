@@ -1,21 +1,18 @@
 """The solids' field: distances, gradients and colours of objects at points, folded along the stream.
 
-Each object's frame (`passes.py`) carries points into its own space. There pairs of points and objects meet
-the network together, where the point is in the object's ball; then the cell takes a point's objects in, one
-by one. Each open group of the stream has a state of its own (`States`), and a group's result is taken in as
-an object is.
-
-A point meets some of the objects, and so some of a group; the others have no effect there. A group that draws
-goes on in the state around it where nothing has been met in that state yet.
+Each object's frame (`passes.py`) carries points into its own space. Pairs of points and objects meet the
+network together, where the point is in the object's ball; then the cell takes a point's objects in, one by
+one. Open groups have states of their own (`States`), and a group's result is taken in as an object is. A
+group that draws goes on in the state around it where nothing has been met in that state yet.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +38,7 @@ from scenelang.drawing.solid.passes import (
     INF,
     OBJECT,
     SLACK,
+    SMALL,
     WAY,
     Passes,
     SolidFrame,
@@ -51,324 +49,12 @@ from scenelang.drawing.solid.passes import (
 TAGS = np.array([[0.618034], [0.754878], [0.569840]])  # parts of whole numbers times these lie apart
 
 
-class Objects:
-    """A program's objects with their weights: their distances and colours, each alone.
-
-    Args:
-        network: trained parameters, on any device.
-        vectors: (N, 64) float32, geometry and material vectors.
-        tokens: (N,) as of a Program.
-        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
-        paints: likewise, None where a row has the colour of its vector.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
-    """
-
-    def __init__(
-        self,
-        network: SolidNetwork,
-        vectors: np.ndarray,
-        tokens: np.ndarray,
-        brought: Sequence[Element | None] | None = None,
-        paints: Sequence[Paint | None] | None = None,
-    ) -> None:
-        self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
-        none = [None] * len(vectors)
-        parts = network.layout.unpack(vectors)
-        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
-        with self.xp.inference():
-            self.solids = read_solids(network, vectors, self.tree, widths)
-            self._tables(parts)
-            self._cells(widths)
-            self._textures(parts.texture, paints or none)
-            self._decoders(parts.code, brought or none)
-            self._alone()
-        kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
-        self.draws = all(solid.draws for solid in self.solids)
-        """True where all objects draw."""
-        self.adding = self._adding()
-        self.media = bool(kinds.any())
-        """True where some object is a medium."""
-        self.mixed = self.media and not kinds.all()
-        """True where some objects are media and some are not."""
-        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
-        """True where media have different colours."""
-
-    def _adding(self) -> Array | None:
-        """A mask (N,), 1 or 0, of objects of groups that neither draw nor take away; None without groups."""
-        groups = self.tree
-        if not groups.deepest:
-            return None
-        there, drawn = groups.path >= 0, np.array([solid.draws for solid in self.solids])
-        cuts = (there & (groups.joins[groups.path] == SUBTRACT)).sum(1) + (groups.tokens == SUBTRACT)
-        adding = there.any(1) & ~drawn & (cuts % 2 == 0)
-        return self.xp.array(adding.astype(np.float32), self.network.codes)
-
-    def _tables(self, parts: Parts) -> None:
-        """Build the tables (…, N) that pairs of points and objects look up."""
-        xp, network = self.xp, self.network
-        frames, count = [solid.frame for solid in self.solids], len(self.solids)
-
-        def table(values: object, *shape: int) -> Array:
-            return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
-
-        self.scale, self.amount, self.frequency = (
-            table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
-        )
-        self.linear = xp.stack([f.outer.linear for f in frames], -1) if frames else table([], 3, 3)
-        self.shift = xp.stack([f.outer.shift for f in frames], -1) if frames else table([], 3)
-        self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
-        self.far = any(solid.radius > RADIUS for solid in self.solids)
-        self.bumpy = any(frame.amount for frame in frames)
-        look = network.look(xp.array(parts.material.copy(), network.codes)).T
-        colour = table(parts.rgb.T, 3) * look[:3]
-        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
-        """Colour and medium (R, N) of objects; where some have textures, a plain colour between these."""
-
-    def _cells(self, widths: Floats) -> None:
-        """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
-        xp, network, groups = self.xp, self.network, self.tree
-        operators = np.concatenate([groups.tokens, groups.joins])
-        widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
-        smooth = xp.array((operators == SMOOTH).astype(np.float32), network.codes) > 0
-        self.smooth = smooth if SMOOTH in operators else None
-        keys = list(zip(operators.tolist(), widths.tolist(), strict=True))
-        self.alike = len(set(keys)) <= 1
-        known = {
-            (token, width): network.cut(token, width)
-            if token >= SUBTRACT and width
-            else network.cell(token, width or BLEND)
-            for token, width in dict.fromkeys(keys)
-        }
-        cells = [known[key] for key in (keys[:1] if self.alike else keys)] or [network.cell(UNION, BLEND)]
-        self.cells = [
-            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
-            for each in zip(*cells, strict=True)
-        ]
-
-    def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """Build the textures of objects that have one in place of a colour.
-
-        They get a plain colour too, unlike any other's, that stands for the texture where pixels are compared
-        to find outlines and shadows.
-        """
-        xp, like = self.xp, self.network.codes
-        worn = {
-            i: Texture(xp, paint, frames[i], like, light=True)
-            for i, paint in enumerate(paints)
-            if paint is not None and self.solids[i].draws  # the others leave colours as they are
-        }
-        self.textures = list(worn.items())
-        """Textures of objects that draw, with the objects' numbers."""
-        detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
-        self.detail = xp.array(np.array(detail, np.float32), like)
-        """Texels that a way of a world unit may cross; 0 without a texture."""
-        if worn:
-            tags = (0.4 + 0.6 * (TAGS * (np.arange(len(paints)) + 1) % 1.0)).astype(np.float32)
-            plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
-            self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
-
-    def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
-        """Build the decoders of distances, and each object's index among them."""
-        xp, network = self.xp, self.network
-        keys = [
-            code.tobytes() if element is None else element
-            for code, element in zip(codes, brought, strict=True)
-        ]
-        # codes first, whose numbers are those of their segments
-        ordered = sorted(dict.fromkeys(keys), key=lambda key: isinstance(key, Element))
-        number = {key: at for at, key in enumerate(ordered)}
-        learned = [
-            xp.array(np.frombuffer(key, np.float32).copy(), network.codes)
-            for key in ordered
-            if isinstance(key, bytes)
-        ]
-        self.decoders: list[Smooth | GridShape] = [
-            *map(network.decoder, learned),
-            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
-        ]
-        self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
-        boxes = [
-            element_box(key) if isinstance(key, Element) else network.box(decoder)  # type: ignore[arg-type]
-            for key, decoder in zip(ordered, self.decoders, strict=True)
-        ]
-        self.solids = [
-            solid.within(xp, boxes[number[key]], network.codes)
-            for key, solid in zip(keys, self.solids, strict=True)
-        ]
-        plain = [
-            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
-            for element, s in zip(brought, self.solids, strict=True)
-        ]
-        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
-        """1 where the network for whole segments may answer."""
-        self.answered = bool(self.asked.sum() > 0)
-        """True where it may for some object."""
-        known = len(network.segment_w) and self.answered
-        self.segments = [network.segment(code) for code in learned] if known else []
-
-    def _alone(self) -> None:
-        """Prepare the answers for points that meet one object alone, or meet it first."""
-        xp, like, solids = self.xp, self.network.codes, self.solids
-        reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
-        cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
-        self.first = self.network.alone(xp.array(reach, like), cell)
-        """Factors of distances (N,) of objects that are met first; 0: the cell has to be asked."""
-        drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
-        self.open = bool(((self.first > 0) | (drawn == 0)).all())
-        """True where the cell need not be asked for any object that draws."""
-        self.factor = self.first * self.scale
-        """World units for a leaf unit of objects that are met alone."""
-        self.special = [
-            i
-            for i, s in enumerate(solids)
-            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount)
-        ]
-        """Objects to which more than a map leads, or that are displaced."""
-        self.groups = len(self.decoders) + len(self.special)
-        """Number of groups of objects that are met alone: those of each decoder, and each special one."""
-        group = 1 * self.decoder
-        for at, i in enumerate(self.special):
-            group[i] = len(self.decoders) + at
-        self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
-        """Group of each object that draws, else -1."""
-
-    def worn(self, objects: Array, p: Array) -> Array:
-        """Colours (3, P) of objects, whatever else is at points p (3, P)."""
-        xp = self.xp
-        colours = xp.take(self.looks[:3], objects)
-        for i, texture in self.textures:
-            index = xp.where(objects == i)
-            if len(index):
-                frame = self.solids[i].frame
-                own = frame.outer(xp, xp.take(p, index))
-                xp.put(colours, index, texture.at(frame.local(xp, own)))
-        return colours
-
-    def normals(self, objects: Array, p: Array) -> Array:
-        """Gradients (3, P) of objects' own distances at points p (3, P)."""
-        gradient = self._distances(*self._local(self._behind(objects, p), objects), objects, True)[1]
-        assert gradient is not None
-        return gradient
-
-    def _behind(self, objects: Array, p: Array) -> Array:
-        """World points (3, P) behind the objects' maps."""
-        xp = self.xp
-        return (xp.take(self.linear, objects) * p).sum(1) + xp.take(self.shift, objects)
-
-    def _looks(self, q: Array, objects: Array) -> Array:
-        """Registers (R, P) of objects with their textures' colours at leaf coordinates (3, P)."""
-        xp = self.xp
-        looks = xp.take(self.looks, objects)
-        for i, texture in self.textures:
-            index = xp.where(objects == i)
-            if len(index):
-                xp.put(looks[:3], index, texture.at(xp.take(q, index)))
-        return looks
-
-    def _local(self, at: Array, objects: Array) -> tuple[Array, list[tuple[SolidFrame, Array, Array]]]:
-        """Leaf coordinates (3, P) of points (3, P) behind the objects' maps.
-
-        Of objects with more than a map, their frames, indices and points too.
-        """
-        xp, q = self.xp, at
-        own = []
-        for i, frame in self.turned:
-            index = xp.where(objects == i)
-            if len(index):
-                own.append((frame, index, xp.take(at, index)))
-        if own:
-            q = 1 * at
-            for frame, index, p in own:
-                xp.put(q, index, frame.local(xp, p))
-        return q, own
-
-    def _distances(
-        self, q: Array, own: list[tuple[SolidFrame, Array, Array]], objects: Array, gradient: bool
-    ) -> tuple[Array, Array | None]:
-        """World distances (P,) at leaf coordinates, as `_local` has them; gradients (3, P) if asked."""
-        xp = self.xp
-        length = rim = None
-        place = q
-        if self.far:
-            length = xp.sqrt((q * q).sum(0))
-            rim = RADIUS / length.clip(RADIUS)
-            place = q * rim
-        result = self._decoded(place, objects, gradient)
-        d, g = result[0], result[1:]
-        if length is not None and rim is not None:
-            d = d + (length - RADIUS).clip(0.0)
-            if gradient:
-                n = q / length.clip(1e-9)
-                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
-        if self.bumpy:
-            f, amount = xp.take(self.frequency, objects), xp.take(self.amount, objects)
-            s = xp.sin(f * q)
-            d = d + amount * (s[0] * s[1] * s[2])
-            if gradient:
-                c = xp.cos(f * q)
-                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
-                g = g + (amount * f) * more
-        scale = xp.take(self.scale, objects)
-        if not gradient:
-            return d * scale, None
-        for frame, index, p in own:
-            xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
-        return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
-
-    def decoded(self, at: Array, bounds: Sequence[int]) -> Array:
-        """Leaf distances (P,) at points (3, P) behind objects' maps, group by group, with bounds between."""
-        ask = [*(partial(self._field, decoder=decoder, gradient=False) for decoder in self.decoders)]
-        ask += [partial(self._special, i) for i in self.special]
-        pieces = zip(ask, pairwise(bounds), strict=True)
-        parts = [distances(at[:, a:b])[0] for distances, (a, b) in pieces if a < b]
-        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
-
-    def _special(self, i: int, at: Array) -> Array:
-        """Leaf distances (1, P) of an object at points (3, P) behind its map."""
-        xp, frame = self.xp, self.solids[i].frame
-        q = frame.local(xp, at)
-        place, beyond = q, 0.0
-        if self.solids[i].radius > RADIUS:
-            length = xp.sqrt((q * q).sum(0))
-            place, beyond = q * (RADIUS / length.clip(RADIUS)), (length - RADIUS).clip(0.0)
-        d = self._field(place, self.decoders[int(self.decoder[i])], False) + beyond
-        if not frame.amount:
-            return d
-        s = xp.sin(frame.frequency * q)
-        return d + frame.amount * (s[0] * s[1] * s[2])
-
-    def _decoded(self, q: Array, objects: Array, gradient: bool) -> Array:
-        """Decode leaf coordinates (3, P) to distances (1, P), or to these and gradients (4, P)."""
-        xp = self.xp
-        if len(self.decoders) == 1:
-            return self._field(q, self.decoders[0], gradient)
-        result, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
-        for i, layers in enumerate(self.decoders):
-            index = xp.where(which == i)
-            if len(index):
-                xp.put(result, index, self._field(xp.take(q, index), layers, gradient))
-        return result
-
-    def _field(self, q: Array, decoder: Smooth | GridShape, gradient: bool) -> Array:
-        if isinstance(decoder, GridShape):
-            return decoder.field(q, gradient)
-        return self.network.field(q, decoder, gradient)
-
-
 class Closing(NamedTuple):
-    """States of groups that end, k of them.
+    """Groups that end, k of them."""
 
-    Args:
-        inner: their entries (k,): the point's number and, for each state below it, the number of points.
-        outer: those of the states that take them in.
-        which: their numbers behind those of the objects.
-    """
-
-    inner: Array
-    outer: Array
-    which: Array
+    inner: Array  # entries (k,): the point's number and, for each state below it, the number of points
+    outer: Array  # those of the states that take them in
+    which: Array  # numbers of the groups, behind those of the objects
 
 
 class Stacks:
@@ -390,18 +76,7 @@ class Stacks:
     def followed(
         self, places: list[Array | None], rays: Array, objects: Array, every: Array
     ) -> tuple[list[Array | None], list[list[Closing]], int]:
-        """Follow points through their objects.
-
-        Args:
-            places: as of `Pairs`, without states.
-            rays: numbers of their points (P,), place by place.
-            objects: numbers (P,).
-            every: numbers of all points (M,).
-
-        Returns:
-            Places with states, groups that end before each and behind the last, and how many states points
-            have at most.
-        """
+        """Places, closings and depth of `Pairs`, by places without states and all points' numbers."""
         xp, count = self._xp, len(every)
         ways, begun = xp.take(self._ways, objects), 0 * every
         met = count if places[0] is None else len(places[0])
@@ -457,23 +132,16 @@ NOTHING = 10.0  # world units: how far a group with nothing in it is at most for
 
 
 class Meeting(NamedTuple):
-    """Answers of the field at points (M,).
+    """Answers of the field, of an object or of a group at points (M,); None where not asked for."""
 
-    Args:
-        distance: D.
-        register: colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing.
-        gradient: of D (3, M), if asked for.
-        change: a bound on D and on how far another object's material may begin, if asked for.
-        owner: number of the object whose material holds, from 1, if asked for.
-        met: pairs of points and objects that met.
-    """
-
-    distance: Array
-    register: Array
-    gradient: Array = None
-    change: Array = None
-    owner: Array = None
-    met: int = 0
+    distance: Array  # D
+    register: (
+        Array  # colours and medium (R, M), as in `SolidField.looks`, the medium alone (1, M), or nothing
+    )
+    gradient: Array = None  # of D (3, M)
+    change: Array = None  # a bound on D and on how far another object's material may begin
+    owner: Array = None  # number of the object whose material holds, from 1
+    met: int = 0  # pairs of points and objects that met
 
 
 class Pairs(NamedTuple):
@@ -499,16 +167,6 @@ class Pairs(NamedTuple):
     depth: int = 1
 
 
-class Operand(NamedTuple):
-    """An object or a group for states (k,) to take in, as of `Meeting`; `look` is a register (R, k or 1)."""
-
-    distance: Array
-    look: Array
-    gradient: Array
-    change: Array
-    owner: Array
-
-
 @dataclass(slots=True)
 class States:
     """Distances and registers of states, and optional values, as of `Meeting`.
@@ -521,21 +179,299 @@ class States:
     bound: Array
     owner: Array
 
-    def parts(self) -> tuple[Array, ...]:
-        """All of it, None where it is not asked for."""
-        return self.memory, self.slope, self.bound, self.owner
 
-    def at(self, xp: Arrays, index: Array) -> States:
-        """Some of the entries."""
-        return States(*(part if part is None else xp.take(part, index) for part in self.parts()))
+class SolidField:
+    """A program's objects with their weights, ready to be met by points of rays.
 
+    Args:
+        network: trained parameters, on any device.
+        vectors, tokens: (N, 64) float32 and (N,), as of a Program.
+        brought, paints: elements and textures of rows, None where a row has the geometry or the colour of
+            its vector; none if left out.
 
-class SolidField(Objects):
-    """A program's objects, ready to be met by points of rays."""
+    Raises:
+        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
+    """
 
-    @cached_property
-    def _stacks(self) -> Stacks:
-        return Stacks(self.xp, self.tree, self.network.codes)
+    def __init__(
+        self,
+        network: SolidNetwork,
+        vectors: np.ndarray,
+        tokens: np.ndarray,
+        brought: Sequence[Element | None] | None = None,
+        paints: Sequence[Paint | None] | None = None,
+    ) -> None:
+        self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
+        none = [None] * len(vectors)
+        parts = network.layout.unpack(vectors)
+        widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
+        self.stacks = Stacks(self.xp, self.tree, network.codes) if self.tree.deepest else None
+        with self.xp.inference():
+            self.solids = read_solids(network, vectors, self.tree, widths)
+            self._tables(parts)
+            self._cells(widths)
+            self._textures(parts.texture, paints or none)
+            self._decoders(parts.code, brought or none)
+            self._alone()
+        kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
+        drawn = np.array([solid.draws for solid in self.solids], bool)
+        self.draws = bool(drawn.all())  # whether all objects draw
+        self.media = bool(kinds.any())  # whether some object is a medium
+        self.mixed = self.media and not kinds.all()  # whether some are and some are not
+        # whether media have different colours
+        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
+        self.adding: Array | None = None  # (N,), 1 for objects of groups that neither draw nor take away
+        if (groups := self.tree).deepest:
+            there = groups.path >= 0
+            cuts = (there & (groups.joins[groups.path] == SUBTRACT)).sum(1) + (groups.tokens == SUBTRACT)
+            adding = there.any(1) & ~drawn & (cuts % 2 == 0)
+            self.adding = self.xp.array(adding.astype(np.float32), network.codes)
+
+    def _tables(self, parts: Parts) -> None:
+        """Build the tables (…, N) that pairs of points and objects look up."""
+        xp, network = self.xp, self.network
+        frames, count = [solid.frame for solid in self.solids], len(self.solids)
+
+        def table(values: object, *shape: int) -> Array:
+            return xp.array(np.array(values, np.float32).reshape(*shape, count), network.codes)
+
+        self.scale, self.amount, self.frequency = (
+            table([getattr(frame, name) for frame in frames]) for name in ("scale", "amount", "frequency")
+        )
+        self.linear = xp.stack([f.outer.linear for f in frames], -1) if frames else table([], 3, 3)
+        self.shift = xp.stack([f.outer.shift for f in frames], -1) if frames else table([], 3)
+        self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
+        self.far = any(solid.radius > RADIUS for solid in self.solids)
+        self.bumpy = any(frame.amount for frame in frames)
+        look = network.look(xp.array(parts.material.copy(), network.codes)).T
+        colour = table(parts.rgb.T, 3) * look[:3]
+        # colour and medium (R, N) of objects; where some have textures, a plain colour between these
+        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
+
+    def _cells(self, widths: Floats) -> None:
+        """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
+        xp, network, groups = self.xp, self.network, self.tree
+        operators = np.concatenate([groups.tokens, groups.joins])
+        widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
+        smooth = xp.array((operators == SMOOTH).astype(np.float32), network.codes) > 0
+        self.smooth = smooth if SMOOTH in operators else None
+        keys = list(zip(operators.tolist(), widths.tolist(), strict=True))
+        self.alike = len(set(keys)) <= 1
+        known = {
+            (token, width): network.cut(token, width)
+            if token >= SUBTRACT and width
+            else network.cell(token, width or BLEND)
+            for token, width in dict.fromkeys(keys)
+        }
+        cells = [known[key] for key in (keys[:1] if self.alike else keys)] or [network.cell(UNION, BLEND)]
+        self.cells = [
+            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
+            for each in zip(*cells, strict=True)
+        ]
+
+    def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
+        """Build the textures of objects that have one in place of a colour.
+
+        They get a plain colour too, unlike any other's, by which outlines and shadows are found.
+        """
+        xp, like = self.xp, self.network.codes
+        worn = {
+            i: Texture(xp, paint, frames[i], like, light=True)
+            for i, paint in enumerate(paints)
+            if paint is not None and self.solids[i].draws  # the others leave colours as they are
+        }
+        self.textures = list(worn.items())  # those that draw, with their objects' numbers
+        # texels that a way of a world unit may cross; 0 without a texture
+        detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
+        self.detail = xp.array(np.array(detail, np.float32), like)
+        if worn:
+            tags = (0.4 + 0.6 * (TAGS * (np.arange(len(paints)) + 1) % 1.0)).astype(np.float32)
+            plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
+            self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
+
+    def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
+        """Build the decoders of distances, and each object's index among them."""
+        xp, network = self.xp, self.network
+        keys = [
+            code.tobytes() if element is None else element
+            for code, element in zip(codes, brought, strict=True)
+        ]
+        # codes first, whose numbers are those of their segments
+        ordered = sorted(dict.fromkeys(keys), key=lambda key: isinstance(key, Element))
+        number = {key: at for at, key in enumerate(ordered)}
+        learned = [
+            xp.array(np.frombuffer(key, np.float32).copy(), network.codes)
+            for key in ordered
+            if isinstance(key, bytes)
+        ]
+        self.decoders: list[Smooth | GridShape] = [
+            *map(network.decoder, learned),
+            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
+        ]
+        self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
+        boxes = [
+            element_box(key) if isinstance(key, Element) else network.box(decoder)  # type: ignore[arg-type]
+            for key, decoder in zip(ordered, self.decoders, strict=True)
+        ]
+        for i, (key, solid) in enumerate(zip(keys, self.solids, strict=True)):
+            box = boxes[number[key]]
+            # a small box, where an affine map leads to the leaf
+            if not ((box[1] - box[0]).min() > SMALL or solid.frame.steps or solid.wide):
+                sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * (solid.radius - 1)
+                low, high = (xp.array(side, network.codes) for side in sides.astype(np.float32))
+                self.solids[i] = replace(solid, box=(low, high))
+        plain = [
+            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
+            for element, s in zip(brought, self.solids, strict=True)
+        ]
+        # 1 where the network for whole segments may answer
+        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
+        self.answered = bool(self.asked.sum() > 0)
+        known = len(network.segment_w) and self.answered
+        self.segments = [network.segment(code) for code in learned] if known else []
+
+    def _alone(self) -> None:
+        """Prepare the answers for points that meet one object alone, or meet it first."""
+        xp, like, solids = self.xp, self.network.codes, self.solids
+        # the diameter of what an object changes: no distance in it is greater
+        reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
+        cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
+        # factors of distances (N,) of objects that are met first; 0: the cell has to be asked
+        self.first = self.network.alone(xp.array(reach, like), cell)
+        drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
+        # whether the cell need not be asked for any object that draws
+        self.open = bool(((self.first > 0) | (drawn == 0)).all())
+        self.factor = self.first * self.scale  # world units for a leaf unit of objects that are met alone
+        self.special = [  # to which more than a map leads, or that are displaced
+            i
+            for i, s in enumerate(solids)
+            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount)
+        ]
+        # groups of objects that are met alone: those of each decoder, and each special one; -1 for others
+        self.groups = len(self.decoders) + len(self.special)
+        group = 1 * self.decoder
+        for at, i in enumerate(self.special):
+            group[i] = len(self.decoders) + at
+        self.group = xp.select((self.first > 0) & (drawn > 0), group, 0 * group - 1)
+
+    def worn(self, objects: Array, p: Array) -> Array:
+        """Colours (3, P) of objects, whatever else is at points p (3, P)."""
+        xp = self.xp
+        colours = xp.take(self.looks[:3], objects)
+        for i, texture in self.textures:
+            index = xp.where(objects == i)
+            if len(index):
+                frame = self.solids[i].frame
+                own = frame.outer(xp, xp.take(p, index))
+                xp.put(colours, index, texture.at(frame.local(xp, own)))
+        return colours
+
+    def normals(self, objects: Array, p: Array) -> Array:
+        """Gradients (3, P) of objects' own distances at points p (3, P)."""
+        return self._distances(*self._local(self._behind(objects, p), objects), objects, True)[1]
+
+    def _behind(self, objects: Array, p: Array) -> Array:
+        """World points (3, P) behind the objects' maps."""
+        xp = self.xp
+        return (xp.take(self.linear, objects) * p).sum(1) + xp.take(self.shift, objects)
+
+    def _looks(self, q: Array, objects: Array) -> Array:
+        """Registers (R, P) of objects with their textures' colours at leaf coordinates (3, P)."""
+        xp = self.xp
+        looks = xp.take(self.looks, objects)
+        for i, texture in self.textures:
+            index = xp.where(objects == i)
+            if len(index):
+                xp.put(looks[:3], index, texture.at(xp.take(q, index)))
+        return looks
+
+    def _local(self, at: Array, objects: Array) -> tuple[Array, list[tuple[SolidFrame, Array, Array]]]:
+        """Leaf coordinates (3, P) of points (3, P) behind the objects' maps.
+
+        Of objects with more than a map, their frames, indices and points too.
+        """
+        xp, q = self.xp, at
+        own = [
+            (frame, index, xp.take(at, index))
+            for i, frame in self.turned
+            if len(index := xp.where(objects == i))
+        ]
+        for frame, index, p in own:
+            q = 1 * at if q is at else q
+            xp.put(q, index, frame.local(xp, p))
+        return q, own
+
+    def _distances(
+        self, q: Array, own: list[tuple[SolidFrame, Array, Array]], objects: Array, gradient: bool
+    ) -> tuple[Array, Array]:
+        """World distances (P,) at leaf coordinates, as `_local` has them; gradients (3, P) if asked."""
+        xp, bulge = self.xp, None
+        if self.bumpy:
+            bulge = xp.take(self.frequency, objects), xp.take(self.amount, objects)
+        d, g = self._leaf(q, partial(self._decoded, objects=objects), self.far, bulge, gradient)
+        scale = xp.take(self.scale, objects)
+        if not gradient:
+            return d * scale, g
+        for frame, index, p in own:
+            xp.put(g, index, frame.pulled(xp, p, xp.take(g, index)))
+        return d * scale, (xp.take(self.linear, objects) * g[:, None]).sum(0) * scale
+
+    def decoded(self, at: Array, bounds: Sequence[int]) -> Array:
+        """Leaf distances (P,) at points (3, P) behind objects' maps, group by group, with bounds between."""
+        parts = []
+        for group, (a, b) in enumerate(pairwise(bounds)):
+            if a < b and group < len(self.decoders):
+                parts.append(self._field(at[:, a:b], False, self.decoders[group])[0])
+            elif a < b:
+                i = self.special[group - len(self.decoders)]
+                frame, decoder = self.solids[i].frame, self.decoders[int(self.decoder[i])]
+                bulge = (frame.frequency, frame.amount) if frame.amount else None
+                q, far = frame.local(self.xp, at[:, a:b]), self.solids[i].radius > RADIUS
+                parts.append(self._leaf(q, partial(self._field, decoder=decoder), far, bulge, False)[0])
+        return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
+
+    def _leaf(
+        self, q: Array, field: Callable[..., Array], far: bool, bulge: tuple[Any, Any] | None, gradient: bool
+    ) -> tuple[Array, Array]:
+        """Leaf distances (P,) by a field, which does not know what is ``far``; gradients (3, P) if asked."""
+        xp, place = self.xp, q
+        if far:
+            length = xp.sqrt((q * q).sum(0))
+            rim = RADIUS / length.clip(RADIUS)
+            place = q * rim
+        result = field(place, gradient=gradient)
+        d, g = result[0], result[1:]
+        if far:
+            d = d + (length - RADIUS).clip(0.0)
+            if gradient:
+                n = q / length.clip(1e-9)
+                g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
+        if bulge is not None:
+            f, amount = bulge
+            s = xp.sin(f * q)
+            d = d + amount * (s[0] * s[1] * s[2])
+            if gradient:
+                c = xp.cos(f * q)
+                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
+                g = g + (amount * f) * more
+        return d, g
+
+    def _decoded(self, q: Array, gradient: bool, objects: Array) -> Array:
+        """Decode leaf coordinates (3, P) to distances (1, P), or to these and gradients (4, P)."""
+        xp = self.xp
+        if len(self.decoders) == 1:
+            return self._field(q, gradient, self.decoders[0])
+        result, which = xp.full((4 if gradient else 1, q.shape[1]), 0.0, q), xp.take(self.decoder, objects)
+        for i, layers in enumerate(self.decoders):
+            index = xp.where(which == i)
+            if len(index):
+                xp.put(result, index, self._field(xp.take(q, index), gradient, layers))
+        return result
+
+    def _field(self, q: Array, gradient: bool, decoder: Smooth | GridShape) -> Array:
+        if isinstance(decoder, GridShape):
+            return decoder.field(q, gradient)
+        return self.network.field(q, decoder, gradient)
 
     def passes(self, origin: Array, way: Array, limit: Array, tight: bool = True) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
@@ -544,7 +480,7 @@ class SolidField(Objects):
 
     def meet(
         self,
-        passes: Passes,
+        passes: Passes | Pairs,
         t: Array,
         wanted: Wanted,
         gradient: bool = False,
@@ -555,52 +491,14 @@ class SolidField(Objects):
         """Let points of rays meet the objects.
 
         Args:
-            passes: of the rays.
+            passes: of the rays, or their pairs with the objects.
             t: how far along each the point is (M,).
             wanted: what of the register to answer beside the distance.
             gradient, change, owners: what else; with owners the register says nothing.
             p: the points themselves (3, M), where they are a little off the rays.
         """
-        return self.answer(self.pairs(passes, t), t, wanted, gradient, change, owners, p)
-
-    def pairs(self, passes: Passes, t: Array) -> Pairs:
-        """Pairs of points at t (M,) and the objects in whose balls these are."""
         xp, count = self.xp, len(t)
-        inside = self.inside(passes, t)
-        total = inside.sum(0)
-        before = total - inside.cumsum(0)  # a point's first object is in the last slot
-        every, most = xp.where(t == t), int(total.max()) if count else 0
-        flats, places = [], list[Array | None]()
-        if count and int(total.min()):
-            slots = xp.whole(inside * (before == 0) * xp.where(inside[:, 0] == inside[:, 0])[:, None])
-            flats, places = [slots.sum(0) * count + every], [None]
-        for turn in range(len(places), most):
-            flats.append(xp.where((inside & (before == turn)).reshape(-1)))
-            places.append(flats[-1] % count)
-        flat = xp.concat([every[:0], *flats], 0)
-        rays = xp.concat([every[:0], *(every if place is None else place for place in places)], 0)
-        pairs = xp.take(passes.slots[: WAY.stop].reshape(WAY.stop, -1), flat)
-        objects = xp.whole(pairs[OBJECT])
-        if not self.draws:
-            objects = xp.select(objects < 0, -1 - objects, objects)
-        result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
-        if most < 2 or not self.tree.deepest:
-            return result
-        places, closings, depth = self._stacks.followed(places, rays, objects, every)
-        return result._replace(places=places, closings=closings, depth=depth)
-
-    def answer(
-        self,
-        pairs: Pairs,
-        t: Array,
-        wanted: Wanted,
-        gradient: bool = False,
-        change: bool = False,
-        owners: bool = False,
-        p: Array | None = None,
-    ) -> Meeting:
-        """As `meet`, of pairs whose rays have come to t (M,)."""
-        xp, count = self.xp, len(t)
+        pairs = self.pairs(passes, t) if isinstance(passes, Passes) else passes
         places, rays, objects, at, way, closings, depth = pairs
         size = depth * count
         if p is None:
@@ -626,7 +524,7 @@ class SolidField(Objects):
             which, near, look = objects[pair], d[pair], self.looks
             if wanted:
                 look = xp.take(look, which) if looks is None else looks[:, pair]
-            slope = own if own is None else own[:, pair]
+            slope = own[:, pair]
             if not start and self.open and not owners:  # nothing has been met
                 after = xp.take(self.first, which) * near[None]
                 if wanted:
@@ -639,31 +537,60 @@ class SolidField(Objects):
                     states.slope = _update(xp, states.slope, index, xp.take(self.first, which) * slope)
                 continue
             number = which + 1 + 0 * near if owners else None
-            self._join(states, index, Operand(near, look, slope, None, number), which, wanted)
+            self._join(states, index, Meeting(near, look, slope, None, number), which, wanted)
         for closing in closings[-1]:
             self._close(states, closing, wanted)
-        memory, slope, bound, owner = (_first(part, count) for part in states.parts())
+        parts = states.memory, states.slope, states.bound, states.owner
+        first: list[Any] = [part if part is None else part[..., :count] for part in parts]
+        memory, slope, bound, owner = first
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
 
+    def pairs(self, passes: Passes, t: Array) -> Pairs:
+        """Pairs of points at t (M,) and the objects in whose balls these are."""
+        xp, count = self.xp, len(t)
+        inside = self.inside(passes, t)
+        total = inside.sum(0)
+        before = total - inside.cumsum(0)  # a point's first object is in the last slot
+        every, most = xp.where(t == t), int(total.max()) if count else 0
+        flats, places = [], list[Array | None]()
+        if count and int(total.min()):
+            slots = xp.whole(inside * (before == 0) * xp.where(inside[:, 0] == inside[:, 0])[:, None])
+            flats, places = [slots.sum(0) * count + every], [None]
+        for turn in range(len(places), most):
+            flats.append(xp.where((inside & (before == turn)).reshape(-1)))
+            places.append(flats[-1] % count)
+        flat = xp.concat([every[:0], *flats], 0)
+        rays = xp.concat([every[:0], *(every if place is None else place for place in places)], 0)
+        pairs = xp.take(passes.slots[: WAY.stop].reshape(WAY.stop, -1), flat)
+        objects = xp.whole(pairs[OBJECT])
+        if not self.draws:
+            objects = xp.select(objects < 0, -1 - objects, objects)
+        result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
+        if most < 2 or self.stacks is None:
+            return result
+        places, closings, depth = self.stacks.followed(places, rays, objects, every)
+        return result._replace(places=places, closings=closings, depth=depth)
+
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
-        result = states.at(xp, inner)
-        d, look = result.memory[0].clip(-EMPTY, NOTHING), result.memory[1:]
-        xp.put(states.memory[:1], inner, 0 * result.memory[:1] + EMPTY)
+        parts = states.memory, states.slope, states.bound, states.owner
+        ended: list[Any] = [part if part is None else xp.take(part, inner) for part in parts]
+        memory, *others = ended
+        d = memory[0].clip(-EMPTY, NOTHING)
+        xp.put(states.memory[:1], inner, 0 * memory[:1] + EMPTY)
         if states.bound is not None:
             xp.put(states.bound, inner, 0 * d + EMPTY)
-        operand = Operand(d, look, result.slope, result.bound, result.owner)
-        self._join(states, index, operand, which, wanted)
+        self._join(states, index, Meeting(d, memory[1:], *others), which, wanted)
 
     def _join(
-        self, states: States, index: Array | None, operand: Operand, which: Array, wanted: Wanted
+        self, states: States, index: Array | None, operand: Meeting, which: Array, wanted: Wanted
     ) -> None:
         """Let states at an index take in operands by the cells of rows, or groups, `which`."""
         xp, cell = self.xp, self.cells[wanted]
-        near, look = operand.distance, operand.look
+        near, look = operand.distance, operand.register
         if not self.alike:
             cell = Cell(*(xp.take(weights, which) for weights in cell))
         before = _part(xp, states.memory, index)
@@ -674,7 +601,14 @@ class SolidField(Objects):
             held = xp.select(after[-1] > 0.5, operand.owner, _part(xp, states.owner, index))
             states.owner = _update(xp, states.owner, index, held)
         if states.bound is not None:
-            gap = xp.minimum(_part(xp, states.bound, index), self._gap(near, before, look, which))
+            # distances (k,) within which operands leave the kind of material as it is
+            gap = abs(near)
+            if self.smooth is not None:
+                blend = xp.minimum(gap, abs(before[0] - near) / 2)
+                gap = xp.select(xp.take(self.smooth, which), blend, gap)
+            # those of the kind that is there change nothing of it
+            gap = xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
+            gap = xp.minimum(_part(xp, states.bound, index), gap)
             if operand.change is not None:
                 gap = xp.minimum(gap, operand.change)
             states.bound = _update(xp, states.bound, index, gap)
@@ -683,15 +617,6 @@ class SolidField(Objects):
             past = _part(xp, states.slope, index)
             states.slope = _update(xp, states.slope, index, by_own * operand.gradient + by_past * past)
         states.memory = _update(xp, states.memory, index, after)
-
-    def _gap(self, d: Array, before: Array, look: Array, which: Array) -> Array:
-        """Distances (k,) within which objects at d (k,) leave the kind of material as it is."""
-        xp, gap = self.xp, abs(d)
-        if self.smooth is not None:
-            blend = xp.minimum(gap, abs(before[0] - d) / 2)
-            gap = xp.select(xp.take(self.smooth, which), blend, gap)
-        # objects of the kind that is there change nothing of it
-        return xp.select(abs(before[1] - look[-1]) > 0.5, gap, 0 * gap + EMPTY)
 
     def inside(self, passes: Passes, t: Array) -> Array:
         """A mask of balls (K, M) around the points at t (M,), of objects that change something there."""
@@ -728,11 +653,6 @@ class SolidField(Objects):
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:
     """Entries (…, k) of an array (…, M), or all."""
     return whole if index is None else xp.take(whole, index)
-
-
-def _first(whole: Array, count: int) -> Array:
-    """The first entries (…, M) of an array, or None."""
-    return whole if whole is None else whole[..., :count]
 
 
 def _update(xp: Arrays, whole: Array, index: Array | None, values: Array) -> Array:

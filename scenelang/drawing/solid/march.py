@@ -1,13 +1,12 @@
 """Rays through the solids' field: the first surface, and the ways through media before it.
 
 The field bounds how far a surface or another kind of material is, and a step goes as far (Hart 1996). Where
-the last two bounds predict a surface farther on, a step goes just behind that, by at most `Pace.gap` more; a
-ray may miss solids thinner than the gap. A ray prepares its questions once, up to where it meets other
-objects; most rays meet one object alone and ask its decoder, with no cell between. Rays that are done leave
-the batch.
+the last two bounds predict a surface farther on, a step goes just behind that, by at most `Pace.gap` more. A
+ray prepares its questions once, up to where it meets other objects; most rays meet one object alone and ask
+its decoder, with no cell between.
 
 A network has learned the length of half a ray inside a leaf. It answers for rays that pass only media under
-affine maps, joined by unions and beyond the reach of blends, whose balls are apart; the others are marched.
+affine maps, joined by unions and beyond the reach of blends, whose balls are apart.
 """
 
 from __future__ import annotations
@@ -43,29 +42,32 @@ Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, len
 
 
 @dataclass(slots=True)
+class Work:
+    """Counts of the work of drawing."""
+
+    rays: int = 0  # from the eye
+    lights: int = 0  # rays from the light
+    near: int = 0  # rays of both kinds that came near an object; the others took no step
+    steps: int = 0  # points of space on them at which the field was asked
+    met: int = 0  # (object, point) pairs that went through the network
+    refined: int = 0  # pixels that were sampled four times
+    lost: int = 0  # rays that took all the steps there are without coming to an end
+
+    def __add__(self, other: Work) -> Work:
+        return Work(*map(add, astuple(self), astuple(other)))
+
+
+@dataclass(slots=True)
 class Trail:
-    """Surfaces and media that M rays met.
+    """Surfaces and media that M rays met."""
 
-    Args:
-        hit: (M,) how far the first opaque surface is, inf where there is none.
-        length: (M,) world units in media before that or before the ray's end.
-        soft: (M,) 1 where it was a medium that the surface ends, 0 elsewhere: the distance is not 0 there.
-        place: (M,) of rays in `passes`, -1 where they pass none.
-        passes: the balls that those pass.
-        pieces: of the ways in media.
-        near, steps, met, lost: as of `Work`.
-    """
-
-    hit: Array
-    length: Array
-    soft: Array
-    place: Array
+    hit: Array  # (M,) how far the first opaque surface is, inf where there is none
+    length: Array  # (M,) world units in media before that or before the ray's end
+    soft: Array  # (M,) 1 where a surface ends a medium, 0 elsewhere: the distance is not 0 there
+    place: Array  # (M,) of rays in `passes`, -1 where they pass none
     passes: Passes
     pieces: list[Piece] = field(default_factory=list)
-    near: int = 0
-    steps: int = 0
-    met: int = 0
-    lost: int = 0
+    work: Work = field(default_factory=Work)
 
     def at(self, xp: Arrays, index: Array) -> Passes:
         """The balls that some of the rays pass."""
@@ -74,25 +76,18 @@ class Trail:
 
 @dataclass(slots=True)
 class _Batch:
-    """Rays that are asked together.
+    """Rays that are asked together."""
 
-    Args:
-        place: numbers of their balls (n,).
-        rows: what they carry along (…, n).
-        alive: which are still under way (n,), as many as are `left`.
-        waiting: others that come in, with numbers of their balls, as many as `more` says.
-        bounds: of those that meet one object alone where each group begins, and the end.
-        pairs: of the others.
-    """
-
-    place: Array
-    rows: Array
-    alive: Array
-    left: int = 0
-    more: int = 0
-    waiting: list[tuple[Array, Array]] = field(default_factory=list)
-    bounds: list[int] = field(default_factory=list)
-    pairs: Pairs | None = None
+    place: Array  # numbers of their balls (n,)
+    rows: Array  # what they carry along (…, n)
+    alive: Array  # which are still under way (n,)
+    left: int = 0  # as many
+    more: int = 0  # as many wait
+    waiting: list[tuple[Array, Array]] = field(default_factory=list)  # places and rows that come in
+    bounds: list[int] = field(
+        default_factory=list
+    )  # where each group of rays of one object begins, and the end
+    pairs: Pairs | None = None  # of the others
 
 
 class Rays:
@@ -132,7 +127,7 @@ class Rays:
             elif not self.between:
                 break
         else:
-            self.trail.lost = sum(batch.left + batch.more for batch in self.batches)
+            self.trail.work.lost = sum(batch.left + batch.more for batch in self.batches)
         if self.struck:
             places, rows, frees = zip(*self.struck, strict=True)
             hit = self._root(xp.concat(rows, 1), xp.concat(frees, 0))
@@ -150,12 +145,6 @@ class Rays:
             none = index[:0]
             self.batches[0] = _Batch(none, alone.rows[:, :0], none < 0)
 
-    def _drawn(self, slots: Array, places: Array) -> Array:
-        """Places (K, k) of the objects that draw, inf for the others."""
-        if self.solids.draws:
-            return places
-        return self.xp.select(slots[OBJECT] < 0, self.never, places)
-
     def _go_on(self, place: Array, rows: Array, passes: Passes) -> None:
         """Rays come to where they meet other objects, or none; up to `UNTIL` they are sure to come."""
         xp, solids = self.xp, self.solids
@@ -165,7 +154,10 @@ class Rays:
         if solids.media:  # the way through a medium ends with its ball
             within = rows[WITHIN] > 0
             at = xp.select(within & (end > t), xp.minimum(at, end), at)
-        rows[T] = xp.least(self._drawn(passes.slots, xp.select(at <= end, at, self.never)))
+        at = xp.select(at <= end, at, self.never)
+        if not solids.draws:  # those that do not are no reason to stop
+            at = xp.select(passes.slots[OBJECT] < 0, self.never, at)
+        rows[T] = xp.least(at)
         if solids.adding is not None:  # what a group leaves may begin where it meets more
             objects = xp.whole(passes.slots[OBJECT])
             objects = xp.select(objects < 0, -1 - objects, objects)
@@ -233,14 +225,14 @@ class Rays:
     def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
         """Masks of points at t (n,) inside media and inside opaque solids, and how far both hold."""
         solids, rows = self.solids, batch.rows
-        self.trail.steps += len(t)
+        self.trail.work.steps += len(t)
         if batch.pairs is None:
-            self.trail.met += len(t)
+            self.trail.work.met += len(t)
             d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
             free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
         else:
-            result = solids.answer(batch.pairs, t, self.wanted, change=solids.mixed)
-            self.trail.met += result.met
+            result = solids.meet(batch.pairs, t, self.wanted, change=solids.mixed)
+            self.trail.work.met += result.met
             d, free, dense = result.distance, abs(result.distance), None
             if solids.mixed:
                 dense = result.register[0] > 0.5
@@ -315,7 +307,7 @@ class Rays:
         for _ in range(halvings):
             half = (low + high) / 2
             result = self.solids.meet(passes, half, self.wanted)
-            self.trail.met += result.met
+            self.trail.work.met += result.met
             still = (result.distance < 0) & (result.register[0] > 0.5)
             low, high = xp.select(still, half, low), xp.select(still, high, half)
         xp.put(self.trail.hit, ray, high)
@@ -357,12 +349,7 @@ def known(solids: SolidField, passes: Passes) -> Array:
 
 
 def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
-    """World units that rays (M,) are in media, and how many objects they were asked of.
-
-    Args:
-        solids: the field.
-        passes: the balls of rays that are `known`.
-    """
+    """World units that `known` rays (M,) are in media, and how many objects they were asked of."""
     xp, slots = solids.xp, passes.slots
     flat = xp.where((slots[BEGIN] < INF).reshape(-1))
     pairs = xp.take(slots.reshape(len(slots), -1), flat)
@@ -385,46 +372,14 @@ HALVINGS = 16  # of the interval in which a medium gives way to a solid
 
 
 class Pace(NamedTuple):
-    """Trade-offs between speed and accuracy where solids are drawn.
+    """Trade-offs between speed and accuracy where solids are drawn."""
 
-    Args:
-        gap: world units by which steps may go beyond what is certain; what is thinner may be passed.
-        nodes: points on a ray's way through a medium at which the light is asked for.
-        contrast: pixels that differ more from their neighbours, in sRGB, are sampled four times.
-    """
-
-    gap: float = 0.009
-    nodes: int = 3
-    contrast: float = 0.04
+    gap: float = 0.009  # world units by which steps may pass what is certain, and what is thinner
+    nodes: int = 3  # points on a ray's way through a medium at which the light is asked for
+    contrast: float = 0.04  # sRGB: pixels that differ more from their neighbours are sampled four times
 
 
 CAREFUL = Pace()
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """Counts of the work of drawing.
-
-    Args:
-        rays: from the eye.
-        lights: rays from the light.
-        near: rays of both kinds that came near an object; the others took no step.
-        steps: points of space on them at which the field was asked.
-        met: (object, point) pairs that went through the network.
-        refined: pixels that were sampled four times.
-        lost: rays that took all the steps there are without coming to an end.
-    """
-
-    rays: int = 0
-    lights: int = 0
-    near: int = 0
-    steps: int = 0
-    met: int = 0
-    refined: int = 0
-    lost: int = 0
-
-    def __add__(self, other: Work) -> Work:
-        return Work(*map(add, astuple(self), astuple(other)))
 
 
 def march(
@@ -440,9 +395,7 @@ def march(
     """Follow rays.
 
     Args:
-        solids: the field.
-        origin: of all rays (3,).
-        way: unit directions (3, M).
+        origin, way: of all rays (3,), and unit directions (3, M).
         limit: how far to go (M,).
         halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
         gap: as of `Pace`.
@@ -452,12 +405,13 @@ def march(
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
     ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
-    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, near=len(ids))
+    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes)
+    trail.work.near = len(ids)
     if whole and solids.segments and len(ids):
         sure = known(solids, passes)
         some, rest = xp.where(sure), xp.where(~sure)
         if len(some):
-            answers, trail.met = lengths(solids, passes.at(xp, some))
+            answers, trail.work.met = lengths(solids, passes.at(xp, some))
             xp.put(length, xp.take(ids, some), answers)
         ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):

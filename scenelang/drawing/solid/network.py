@@ -1,8 +1,7 @@
 """The solids' network, from top to bottom, for parameters of either library, and boxes around its leaves.
 
 Letters: N objects, M points, C = `code`, G = `width`, S = `segment`, L = `paint_lines`, K = `kind_lines`.
-Distances are in world units, leaf coordinates in leaf units, points lie last, as in `network.py`, whose two
-learned parts are these too:
+Distances are in world units, leaf coordinates in leaf units, points lie last. Two parts are learned:
 
 1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code.
    Light shows normals, so its units are smooth: SiLU (Elfwing et al. 2018).
@@ -92,21 +91,14 @@ SEGMENT = 5  # numbers that tell a ray in a leaf, see `folded`
 
 @dataclass(frozen=True, slots=True)
 class SolidConfig:
-    """Sizes of the network.
+    """Sizes of the network."""
 
-    Args:
-        code, material_code: entries of the codes.
-        width: hidden units of the decoder's two layers.
-        paint_lines, kind_lines: lines of which the highest opens the gate of colour and that of medium.
-        segment: hidden units of the two layers that answer for whole segments; 0: there are none.
-    """
-
-    code: int = 4
+    code: int = 4  # entries of the codes
     material_code: int = 2
-    width: int = 8
-    paint_lines: int = 2
-    kind_lines: int = 2
-    segment: int = 0
+    width: int = 8  # hidden units of the decoder's two layers
+    paint_lines: int = 2  # lines of which the highest opens the gate of colour
+    kind_lines: int = 2  # and that of medium
+    segment: int = 0  # hidden units of the two layers that answer for whole segments; 0: there are none
 
 
 class Cell(NamedTuple):
@@ -225,18 +217,13 @@ class SolidNetwork:
         return xp.concat([value, g], 0)
 
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
-        """One object: the cell.
+        """The memory behind an object, and how far the distance's gate is open (M,): the cell.
 
         Args:
             d: the object's distance (M,).
             memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
                 (1 + R, M) with colours before it.
             look: the object's own register (R, 1), or (R, M).
-            cell: of the object's token.
-            wanted: what the memory holds.
-
-        Returns:
-            The memory behind the object, and how far the distance's gate is open (M,).
         """
         xp, state = self.xp, memory[:1]
         gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
@@ -257,18 +244,14 @@ class SolidNetwork:
     def alone(self, reach: Array, cell: Cell) -> Array:
         """Factors of distances (N,) of up to a reach (N,) where nothing has been met.
 
-        0 where a gate may not be open there.
-
-        Args:
-            reach: world units.
-            cell: of the objects' tokens, as for `Wanted.ALL`.
+        0 where a gate may not be open there. The cell is that of `Wanted.ALL`.
         """
         least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
         gates = (least[:1], least[1:n], least[n:])
         return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
 
     def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
-        """Derivatives of the distance behind an object by its own (M,) and by that before it (M,)."""
+        """Derivatives (M,) of the distance behind an object by its own and by that before it."""
         candidate, bump = cell.candidate[0], cell.bump[0]
         rate = d * candidate - state - (1 - 2 * take) * bump
         rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)
@@ -315,14 +298,8 @@ def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tu
 def folded(xp: Arrays, q: Array, way: Array) -> Array:
     """Numbers (5, M) that tell a ray in a leaf, up to turns about y and the mirrors, which change no leaf.
 
-    Args:
-        xp: functions of the arrays' library.
-        q: points (3, M).
-        way: unit directions (3, M).
-
-    Returns:
-        Distances of the points from the axis and from the plane across it; how fast the ray goes away from
-        the axis, about it, and away from the plane.
+    They are the distances of its point from the axis and from the plane across it, and how fast the ray goes
+    away from the axis, about it, and away from the plane, by points and unit directions (3, M).
     """
     rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
     a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)

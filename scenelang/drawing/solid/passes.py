@@ -1,7 +1,4 @@
-"""Objects that rays may meet: their frames, and the balls in which each lies.
-
-The three-dimensional companion of `frames.py`: maps, turns of space and what bounds them, none of it learned.
-Points are arrays (3, M).
+"""Objects that rays may meet: their frames, and the balls in which each lies; none of it is learned.
 
 A ray has a slot for each ball that it passes, so that its cost depends on those balls alone, however many
 objects the scene has. An object that cuts away everything outside of it is met wherever something may be.
@@ -44,7 +41,6 @@ class Turn(NamedTuple):
         return xp.stack(rows, 0), cos, sin, length
 
     def __call__(self, xp: Arrays, p: Array) -> Array:
-        """Points turned."""
         return self._carried(xp, p)[0]
 
     def pulled(self, xp: Arrays, p: Array, g: Array) -> Array:
@@ -57,10 +53,6 @@ class Turn(NamedTuple):
         rows[self.along] = rows[self.along] + self.rate * swing
         result = xp.stack(rows, 0)
         return result if length is None else result + (self.twirl * swing / length.clip(1e-12)) * p
-
-    def placed(self, xp: Arrays, like: Array) -> Turn:
-        """Itself."""
-        return self
 
     def stretch(self, radius: float) -> float:
         """Greatest factor by which it lengthens a small step, in the ball of a radius about the origin.
@@ -81,7 +73,6 @@ class Map(NamedTuple):
     shift: Array  # (3,)
 
     def __call__(self, xp: Arrays, p: Array) -> Array:
-        """Points mapped."""
         return xp.dense(p, self.linear, self.shift)
 
     def pulled(self, xp: Arrays, p: Array, g: Array) -> Array:
@@ -95,25 +86,16 @@ class Map(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SolidFrame:
-    """An object's way back to its leaf, outermost first.
+    """An object's way back to its leaf, outermost first."""
 
-    Args:
-        outer: the map into the space in which the object lies in a ball about the origin.
-        steps: what follows it.
-        scale: world distance per leaf distance, the smallest singular value of the composed map.
-        reach, moved: the ball that holds a leaf ball of radius r has the radius reach r + moved.
-        amount, frequency: of the displacement.
-        blend: width of the blend by which the object joins.
-    """
-
-    outer: Map
-    steps: tuple[Turn | Map, ...]
-    scale: float
-    reach: float
+    outer: Map  # into the space in which the object lies in a ball about the origin
+    steps: tuple[Turn | Map, ...]  # what follows it
+    scale: float  # world distance per leaf distance, the smallest singular value of the composed map
+    reach: float  # the ball that holds a leaf ball of radius r has the radius reach r + moved
     moved: float
-    amount: float
+    amount: float  # of the displacement
     frequency: float
-    blend: float
+    blend: float  # width of the blend by which the object joins
 
     def ball(self, radius: float) -> float:
         """Radius of the ball behind `outer` outside which leaf coordinates are longer than ``radius``."""
@@ -148,21 +130,19 @@ class SolidFrame:
 
     def placed(self, xp: Arrays, like: Array) -> SolidFrame:
         """The same where an array lies."""
-        steps = tuple(step.placed(xp, like) for step in self.steps)
+        steps = tuple(step if isinstance(step, Turn) else step.placed(xp, like) for step in self.steps)
         return replace(self, outer=self.outer.placed(xp, like), steps=steps)
 
 
 def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame:
-    """The frame of one vector (64,).
-
-    Raises:
-        ProgramError: it leads from the world to no leaf, which no compiled scene has.
-    """
+    """The frame of one vector (64,); raises `ProgramError` where it leads to no leaf."""
     g = g.astype(np.float64)
     if not np.abs(g[: layout.geometry]).max() < MOST:
         raise ProgramError("a frame beyond float32")
     parts = layout.unpack(g)
-    last, middle = _map(parts.frame), _map(parts.middle)
+    last, middle = (
+        Map(rows[:, :3], rows[:, 3]) for rows in np.reshape([parts.frame, parts.middle], (2, 3, 4))
+    )
     outer, inner = _turns(parts.outer), _turns(parts.inner)
     whole = Map(middle.linear @ last.linear, middle.linear @ last.shift + middle.shift)
     stretches = np.linalg.svd(whole.linear, compute_uv=False)
@@ -188,11 +168,7 @@ def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame
 
 
 def inverse_of(linear: np.ndarray) -> np.ndarray:
-    """The inverse of a linear map (3, 3).
-
-    Raises:
-        ProgramError: it has none in float32.
-    """
+    """The inverse of a linear map (3, 3); raises `ProgramError` where float32 has none."""
     try:
         result: np.ndarray = np.linalg.inv(linear)
     except np.linalg.LinAlgError:
@@ -200,11 +176,6 @@ def inverse_of(linear: np.ndarray) -> np.ndarray:
     if not np.abs(result).max() < MOST:
         raise ProgramError("a frame beyond float32")
     return result
-
-
-def _map(frame: np.ndarray) -> Map:
-    rows = frame.reshape(3, 4)
-    return Map(rows[:, :3], rows[:, 3])
 
 
 def _single(wide: Map) -> Map:
@@ -231,58 +202,42 @@ OBJECT, WAY, BEGIN, END, RATE, SLOT = 0, slice(1, 4), 4, 5, 6, 7  # what a slot 
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """One object: where rays may meet it.
-
-    Args:
-        frame: where it lies.
-        draws: whether something may be seen, where it is met, of what was empty before.
-        clips: whether outside its ball nothing is left of what came before in its group, or before the group
-            that it begins.
-        begins: whether it begins a group.
-        ends: how many groups end behind it.
-        radius: leaf units from its origin beyond which it changes nothing.
-        ball: radius of the ball around that behind the frame's outer map.
-        rate: how fast its world distance changes in it at most, per step of 1 behind the map.
-        centre, extent: a ball (3,) of the world around that.
-        wide: whether its ball holds more than what its leaf changes.
-        box: behind the map the least and the greatest coordinates (3, 1) of what it changes, if known.
-    """
+    """One object: where rays may meet it."""
 
     frame: SolidFrame
-    draws: bool
-    clips: bool
-    begins: bool
-    ends: int
-    radius: float
-    ball: float
-    rate: float
-    centre: Array
-    extent: float
-    wide: bool = False
-    box: tuple[Array, Array] | None = None
-
-    def within(self, xp: Arrays, box: np.ndarray, like: Array) -> Solid:
-        """The same with its leaf's box (2, 3), where an affine map leads to the leaf and the box is small."""
-        if (box[1] - box[0]).min() > SMALL or self.frame.steps or self.wide:
-            return self
-        low, high = (box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * (self.radius - 1)).astype(np.float32)
-        return replace(self, box=(xp.array(low, like), xp.array(high, like)))
+    draws: bool  # something may be seen, where it is met, of what was empty before
+    clips: bool  # outside its ball nothing is left of its group so far, or of what the group it begins joins
+    begins: bool  # a group
+    ends: int  # groups that end behind it
+    radius: float  # leaf units from its origin beyond which it changes nothing
+    ball: float  # radius of the ball around that behind the frame's outer map
+    rate: float  # at which its world distance changes in it at most, per step of 1 behind the map
+    centre: Array  # (3,) of a ball of the world around that
+    extent: float  # radius of this
+    wide: bool = False  # its ball holds more than what its leaf changes
+    box: tuple[Array, Array] | None = (
+        None  # behind the map, least and greatest coordinates (3, 1) that it changes
+    )
 
 
 def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widths: Floats) -> list[Solid]:
-    """The objects of a stream, whose groups and widths of blends are as of `felt`.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf.
-    """
+    """The objects of a stream, whose groups and widths of blends are as of `felt`; raises `ProgramError`."""
     xp, layout, like = network.xp, network.layout, network.codes
     solids: list[Solid] = []
     frames = [read_solid_frame(vector, layout) for vector in vectors]
     deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
-    matters, seen = felt(groups, widths), showing(groups)
-    # what is taken away says how deep points inside others lie
-    deep = matters.everywhere & _under(groups, SUBTRACT)
+    matters = felt(groups, widths)
+    # rows (1 + D, N) that may show something where it was empty: at all, and in their groups
+    shows = np.isin(groups.tokens, (UNION, SMOOTH))
+    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
+    seen = np.logical_and.accumulate([shows, *inner])[::-1]
+    # rows that a subtract joins, or a group around them: these say how deep points inside others lie
+    taken = (groups.tokens == SUBTRACT) | ((groups.path >= 0) & (groups.joins[groups.path] == SUBTRACT)).any(
+        1
+    )
+    deep = matters.everywhere & taken
     for i, frame in enumerate(frames):
+        # a blend reaches as far as its width, and each lowers the distance by a quarter of that at most
         blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
         if deep[i]:
             blends += deepest
@@ -306,34 +261,14 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     return _widened(xp, solids, frames, groups, seen) if groups.deepest else solids
 
 
-def showing(groups: Groups) -> Mask:
-    """A mask (1 + D, N) of rows that may show something where it was empty: at all, and in their groups."""
-    shows = np.isin(groups.tokens, (UNION, SMOOTH))
-    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
-    return np.asarray(np.logical_and.accumulate([shows, *inner])[::-1])
-
-
-def _under(groups: Groups, operator: int) -> Mask:
-    """Find rows (N,) that an operator joins, or a group around them."""
-    result = groups.tokens == operator
-    for path in groups.path.T:
-        result = result | ((path >= 0) & (groups.joins[path] == operator))
-    return np.asarray(result)
-
-
 def _widened(
     xp: Arrays, solids: list[Solid], frames: Sequence[SolidFrame], groups: Groups, seen: Mask
 ) -> list[Solid]:
     """The same, of which those that intersect are met wherever they have to be.
 
-    A group that is intersected with what stands before it has to be there, whatever cuts it: so there what
-    intersects in it is met wherever the group may be. Elsewhere what came before ends with its ball.
-
-    Args:
-        xp: functions of the arrays' library.
-        solids, groups: of the stream.
-        frames: where they lie, as arrays of numpy.
-        seen: as `showing` tells.
+    A group that is intersected with what stands before it has to be there, whatever cuts it: so what
+    intersects in it is met wherever the group may be. Elsewhere what came before ends with its ball. The
+    frames are arrays of numpy.
     """
     centres = np.array([np.asarray(xp.to_numpy(solid.centre), np.float64) for solid in solids])
     extents = np.array([solid.extent for solid in solids])[:, None]
@@ -376,17 +311,12 @@ def _widened(
 
 
 class Passes(NamedTuple):
-    """The balls that M rays from one point pass, K at most.
+    """The balls that M rays from one point pass, K at most."""
 
-    Args:
-        slots: (SLOT, K, M). A ray's last object comes first: its number, or -1 minus it where it does not
-            draw; the direction of the ray behind its map; begin and end, inf and -inf where there is none;
-            how fast its distance changes along the ray at most.
-        origins: (3, N), the point behind the map of each object.
-    """
-
+    # (SLOT, K, M), a ray's last object first: its number, or -1 minus it where it does not draw; the ray's
+    # direction behind its map; begin and end, inf and -inf where there is none; the distance's greatest rate
     slots: Array
-    origins: Array
+    origins: Array  # (3, N), the point behind the map of each object
 
     def at(self, xp: Arrays, index: Array) -> Passes:
         """Passes of some of the rays."""
@@ -405,12 +335,8 @@ def find_passes(
     """Indices (k,) of rays that may meet something that draws, and the balls that these pass.
 
     Args:
-        xp: functions of the arrays' library.
-        solids: the objects.
-        origin: of all rays (3,).
-        origins: the same behind the map of each object (3, N).
-        way: unit directions (3, M).
-        limit: where the rays end (M,).
+        origin, origins: of all rays (3,), and behind the map of each object (3, N).
+        way, limit: unit directions (3, M), and where the rays end (M,).
         tight: whether objects' boxes count too.
     """
     low, high, result = 0 * way[0], limit, []

@@ -6,38 +6,37 @@ from functools import partial
 
 import numpy as np
 import pytest
-import torch
 
-from scenelang.compiler.graph import Fold
+import scenelang as nsg
 from scenelang.compiler.spaces import Light, Stage
 from scenelang.drawing.closed import ClosedSolids
 from scenelang.drawing.exact.solid import Field, solid_image
-from scenelang.drawing.neural.torch_networks import Solids
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import SolidNetwork, Wanted
-from scenelang.drawing.solid.passes import SLACK
-from scenelang.language.words import BLEND, TOKENS
-from tests.drawing.solids import Object, field, moved, network, psnr, scaled, turned
-from tests.drawing.test_renderers_solids import everywhere
-from tests.drawing.trees import Answer, Join, Tree, fold, random_tree, tree_field, tree_graph
+from tests.drawing.solids import (
+    Answer,
+    Join,
+    Object,
+    Tree,
+    everywhere,
+    field,
+    folded,
+    moved,
+    network,
+    random_tree,
+    scaled,
+    torch_network,
+    tree_field,
+    tree_graph,
+    turned,
+)
+from tests.pictures import psnr_db
 
 STAGE = Stage(light=Light((1.5, 3.0, 2.5), 16.0))
 LEAST = 2e-3  # world units from a surface where sides are told apart
 EYE = np.array([0.5, 1.2, 6.0], np.float32)
-BALL, RING = Object("sphere", (scaled(0.7, 0.7, 0.7),)), Object("torus", (turned(0.5), moved(0.3, 0, 0)))
-
-
-def torch_network() -> Solids:
-    """The shipped network in torch."""
-    net = network()
-    other = Solids(net.config, 2, 2)
-    with torch.no_grad():
-        for name, parameter in other.named_parameters():
-            group, _, index = name.partition(".")
-            value = getattr(net, group)
-            parameter.copy_(torch.from_numpy(value[int(index)] if index else value))
-    return other.requires_grad_(False)
+BALL, RING = Object("sphere", (scaled(0.7),)), Object("torus", (turned(0.5), moved(0.3, 0, 0)))
 
 
 CLOSED, TORCH = ClosedSolids("solids3d"), torch_network()
@@ -55,48 +54,13 @@ def tree_of(seed: int, least: int = 1) -> Tree:
 
 
 @pytest.mark.parametrize("library", ["numpy", "torch"])
-@pytest.mark.parametrize("token", ["subtract", "intersect"])
-def test_rounded_cuts_are_those_of_the_formula(token: str, library: str) -> None:
-    """Distances, colours and gradients over distances of all sizes and widths from thin to wide."""
-    net = network() if library == "numpy" else TORCH
-    xp, like, n, h = net.xp, net.codes, 3000, 1e-4
-    rng = np.random.default_rng(3)
-    for k in (0.01, 0.05, 0.15, 0.5, 2.0):
-        past, own = (k * rng.uniform(-2, 2, (2, n))).astype(np.float32)
-        e = -own if token == "subtract" else own
-        share = np.clip(0.5 - 0.5 * (e - past) / k, 0, 1)
-        exact = share * past + (1 - share) * e + k * share * (1 - share)
-        memory, look = np.concatenate([past[None], np.zeros((4, n))]).astype(np.float32), np.ones((4, 1))
-        for wanted, count in zip(Wanted, (1, 2, 5), strict=True):
-            cell = net.cut(TOKENS[token], k)[wanted]
-            state = xp.array(np.concatenate([memory[:1], memory[len(memory) - count + 1 :]]), like)
-            d = xp.array(own, like)
-            found, take = net.join(d, state, xp.array(look.astype(np.float32), like), cell, wanted)
-            after = np.asarray(xp.to_numpy(found))
-            assert abs(after[0] - exact).max() < 1e-3 * k
-            assert abs(after[1:]).max(initial=0) < 1e-6  # what is cut keeps its colour and kind
-            by_own, by_past = (np.asarray(xp.to_numpy(v)) for v in net.partials(d, state[0], take, cell))
-            clear = abs(abs(e - past) - k) > 3 * h * k + 2e-3 * k  # off the ends of the edge
-            for slope, moves in ((by_own, (h * k, 0)), (by_past, (0, h * k))):
-                near = _rounded(past + moves[1], own + moves[0], k, token)
-                back = _rounded(past - moves[1], own - moves[0], k, token)
-                assert abs(slope - (near - back) / (2 * h * k))[clear].max() < 4e-3
-
-
-def _rounded(past: np.ndarray, own: np.ndarray, k: float, token: str) -> np.ndarray:
-    e = (-own if token == "subtract" else own).astype(np.float64)
-    share = np.clip(0.5 - 0.5 * (e - past) / k, 0, 1)
-    return np.asarray(share * past + (1 - share) * e + k * share * (1 - share))
-
-
-@pytest.mark.parametrize("library", ["numpy", "torch"])
 def test_states_are_those_of_the_recursion(library: str) -> None:
     """Where every object is met: distances, colours, kinds and gradients; the leaves' own are the field's."""
     net: SolidNetwork = network() if library == "numpy" else TORCH
     deepest = 0
     for seed in range(14 if library == "numpy" else 5):
         tree, p = tree_of(seed, 2), points(seed, 800)
-        exact = fold(tree, partial(_alone, p=p, notes={}))
+        exact = folded(tree, partial(_alone, p=p, notes={}))
         solids = tree_field(tree, net)
         solids.far, deepest = True, max(deepest, solids.tree.deepest)
         found = _told(solids, everywhere(solids, p, gradient=True))
@@ -155,37 +119,9 @@ def test_what_is_not_met_changes_nothing(library: str) -> None:
     assert astray <= (0.001 if library == "numpy" else 0.03) * count  # leaves are learned
 
 
-def test_balls_of_flat_streams_are_what_blends_reach() -> None:
-    """As before there were groups, to the last bit; and points have one state."""
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        objects = [
-            Object("sphere", (scaled(*rng.uniform(0.3, 0.8, 3)), moved(*rng.uniform(-1, 1, 3))), token=token)
-            for token in ("union", *rng.choice([*TOKENS], 7).tolist())
-        ]
-        objects = [o._replace(k=float(rng.choice([0.0, 0.3])) * (o.token == "smooth")) for o in objects]
-        solids = field(objects)
-        deepest = max(solid.frame.scale for solid in solids.solids)
-        smooths, widest = 0, 0.0
-        for o, solid in reversed(list(zip(objects, solids.solids, strict=True))):
-            if o.token == "smooth":
-                smooths, widest = smooths + 1, max(widest, float(np.float32(o.k)) or BLEND)
-            blends = widest * (1 + smooths / 4) + (deepest if smooths and o.token == "subtract" else 0.0)
-            assert solid.radius == 1 + SLACK + blends / solid.frame.scale
-            assert solid.draws == (o.token in ("union", "smooth"))
-            assert solid.clips == (o.token == "intersect")
-        p = rng.uniform(-1, 1, (3, 50)).astype(np.float32)
-        t = np.linalg.norm(p - EYE[:, None], axis=0)
-        met, passes = solids.passes(EYE, (p - EYE[:, None]) / t, t)
-        if len(met):
-            pairs = solids.pairs(passes, t[met])
-            assert pairs.depth == 1
-            assert not any(pairs.closings)
-
-
 def test_a_group_that_meets_nothing_has_no_state() -> None:
     """One that draws goes on in what is empty; a cut on nothing is nothing."""
-    away = Object("sphere", (scaled(0.3, 0.3, 0.3), moved(0, 0, -2)))
+    away = Object("sphere", (scaled(0.3), moved(0, 0, -2)))
     p = np.random.default_rng(4).uniform(-0.5, 0.5, (3, 200)).astype(np.float32)
     t = np.linalg.norm(p - EYE[:, None], axis=0)
     way = (p - EYE[:, None]) / t
@@ -216,7 +152,7 @@ def test_a_group_that_meets_nothing_has_no_state() -> None:
 def test_steps_in_media_pass_no_change_of_kind(op: str, kinds: tuple[str, str]) -> None:
     """Nowhere within the bound on how far the material is the same is it another."""
     rng, (a, b) = np.random.default_rng(6), kinds
-    mist = BALL._replace(material=a, steps=(scaled(1.2, 1.2, 1.2),))
+    mist = BALL._replace(material=a, steps=(scaled(1.2),))
     inner = Tree((Join("union", RING._replace(material=b)), Join(op, BALL._replace(material=a), 0.2)))
     solids = tree_field(Tree((Join("union", mist), Join("union", inner), Join("smooth", RING, 0.2))))
     p = rng.uniform(-1, 1, (3, 1500)).astype(np.float32)
@@ -238,51 +174,34 @@ def test_steps_in_media_pass_no_change_of_kind(op: str, kinds: tuple[str, str]) 
 
 def test_segments_answer_for_groups_that_are_unions() -> None:
     """What is drawn is what is marched, and rays that pass what cuts are marched."""
-    mists = [
-        Object("sphere", (scaled(0.35, 0.35, 0.35), moved(x, 0, 0)), "volumetric") for x in (-0.8, 0.0, 0.8)
-    ]
-    cut = Tree((Join("union", mists[1]), Join("subtract", mists[1]._replace(steps=(scaled(0.2, 0.2, 0.2),)))))
+    mists = [Object("sphere", (scaled(0.35), moved(x, 0, 0)), "volumetric") for x in (-0.8, 0.0, 0.8)]
+    cut = Tree((Join("union", mists[1]), Join("subtract", mists[1]._replace(steps=(scaled(0.2),)))))
     for group in (Tree(Join("union", mist) for mist in mists[1:]), cut):
         tree = Tree((Join("union", mists[0]), Join("union", group)))
         solids, marched = tree_field(tree), tree_field(tree)
         marched.segments = []
         assert solids.segments
         mine, other = (draw_solids(each, STAGE, (48, 40))[0] for each in (solids, marched))
-        assert psnr(mine, other) > 45
-        assert psnr(mine, solid_image(_root(tree), STAGE, (48, 40))) > 45
+        assert psnr_db(mine, other) > 45
+        assert psnr_db(mine, solid_image(tree_graph(tree), STAGE, (48, 40))) > 45
 
 
-def _root(tree: Tree) -> Fold:
-    found = tree_graph(tree)
-    assert isinstance(found, Fold)
-    return found
-
-
-@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 66), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 66), marks=pytest.mark.slow)])
 def test_pictures_of_trees_are_those_of_the_reference(seeds: range) -> None:
     """Diffuse and volumetric; those of closed forms differ by what samples of a pixel do."""
     learned, closed = [], []
     for seed in seeds:
         tree = tree_of(seed)
-        exact = solid_image(_root(tree), STAGE, (64, 64))
+        exact = solid_image(tree_graph(tree), STAGE, (48, 48))
         for found, net in ((learned, network()), (closed, CLOSED)):
-            found.append(min(50.0, psnr(draw_solids(tree_field(tree, net), STAGE, (64, 64))[0], exact)))
+            found.append(min(50.0, psnr_db(draw_solids(tree_field(tree, net), STAGE, (48, 48))[0], exact)))
     assert np.mean(learned) > 47
     assert np.quantile(learned, 0.05) > 40
     assert min(closed) > 43
 
 
-def test_both_libraries_draw_trees_alike() -> None:
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    fields = (tree_field(tree_of(3), net) for net in (network(), TORCH))
-    mine, theirs = (draw_solids(solids, STAGE, (24, 24))[0] for solids in fields)
-    torch.set_num_threads(threads)
-    assert psnr(mine, theirs) > 55
-
-
 def ball(x: float, y: float, radius: float = 0.9) -> Object:
-    return Object("sphere", (scaled(radius, radius, radius), moved(x, y, 0)))
+    return Object("sphere", (scaled(radius), moved(x, y, 0)))
 
 
 BOTH = Tree((Join("union", ball(0.4, 0)), Join("intersect", ball(-0.4, 0))))
@@ -301,7 +220,7 @@ HOLE = Tree((Join("union", ball(0, 0, 1.5)), Join("subtract", ball(0.8, 0, 0.2))
 def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
     """Intersections in one another whose leaves lie apart; a rounded edge along a hole in a group."""
     p = np.random.default_rng(8).uniform(-2, 2, (3, 20000)).astype(np.float32)
-    exact = Field(_root(tree)).at(p.astype(float)).d
+    exact = Field(tree_graph(tree)).at(p.astype(float)).d
     solids = tree_field(tree, CLOSED)
     t = np.linalg.norm(p - EYE[:, None], axis=0)
     met, passes = solids.passes(EYE, (p - EYE[:, None]) / t, t + 5)
@@ -310,3 +229,51 @@ def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
     clear = abs(exact) > LEAST
     assert ((d < 0) == (exact < 0))[clear].all()
     assert (exact < 0).sum() > 100
+
+
+LEFT = {
+    "beads": """
+        intersect {
+            sphere { scale(1.1); }
+            union {
+                sphere { scale(0.2); translate(-0.6, 0.2, 0.5); }
+                sphere { scale(0.25); translate(0.5, 0.1, 0.6); }
+            }
+        }
+        """,
+    "hole": """
+        subtract {
+            sphere;
+            subtract {
+                sphere { scale(0.9); translate(0.25, 0.25, 0.6); }
+                sphere { scale(0.16); translate(0, 0.2, 0.35); }
+                sphere { scale(0.1); translate(0.3, 0.45, 0.35); }
+            }
+        }
+        """,
+    "mist": """
+        intersect {
+            sphere { material volumetric; }
+            union {
+                sphere { scale(0.4); translate(-0.6, 0.2, 0.5); }
+                subtract {
+                    sphere { scale(0.6); translate(0.5, 0.1, 0.3); }
+                    sphere { scale(0.2); translate(0.5, 0.3, 0.6); }
+                }
+            }
+        }
+        sphere { scale(0.3); translate(-0.2, -0.3, 0.3); }
+        """,
+}
+
+
+def scene_of(name: str) -> nsg.Scene:
+    return nsg.loads(f"canvas(64, 48); camera(eye = [0, 1.2, 4]); {LEFT[name]}")
+
+
+@pytest.mark.parametrize("name", LEFT)
+def test_steps_end_where_groups_may_add(name: str) -> None:
+    """Rays meet what groups leave where nothing is left of all that the rays have met before."""
+    scene = scene_of(name)
+    exact = np.asarray(nsg.render(scene, backend="reference"))
+    assert psnr_db(np.asarray(nsg.render(scene)), exact) > 45
