@@ -22,9 +22,9 @@ from scenelang.cli.main import Reporting
 from scenelang.cli.say import Bar, need_metrics
 
 if TYPE_CHECKING:
+    from lab.frontier.record import Frontier
     from lab.training.config import SolidsConfig
     from scenelang.drawing.neural.load import Model
-    from scenelang.output.frontier import Frontier
 
 SEED, VERIFY_SEED = 2021, 4042  # of measurements; of scenes that promises are verified on
 _FOLDER: Final = click.Path(path_type=Path, file_okay=False)
@@ -383,7 +383,7 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int, kept: P
 
 def _table(frontier: Frontier) -> str:
     """All points, the fastest first."""
-    from scenelang.output.frontier import between
+    from lab.frontier.record import between
 
     lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
     for p in frontier.points:
@@ -398,8 +398,9 @@ def _table(frontier: Frontier) -> str:
 def _verify(
     base: str, out: Path, scenes: int, seed: int | None, promises: Path | None, kept: Path | None
 ) -> bool:
+    from lab.frontier.record import Frontier
     from lab.frontier.verify import KEPT, verify
-    from scenelang.output.frontier import MOST_BYTES, Frontier, frontier_path
+    from scenelang.output.frontier import MOST_BYTES, frontier_path
 
     path = promises or frontier_path(base)
     try:

@@ -12,7 +12,7 @@ import pytest
 import scenelang as nsg
 from lab.frontier import measure, verify, ways
 from lab.frontier.measure import Case, median_interval
-from scenelang.output.frontier import Errors, Frontier, between
+from lab.frontier.record import Errors, Frontier, between
 from tests.cli.conftest import Folder
 from tests.cli.conftest import folder as folder
 from tests.cli.test_choosing import ladder
@@ -153,7 +153,7 @@ def test_verify_counts_kept_promises(shipped: Folder, monkeypatch: pytest.Monkey
     assert found["held"] is True
     assert found["cases"]["small"]["shapes2d"]["scenes"] == 2
     assert found["cases"]["small"]["shapes2d"]["kept"] == 1.0
-    tight = replace(good, points=tuple(replace(p, flip=Errors(0, 0, 1e-9, 0)) for p in points))
+    tight = replace(good, points=tuple(replace(p, flip=Errors(1e-9, 0, 0, 0)) for p in points))
     Path("tight.json").write_text(tight.to_json(), "utf-8")
     result = run("frontier", "shapes2d", "--verify", "--promises", "tight.json", "--scenes", "2")
     assert result.exit_code == 1

@@ -18,9 +18,10 @@ from matplotlib.text import Text
 from lab.charts import pyplot
 from lab.frontier.chart import frontier_chart, frontier_figure, short_name
 from lab.frontier.page import frontier_page, picture_uri
+from lab.frontier.record import Frontier, between
 from scenelang.compiler.manifest import available
 from scenelang.drawing.image import Image, from_samples
-from scenelang.output.frontier import between, frontier_path, load_frontier
+from scenelang.output.frontier import frontier_path
 from tests.measure.test_choose import frontier, point
 
 ROOT = Path(__file__).parents[2]
@@ -149,8 +150,7 @@ def test_charts_label_every_point_that_has_an_error() -> None:
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")
 def test_the_shipped_frontier_keeps_its_promises() -> None:
     """It is of models that ship, and its promises were kept in 95 % of other scenes."""
-    shipped = load_frontier("shapes2d")
-    assert shipped is not None
+    shipped = Frontier.from_json(frontier_path("shapes2d").read_bytes())
     assert {p.model for p in shipped.points if p.model is not None} <= set(available())
     assert between(shipped.points) >= 8
     found = json.loads((ROOT / "docs/results/frontier-verified.json").read_text("utf-8"))
