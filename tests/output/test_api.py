@@ -14,7 +14,7 @@ import scenelang as nsg
 from scenelang.language.evaluation import ParamError
 from scenelang.output.animate import Progress
 from scenelang.output.sweep import MOST_SIDE, render_many, write_sheet
-from scenelang.output.sweep_rows import Line, TableError
+from scenelang.output.sweep import Line, TableError
 
 TEXT = """\
 canvas(24, 16);

@@ -9,7 +9,7 @@ import pytest
 
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, ParamError, Source, param_named
-from scenelang.output.sweep_rows import Rows, rows_of, text_of, values_of
+from scenelang.output.sweep import Rows, rows_of, text_of, values_of
 
 TEXT = """\
 param k = 0.5 in 0..1;
