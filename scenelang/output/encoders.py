@@ -62,8 +62,8 @@ def write_gif(
     census = Census(most)
     count = len(lengths)
     if palette != "frame":
-        for index, (pixels, length) in enumerate(film.runs(lengths)):
-            census.add(pixels, length)
+        for index, (file, length) in enumerate(runs(film.files, lengths)):
+            census.add(film.read(file), length)
             progress(0.4 * index / count)
     own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
     common = None if own else census.choose()
@@ -71,7 +71,8 @@ def write_gif(
         _head(out, film, common)
         shown: npt.NDArray[np.uint8] | None = None
         mapper = Mapper(common, dither) if common is not None else None
-        for index, (pixels, length) in enumerate(film.runs(lengths)):
+        for index, (file, length) in enumerate(runs(film.files, lengths)):
+            pixels = film.read(file)
             if own:
                 one = Census(most)
                 one.add(pixels)

@@ -112,9 +112,7 @@ class Painter:
 
     def split(self, program: Program) -> int:
         """Number of threads for which a picture is split; it affects the last bits of its pixels."""
-        if self.how.threads is not None:
-            return self.how.threads
-        return threads_for(program.canvas)
+        return threads_for(program.canvas) if self.how.threads is None else self.how.threads
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
@@ -124,13 +122,12 @@ class Painter:
             return draw_exact(frame.shot.scene, spans=frame.shot.spans)
         from scenelang.drawing.render import draw
 
-        if self.kept is None and self.clip.reuse:
-            self.kept = Kept()
-        split = self.split(frame.program)
-        how = self.how._replace(threads=split)
-        return draw(
-            frame.program, how, place=frame.place, split=split, kept=self.kept, progress=progress
-        ).image
+        self.kept = self.kept or Kept()
+        how = self.how._replace(threads=self.split(frame.program))
+        drawing = draw(
+            frame.program, how, place=frame.place, split=how.threads, kept=self.kept, progress=progress
+        )
+        return drawing.image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -252,14 +249,13 @@ def main() -> None:
         if len(program) < head["bytes"]:
             return
         try:
-            answers.write(json.dumps(_answer(head, program, cache)).encode() + b"\n")
+            answers.write(json.dumps(_answer(Errand(*head["errand"]), program, cache)).encode() + b"\n")
             answers.flush()
         except BrokenPipeError:  # the parent process is gone
             os._exit(0)
 
 
-def _answer(head: dict[str, Any], program: bytes, cache: Kept) -> dict[str, Any]:
-    errand = Errand(*head["errand"])
+def _answer(errand: Errand, program: bytes, cache: Kept) -> dict[str, Any]:
     try:
         put_frame(errand.run(program, cache))
     except RenderError as error:
@@ -311,12 +307,7 @@ class Cluster:
             self._send()
 
     def take(self) -> None:
-        """Send an incomplete batch, and write the next files that come back.
-
-        Raises:
-            RenderError: it cannot be drawn, several workers ended over it, or the scheduler is gone.
-            OSError: a file cannot be written.
-        """
+        """Send an incomplete batch, and write the next files that come back; raises as `Link.result`."""
         self._send()
         self._receive()
 
@@ -340,14 +331,7 @@ class Cluster:
 
 
 def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
-    """Draw Programs on this machine: the processor's seconds, and the files of each by their names.
-
-    Args:
-        batch: bytes of Programs, and their errands.
-
-    Raises:
-        RenderError: one cannot be drawn.
-    """
+    """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
     cache = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
     result = [

@@ -20,33 +20,18 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield found
 
 
-@pytest.mark.parametrize("what", ["numpy", "weights of shapes2d", "scenelang's code"])
-def test_workers_that_would_give_something_else(
-    address: str, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
-    mine = {**workers.fingerprint(), what: "another"}
-    monkeypatch.setattr(workers, "fingerprint", lambda _: mine)
-    with pytest.raises(RenderError, match=rf"worker tcp\S+ has {what} \S+, where another is here"):
-        Link(address)
-
-
-def test_differences_that_results_do_not_show() -> None:
+def test_workers_that_would_give_something_else(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their library, weights or code differ, or a package that this work needs besides."""
+    compare, others = workers.differences, ("scipy", "no-such-library")
+    for what in ("numpy", "weights of shapes2d", "scenelang's code", "no-such-library"):
+        monkeypatch.setattr(workers, "differences", lambda a, b, what=what: compare({**a, what: "another"}, b))
+        with pytest.raises(RenderError, match=rf"worker tcp\S+ has {what} \S+, where another is here"):
+            Link(address, others)
     here = workers.fingerprint()
-    assert workers.differences(here, here) == ([], [])
-    assert workers.differences(here, {**here, "python": "3.9"})[0] == []
-    assert workers.differences(here, {**here, "python": "3.9"})[1]
-
-
-def test_libraries_count_where_they_are_needed(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = workers.fingerprint(("scipy", "no-such-library"))
-    assert found["no-such-library"] == "none"
-    assert "scipy" not in workers.fingerprint()
-    Link(address, ("scipy", "no-such-library")).close()
-    here = workers.fingerprint
-    monkeypatch.setattr(workers, "fingerprint", lambda names: here(names) | dict.fromkeys(names, "0.1"))
-    Link(address).close()
-    with pytest.raises(RenderError, match=r"has no-such-library none, where 0\.1 is here"):
-        Link(address, ("no-such-library",))
+    assert here.keys().isdisjoint(others)
+    assert workers.fingerprint(others)["no-such-library"] == "none"
+    assert compare(here, here) == ([], [])
+    assert compare(here, {**here, "python": "3.9"}) == ([], [f"python 3.9, where {here['python']} is here"])
 
 
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
