@@ -303,12 +303,10 @@ def names_of(
     """Names of the elements of files; raises `ValueError` where one is not a name, or two are the same."""
     if name is not None and len(files) > 1:
         raise ValueError("a name is for one file")
-    words = [said(Path(file).stem) for file in files]
-    names = (
-        [f"_{word}" if word[:1].isdigit() else word for word in words]
-        if name is None
-        else [name] * len(files)
-    )
+    names = [said(Path(file).stem) for file in files]
+    names = [f"_{word}" if word[:1].isdigit() else word for word in names]
+    if name is not None:
+        names = [name] * len(files)
     owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
     for file, word in zip(files, names, strict=True):
         if not (word.isascii() and word.isidentifier()):

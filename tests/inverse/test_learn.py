@@ -107,7 +107,7 @@ def test_a_picture_becomes_a_texture_or_an_outline(folder: Path) -> None:
 
 def test_a_budget_is_recorded_as_steps(folder: Path) -> None:
     for out, given in (("a", ("--budget", "1e-9")), ("b", ("--steps", "1")), ("c", ("--steps", "2"))):
-        assert run("a-ball.ply", "-o", f"{out}.safetensors", *given)[0] == 0
+        assert run("star.svg", "-o", f"{out}.safetensors", *given)[0] == 0
     a, b, c = (Path(f"{out}.safetensors").read_bytes() for out in "abc")
     assert a == b != c
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lab.symmetric import LEAVES, Decoder, Floats, Start, hiding, placed
+from lab.symmetric import LEAVES, Decoder, Floats, hiding, placed
 from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.neural.network import RADIUS
 
@@ -40,12 +40,6 @@ def test_it_has_the_symmetry_and_says_how_it_changes(order: int) -> None:
         step = 1e-7 * (np.arange(len(parameters)) == at)
         ahead = decoder.distance(parameters + step, p)
         assert (ahead - found) / 1e-7 == pytest.approx(slopes[:, at], abs=1e-4)
-
-
-def test_a_start_learns_its_leaf() -> None:
-    start = Start("square", ("gg", "gg"), 1)
-    first = start.run(1, 400)
-    assert start.run(60, 400) < 0.01 * first
 
 
 @pytest.mark.parametrize("leaf", sorted({"square", "triangle", "star", "pentagon"}))

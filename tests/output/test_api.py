@@ -13,8 +13,7 @@ from PIL import Image
 import scenelang as nsg
 from scenelang.language.evaluation import ParamError
 from scenelang.output.animate import Progress
-from scenelang.output.sweep import MOST_SIDE, render_many, write_sheet
-from scenelang.output.sweep import Line, TableError
+from scenelang.output.sweep import MOST_SIDE, Line, TableError, render_many, write_sheet
 
 TEXT = """\
 canvas(24, 16);
