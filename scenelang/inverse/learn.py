@@ -228,9 +228,8 @@ def learn_files(
     The file is written after each element, whole or not at all. An element that it already holds of the same
     original and options is not made again. So the same call continues work that was interrupted.
 
-    Args:
-        files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
-        progress: called with what is done, how much of it, and all.
+    Arguments and errors are those of `scenelang.learn`; ``progress`` is called with what is done, how much of
+    it, and all.
     """
     names = names_of(files, options, name)
     first = held = _writable(out)

@@ -503,11 +503,9 @@ def solve(
 
     Args:
         problems: residuals at sizes from small to large, those of the last by pixels alone.
-        start: a place that is looked at first.
         until: no new descent is begun after this time, as of `time.monotonic`.
         near: sum of squares that is near enough.
         noise: returns whether only noise is left at a place of the last size, so that none is nearer.
-        report: called with what is done, how much of it, and all.
 
     Returns:
         Distinct places, none where no place has a picture, and whether the search converged by itself.

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
+from PIL import features
+
 from scenelang.assets.files import output_place, write_whole
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
 from scenelang.drawing.image import output_file
@@ -20,12 +22,10 @@ from scenelang.language.scene import Scene
 from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
 from scenelang.output.frames import (
     Clip,
-    Encoder,
     Film,
     FrameRange,
     Store,
     Target,
-    deliver,
     find_target,
     put_frame,
 )
@@ -112,7 +112,11 @@ def make(
         beside: called with each frame before it is drawn; gives the further files of a sequence.
         failed: called with a frame that has errors and is left out; by default such a frame ends the run.
     """
-    ready(target)
+    place = output_place(target.path)
+    if target.kind == "video":
+        find_codec(target.path.suffix.lower())
+    elif target.kind == "webp" and not features.check("webp"):
+        raise RenderError("this Pillow is built without WebP")
     if target.kind != "sequence" and not _FPS[0] <= (fps := painter.clip.animation.fps) <= _FPS[1]:
         least, most = _FPS
         raise RenderError(f"a film of {fps:g} frames a second, where {least:g} to {most:,.0f} can be written")
@@ -131,14 +135,16 @@ def make(
             files = [store.file(key) for key in result.keys]
             film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, run.alpha)
             part = store.folder / f"film{target.path.suffix}"
-            encoders: dict[str, Encoder] = {
+            encoders: dict[str, Callable[..., None]] = {
                 "gif": partial(write_gif, palette=palette, dither=dither),
                 "apng": write_apng,
                 "webp": write_webp,
                 "video": partial(write_video, suffix=target.path.suffix.lower()),
             }
             encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
-            deliver(part, target.path)
+            with part.open("rb") as written:
+                os.fsync(written.fileno())
+            os.replace(part, place)
             result.files = [target.path]
         result.encode_s = time.perf_counter() - started
         store.remove()
@@ -277,18 +283,6 @@ def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[P
     if hasattr(os, "sync"):
         os.sync()  # all at once: one by one waits as often as there are files
     return files
-
-
-def ready(target: Target) -> None:
-    """Raise `RenderError` where a format cannot be written, `NotWritten` where an input would be lost."""
-    output_place(target.path)
-    if target.kind == "video":
-        find_codec(target.path.suffix.lower())
-    elif target.kind == "webp":
-        from PIL import features
-
-        if not features.check("webp"):
-            raise RenderError("this Pillow is built without WebP")
 
 
 Frames = range | str | None

@@ -1,8 +1,7 @@
 """Encoders of animations, frame by frame: GIF, APNG, WebP and video by ffmpeg.
 
-Pillow's own writers of GIF and APNG, also in 13.0, hold every frame until the last has come, and give each
-frame of a GIF its own palette. The writers here hold one frame, and find a palette that is exact for all
-frames where there is one.
+Pillow's own writers of GIF and APNG, also in 13.0, hold every frame until the last has come. The writers here
+hold one, and find a palette that is exact for all frames where there is one.
 
 Sources: CompuServe, Graphics Interchange Format, version 89a; W3C, Portable Network Graphics (PNG)
 Specification, third edition, 2025, chapters 4.9 and 11.3.6.
@@ -68,7 +67,14 @@ def write_gif(
     own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
     common = None if own else census.choose()
     with part.open("wb") as out:
-        _head(out, film, common)
+        # bits of an index; the colour after the last is the transparent one
+        bits = 0 if common is None else max(1, len(common).bit_length())
+        flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
+        out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
+        if common is not None:
+            out.write(common.tobytes().ljust(3 << bits, b"\0"))
+        if film.loop:
+            out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
         shown: npt.NDArray[np.uint8] | None = None
         mapper = Mapper(common, dither) if common is not None else None
         for index, (file, length) in enumerate(runs(film.files, lengths)):
@@ -81,17 +87,6 @@ def write_gif(
             shown = _frame(out, film, pixels, shown, mapper, length, own)
             progress(0.4 + 0.6 * index / count)
         out.write(b";")
-
-
-def _head(out: BinaryIO, film: Film, common: Colours | None) -> None:
-    # bits of an index; the colour after the last is the transparent one
-    bits = 0 if common is None else max(1, len(common).bit_length())
-    flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
-    out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
-    if common is not None:
-        out.write(common.tobytes().ljust(3 << bits, b"\0"))
-    if film.loop:
-        out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
 
 
 def _frame(

@@ -12,7 +12,7 @@ import hashlib
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as pillow
 
-from scenelang.assets.files import lock, open_own, output_place, write_whole
+from scenelang.assets.files import lock, open_own, write_whole
 from scenelang.compiler.lower import Memory
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import image_format
@@ -303,14 +303,6 @@ def put_frame(files: Mapping[Path, bytes]) -> None:
         write_whole(file, data, flush=False)
 
 
-def deliver(part: Path, target: Path) -> None:
-    """Flush a finished file to the disk and rename it over ``target``, which stays unchanged on an error."""
-    place = output_place(target)
-    with part.open("rb") as file:
-        os.fsync(file.fileno())
-    os.replace(part, place)
-
-
 @dataclass(frozen=True, slots=True)
 class Film:
     """Finished frames in the order in which they are shown; read from the disk one at a time."""
@@ -340,10 +332,6 @@ def changed(before: Pixels | None, now: Pixels) -> Box:
     if not len(rows):
         return 0, 0, 1, 1
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-
-
-Encoder = Callable[[Film, Path, Callable[[float], None]], None]
-"""Writes a film to a file in one format, and reports the share that is done."""
 
 
 STILL = Animation(seconds=1.0, fps=1.0)

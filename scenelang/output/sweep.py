@@ -111,9 +111,6 @@ def rows_of(
         grid: values of each param, or text as `values_of` takes it.
         drawn: params with random values, each with a range, or empty text for its own.
         count: number of rows; by default that of the grid.
-
-    Raises:
-        ParamError: there is no such param, or no such values of it; or there are none or too many.
     """
     result: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
@@ -393,24 +390,10 @@ _REPORTED: Final = 3  # rows whose errors are reported in full
 
 
 class SweepTable:
-    """Table of a sweep, updated as rows are compiled.
+    """Table of a sweep, updated as rows are compiled; raises `TableError` in the folder of another sweep.
 
     It is written before anything is drawn, and again when all rows are compiled, before pictures are moved to
     their places. So pictures of another sweep are noticed, wherever that sweep was stopped.
-
-    Args:
-        target: files of the pictures.
-        rows: the values.
-        clip: their scenes.
-        outputs, texts: further pictures, and kinds of `TEXTS`, next to each picture.
-        stem: name of the table.
-
-    Attributes:
-        lines: rows of the table.
-        told: errors of the first rows that have any, by number.
-
-    Raises:
-        TableError: the folder has the pictures of another sweep.
     """
 
     def __init__(
@@ -424,7 +407,7 @@ class SweepTable:
     ) -> None:
         self.target, self.clip, self.outputs, self.texts = target, clip, outputs, texts
         self.file, self.names = target.path / f"{stem}.csv", rows.names
-        self.told: dict[int, Sequence[Diagnostic]] = {}
+        self.told: dict[int, Sequence[Diagnostic]] = {}  # errors of the first rows that have any, by number
         self.lines = [
             Line(target.file(at).name, tuple(row.get(name, "") for name in self.names))
             for at, row in enumerate(rows)

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.neural.draw import Kept
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     import PIL.Image
 
     from scenelang.drawing.image import Image
-    from scenelang.drawing.neural.draw import Kept
     from scenelang.output.frames import Target
 
 
@@ -80,7 +80,7 @@ class Easel:
     seen: Stamps = field(default_factory=dict)  # their stamps when their names were read
     _key: str | None = None
     _image: Image | None = None
-    _kept: Kept | None = None
+    _kept: Kept = field(default_factory=Kept)
     _took_s: float = float("inf")  # drawing time of the last picture
 
     def __post_init__(self) -> None:
@@ -128,7 +128,7 @@ class Easel:
         started = time.perf_counter()
         outcome.image = painter.draw(frame, checking(before))
         outcome.draw_s = self._took_s = time.perf_counter() - started
-        self._kept, self._image = painter.kept, outcome.image
+        self._image = outcome.image
         self._save(outcome, outcome.image, frame.key)
 
     def _draft(self, painter: Painter, frame: Drawable, outcome: Outcome) -> None:
