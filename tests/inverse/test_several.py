@@ -40,23 +40,30 @@ def test_errors_of_frames_are_averaged() -> None:
     assert both @ both == pytest.approx(np.mean([part @ part for part in parts if part is not None]))
 
 
-@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0])
-def test_a_target_out_of_focus_is_told_by_how_much(sigma: float) -> None:
+def test_a_target_out_of_focus_is_told_by_how_much() -> None:
     """Whose noise is as large as the blur's error."""
-    u, last = np.array([0.3]), problem({0: flat(1.0)})
-    pictures = last.pictures(u)
-    assert pictures is not None
-    seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
-    target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
-    assert problem({0: target}).blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
+    for sigma in (
+        0.0,
+        1.0,
+        2.0,
+    ):
+        u, last = np.array([0.3]), problem({0: flat(1.0)})
+        pictures = last.pictures(u)
+        assert pictures is not None
+        seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
+        target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
+        assert problem({0: target}).blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
 
 
-@pytest.mark.parametrize(("blot", "noise"), [(0, True), (3, False)])
-def test_what_is_left_is_noise_or_is_not(blot: int, noise: bool) -> None:
+def test_what_is_left_is_noise_or_is_not() -> None:
     """A blot of 3 x 3 pixels is enough."""
-    u, last = np.array([0.3]), problem({0: flat(1.0)})
-    pictures = last.pictures(u)
-    assert pictures is not None
-    target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
-    target[20 : 20 + blot, 30 : 30 + blot] = 0.5
-    assert problem({0: target}).noise(u) is noise
+    for blot, noise in (
+        (0, True),
+        (3, False),
+    ):
+        u, last = np.array([0.3]), problem({0: flat(1.0)})
+        pictures = last.pictures(u)
+        assert pictures is not None
+        target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
+        target[20 : 20 + blot, 30 : 30 + blot] = 0.5
+        assert problem({0: target}).noise(u) is noise

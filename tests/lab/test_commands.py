@@ -80,16 +80,19 @@ def test_train_usage() -> None:
     assert "another configuration" in other.stderr
 
 
-@pytest.mark.parametrize("damaged", [True, False])
-def test_a_checkpoint_that_cannot_be_gone_on_with_ends_a_training_in_words(damaged: bool) -> None:
+def test_a_checkpoint_that_cannot_be_gone_on_with_ends_a_training_in_words() -> None:
     """A damaged one, and one of the right configuration with another training's tensors."""
-    name, path = tiny_config(), Path("run/checkpoint.safetensors")
-    path.parent.mkdir()
-    header = {"format": 1, "config": read_config(name).to_json(), "iteration": 1, "seconds": 1.0}
-    save_tensors(path, {"network.codes": torch.zeros(2)}, header)
-    if damaged:
-        path.write_bytes(path.read_bytes()[:200])
-    result = run("train", name, "-o", "run", "--device", "cpu")
-    assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1].startswith("Error: ")
-    assert "checkpoint" in result.stderr.splitlines()[-1]
+    for damaged in (
+        True,
+        False,
+    ):
+        name, path = tiny_config(), Path("run/checkpoint.safetensors")
+        path.parent.mkdir()
+        header = {"format": 1, "config": read_config(name).to_json(), "iteration": 1, "seconds": 1.0}
+        save_tensors(path, {"network.codes": torch.zeros(2)}, header)
+        if damaged:
+            path.write_bytes(path.read_bytes()[:200])
+        result = run("train", name, "-o", "run", "--device", "cpu")
+        assert result.exit_code == 2
+        assert result.stderr.splitlines()[-1].startswith("Error: ")
+        assert "checkpoint" in result.stderr.splitlines()[-1]

@@ -82,32 +82,6 @@ def test_a_small_run(measured: Frontier) -> None:
     assert [len(p["pictures"]) for p in data["points"]] == [2] * 14
 
 
-@pytest.mark.slow
-def test_a_small_run_of_solids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exact field draws in the same march: as near as the network, and never chosen."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
-    monkeypatch.setattr(measure, "SIDE", 48)
-    monkeypatch.setattr(measure, "CASES", measure.CASES[:1])
-    result = run("frontier", "solids3d", "-o", "out", "--scenes", "2", "--seed", "5")
-    assert result.exit_code == 0, result.output
-    found = Frontier.from_json(Path("out/frontier.json").read_bytes())
-    points = {p.name: p for p in found.points}
-    assert (found.set, found.canvas, found.converged) == ("mixed", (48, 48), {})
-    assert {p.samples for p in found.points if p.model == "solids3d"} == {
-        "adaptive",
-        "four",
-        "quick",
-        "one",
-        "draft",
-    }
-    flips = {name: p.flip.mean for name, p in points.items() if p.flip is not None}
-    assert flips["exact reference, 4 spp"] == 0
-    assert flips["exact field"] < flips["solids3d, one sample"] < flips["solids3d, draft"]
-    assert not points["exact field"].offered
-    assert points["solids3d, quick"].cost is not None
-
-
 def test_the_interval_of_a_median_covers_it_as_often_as_it_says() -> None:
     rng = np.random.default_rng(3)
     for n in (9, 40, 120):

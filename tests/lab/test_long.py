@@ -191,8 +191,8 @@ def test_weights_draw_scenes_as_they_were_trained_to(lifting: str, tmp_path: Pat
     np.testing.assert_allclose(np.asarray(picture)[..., :3], exact.numpy(), atol=5e-3)
 
 
-@pytest.mark.parametrize("path", sorted(p.stem for p in CONFIGS.glob("*.json") if '"long"' in p.read_text()))
-def test_shipped_configurations_are_read(path: str) -> None:
-    file = read_long(path)
-    assert file.model in ("shapes2d-streaming", "shapes2d-reading")
-    assert all(phase.window % 4 == 0 for phase in file.long.phases)
+def test_shipped_configurations_are_read() -> None:
+    for path in sorted(p.stem for p in CONFIGS.glob("*.json") if '"long"' in p.read_text()):
+        file = read_long(path)
+        assert file.model in ("shapes2d-streaming", "shapes2d-reading")
+        assert all(phase.window % 4 == 0 for phase in file.long.phases)

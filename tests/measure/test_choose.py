@@ -102,11 +102,17 @@ def test_points_between_the_fastest_and_the_nearest_are_counted() -> None:
 # ---------------------------------------------------------------- promises
 
 
-@pytest.mark.parametrize(("count", "rank"), [(39, 39), (40, 40), (79, 78), (100, 99), (1000, 976)])
-def test_the_promise_is_a_high_order_statistic(count: int, rank: int) -> None:
-    values = list(np.random.default_rng(count).permutation(count) + 1.0)
-    assert promised(values) == rank
-    assert rank == math.ceil(0.975 * (count + 1))
+def test_the_promise_is_a_high_order_statistic() -> None:
+    for count, rank in (
+        (39, 39),
+        (40, 40),
+        (79, 78),
+        (100, 99),
+        (1000, 976),
+    ):
+        values = list(np.random.default_rng(count).permutation(count) + 1.0)
+        assert promised(values) == rank
+        assert rank == math.ceil(0.975 * (count + 1))
 
 
 def test_few_scenes_promise_more_than_their_worst() -> None:
@@ -145,9 +151,8 @@ def chosen(limits: Limits, points: list[Point] = LADDER, scale: float = 1.0, loa
     return choose(offers(points, load, (256, 256), scale), limits, {}).offer.point.name
 
 
-@pytest.mark.parametrize(
-    ("limits", "name"),
-    [
+def test_the_choice_is_the_cheapest_that_suffices() -> None:
+    for limits, name in (
         (Limits(None, 0.06), "fast"),
         (Limits(None, 0.05), "fast"),
         (Limits(None, 0.03), "middle"),
@@ -157,10 +162,8 @@ def chosen(limits: Limits, points: list[Point] = LADDER, scale: float = 1.0, loa
         (Limits(30, None), "middle"),
         (Limits(100, None), "slow"),
         (Limits(20, 0.02), "middle"),
-    ],
-)
-def test_the_choice_is_the_cheapest_that_suffices(limits: Limits, name: str) -> None:
-    assert chosen(limits) == name
+    ):
+        assert chosen(limits) == name
 
 
 @given(
@@ -287,17 +290,16 @@ def damaged() -> list[tuple[str, object]]:
     ]
 
 
-@pytest.mark.parametrize(("key", "value"), damaged())
-def test_damaged_files_are_refused(key: str, value: object) -> None:
-    told = json.loads(frontier(*LADDER).to_json())
-    told[key] = value
-    with pytest.raises(ValueError, match=r"frontier|format|points|canvas|hold"):
-        Frontier.from_json(json.dumps(told).encode())
+def test_damaged_files_are_refused() -> None:
+    for key, value in damaged():
+        told = json.loads(frontier(*LADDER).to_json())
+        told[key] = value
+        with pytest.raises(ValueError, match=r"frontier|format|points|canvas|hold"):
+            Frontier.from_json(json.dumps(told).encode())
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
+def test_damaged_points_are_refused() -> None:
+    for key, value in (
         ("samples", "two"),
         ("backend", "x"),
         ("ms", None),
@@ -306,13 +308,11 @@ def test_damaged_files_are_refused(key: str, value: object) -> None:
         ("cost", [1]),
         ("offered", 1),
         ("model", 3),
-    ],
-)
-def test_damaged_points_are_refused(key: str, value: object) -> None:
-    told = json.loads(frontier(*LADDER).to_json())
-    told["points"][1][key] = value
-    with pytest.raises(ValueError, match=r"point|hold|missing"):
-        Frontier.from_json(json.dumps(told).encode())
+    ):
+        told = json.loads(frontier(*LADDER).to_json())
+        told["points"][1][key] = value
+        with pytest.raises(ValueError, match=r"point|hold|missing"):
+            Frontier.from_json(json.dumps(told).encode())
 
 
 def test_enlarging_keeps_flat_colours_and_corners() -> None:

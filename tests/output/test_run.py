@@ -73,15 +73,6 @@ def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
     assert 0 < moved.pairs < 0.7 * min(pairs)
 
 
-def test_threads_of_the_split_do_not_show(tmp_path: Path) -> None:
-    from scenelang.drawing.torch_backend import draw_program, open_model
-
-    program = nsg.compile(nsg.load(write(tmp_path), frame=2))
-    model = open_model(program.model)
-    expected = draw_program(program, model, threads=3).image
-    assert draw_program(program, model, threads=1, split=3).image.tobytes() == expected.tobytes()
-
-
 def test_a_sequence(tmp_path: Path) -> None:
     path = write(tmp_path)
     made = nsg.animate(path, f"{tmp_path}/out/", size=SMALL, frames="1..3", threads=1)
@@ -106,22 +97,6 @@ def test_a_scene_without_frames_is_one(tmp_path: Path) -> None:
     (only,) = nsg.render_frames(path, size=SMALL)
     scene = nsg.load(path).model_copy(update={"canvas": SMALL})
     assert only.tobytes() == nsg.render(scene, device="cpu").tobytes()  # by torch, as frames are
-
-
-def test_pictures_that_were_given_out_are_not_touched(tmp_path: Path) -> None:
-    frames = nsg.render_frames(write(tmp_path, HEAD + "star;"), size=SMALL)
-    first = next(frames)
-    first[:] = 0.5
-    assert (next(frames) != 0.5).any()
-
-
-def test_alpha(tmp_path: Path) -> None:
-    path = write(tmp_path, MOVING.replace(DARK, "background(none);"))
-    nsg.animate(path, tmp_path / "a.apng", size=SMALL)
-    with Image.open(tmp_path / "a.apng") as image:
-        assert image.n_frames == 6
-        assert image.mode == "RGBA"
-        assert image.getpixel((0, 0))[3] == 0
 
 
 def test_other_processes_draw_the_same(tmp_path: Path) -> None:
