@@ -71,7 +71,7 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A way to draw, with what a choice asks of it; `lab.frontier.record` has its other figures."""
+    """A way to draw, with the figures that a choice needs; the file has more."""
 
     __pydantic_config__ = _STRICT
     name: str  # label in charts
