@@ -129,13 +129,8 @@ class Problem:
         """The picture of a point, None where its values give no scene."""
         return self.drawn(self.program(u))
 
-    def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,), whose squares sum to the mean square errors of all levels of the pyramid."""
-        picture = self.picture(u)
-        return None if picture is None else self.residuals(picture, self.levels)
-
     def residuals(self, picture: Picture, levels: int = 1) -> Point:
-        """Residuals of a picture, at so many levels of the pyramid."""
+        """Residuals (R,), whose squares sum to the mean square errors of so many levels of the pyramid."""
         return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
