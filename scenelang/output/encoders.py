@@ -16,7 +16,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen, run
 from typing import BinaryIO, Final, Literal
@@ -158,14 +158,12 @@ class Census:
         shown = numbers[pixels[..., 3] >= 128] if pixels.shape[2] == 4 else numbers
         result, counts = np.unique(shown, return_counts=True)
         self.crowded |= len(result) > self.most
-        both = np.concatenate([self.colours, result])
-        self.colours, index = np.unique(both, return_inverse=True)
-        total = np.zeros(len(self.colours), np.int64)
-        np.add.at(total, index, np.concatenate([self.counts, counts * weight]))
-        self.counts = total
+        self.colours, index = np.unique(np.concatenate([self.colours, result]), return_inverse=True)
+        total = np.bincount(index, np.concatenate([self.counts, counts * weight]))
+        self.counts = total.astype(np.int64)
         if len(self.colours) > _MOST_KNOWN:
             frequent = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
-            self.colours, self.counts, self.thinned = self.colours[frequent], total[frequent], True
+            self.colours, self.counts, self.thinned = self.colours[frequent], self.counts[frequent], True
 
     @property
     def fits(self) -> bool:
@@ -200,8 +198,7 @@ class Mapper:
 
     def __init__(self, colours: Colours, dither: bool) -> None:
         self.colours, self.dither = colours, dither
-        self._wide = colours.astype(np.int32)
-        self._known: dict[int, int] = {}
+        self._nearest = lru_cache(_MOST_KNOWN)(partial(_nearest, colours.astype(np.int32)))
 
     def __call__(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
         """Indices (H, W)."""
@@ -209,25 +206,18 @@ class Mapper:
         result, inverse = np.unique(flat, return_inverse=True)
         index = np.array([self._nearest(number) for number in result.tolist()], np.uint8)
         exact = (self.colours[index] == unpacked(result)).all(axis=1).all()
-        if self.dither and not exact:
-            return self._dithered(pixels)
-        return index[inverse].reshape(flat.shape)
-
-    def _nearest(self, number: int) -> int:
-        known = self._known.get(number)
-        if known is None:
-            rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
-            known = int(((self._wide - rgb) ** 2).sum(axis=1).argmin())
-            if len(self._known) < _MOST_KNOWN:
-                self._known[number] = known
-        return known
-
-    def _dithered(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
+        if exact or not self.dither:
+            return index[inverse].reshape(flat.shape)
         table = Image.new("P", (1, 1))
         table.putpalette(self.colours.tobytes())
         image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
         return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
+
+
+def _nearest(colours: npt.NDArray[np.int32], number: int) -> int:
+    rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
+    return int(((colours - rgb) ** 2).sum(axis=1).argmin())
 
 
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
