@@ -127,7 +127,6 @@ def command() -> None:
 @_out
 @_weights
 @_threads
-@inputs.cluster
 def evaluate(
     model: str,
     sets: tuple[str, ...],
@@ -139,7 +138,6 @@ def evaluate(
     out: Path,
     weights: Path | None,
     threads: int,
-    cluster: str | None,
 ) -> None:
     """Draw random scenes with MODEL and compare them with the exact reference.
 
@@ -147,8 +145,6 @@ def evaluate(
     SET-worst.png (network, reference, FLIP map of the worst cases) into FOLDER.
     """
     need_metrics()
-    if cluster is not None and (weights is not None or kept is not None or threads != 1):
-        raise click.UsageError("--cluster is for shipped weights, one thread each, without --kept.")
     import torch
 
     from lab.evaluate import evaluate_set, sheet
@@ -165,7 +161,7 @@ def evaluate(
     for name in chosen:
         with Bar() as bar:
             summary, worst = evaluate_set(
-                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, cluster=cluster, report=bar
+                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, report=bar
             )
         stem = Path(name).stem
         write_json(out / f"{stem}.json", summary)
