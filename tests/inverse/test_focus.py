@@ -37,10 +37,7 @@ def test_a_picture_goes_through_a_gaussian_and_to_larger_pixels(
 
 def test_a_blur_is_found_with_the_size_that_would_make_up_for_it() -> None:
     """The target is of eight times as many pixels along each side, blurred in light or not, and averaged."""
-    for light in (
-        True,
-        False,
-    ):
+    for light in (True, False):
         sharp = scenelang.loads(TEXT.replace("64, 64", "512, 512"), params={"size": 0.5})
         seen = np.asarray(scenelang.render(sharp), float)
         soft = ndimage.gaussian_filter(decoded(seen) if light else seen, (9.6, 9.6, 0))

@@ -63,12 +63,7 @@ def made(kind: str) -> Any:
 
 
 def test_what_files_say_is_what_the_surface_shows() -> None:
-    for kind, suffix in (
-        ("vertex", ".ply"),
-        ("vertex", ".glb"),
-        ("face", ".ply"),
-        ("texture", ".glb"),
-    ):
+    for kind, suffix in (("vertex", ".ply"), ("vertex", ".glb"), ("face", ".ply"), ("texture", ".glb")):
         box = made(kind)
         solids, _ = read_solids(box.export(file_type=suffix[1:]), suffix, {})
         mesh = whole(solids)

@@ -77,10 +77,7 @@ def winding(p: np.ndarray, corners: np.ndarray) -> float:
 
 
 def test_distances_and_slopes_of_a_mesh() -> None:
-    for sign in (
-        "winding",
-        "closed",
-    ):
+    for sign in ("winding", "closed"):
         torus = trimesh.creation.torus(0.7, 0.3, major_sections=9, minor_sections=5)
         mesh = mesh_of(np.asarray(torus.vertices), np.asarray(torus.faces), sign)  # type: ignore[arg-type]
         p = np.random.default_rng(0).uniform(-1, 1, (60, 3))

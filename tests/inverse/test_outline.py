@@ -75,10 +75,7 @@ def test_only_lines_that_are_lost_are_too_thin() -> None:
 
 def test_inside_agrees_with_a_loop() -> None:
     """Also at the heights of corners, where an edge counts at one of its ends."""
-    for odd in (
-        False,
-        True,
-    ):
+    for odd in (False, True):
         random = np.random.default_rng(0)
         corners = random.integers(0, 12, (40, 2)).astype(float)
         edges = np.stack([corners, np.roll(corners, -1, 0)], 1)

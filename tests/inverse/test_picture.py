@@ -118,10 +118,7 @@ def flag() -> np.ndarray:
 
 
 def test_the_smallest_that_is_near_enough() -> None:
-    for colours, coding in (
-        (photo(), "av1"),
-        (flag(), "webp"),
-    ):
+    for colours, coding in ((photo(), "av1"), (flag(), "webp")):
         element, tried = fit_picture(Picture(colours), "a")
         off = np.sqrt(((texels(element) * 255.0 - colours) ** 2).mean()) / 255
         assert element.coding == coding

@@ -50,10 +50,7 @@ def test_a_fine_descent_ends_where_a_coarse_one_is_drawn_aside() -> None:
 
 
 def test_a_scan_names_the_other_valley_of_each_axis() -> None:
-    for wraps in (
-        False,
-        True,
-    ):
+    for wraps in (False, True):
         known = Found(np.array([0.8, 0.2]), 0.01)
         found = search.scanned(two_things, box(wraps, wraps), known)
         best = min(found, key=lambda one: one.cost)

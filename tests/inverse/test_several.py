@@ -42,11 +42,7 @@ def test_errors_of_frames_are_averaged() -> None:
 
 def test_a_target_out_of_focus_is_told_by_how_much() -> None:
     """Whose noise is as large as the blur's error."""
-    for sigma in (
-        0.0,
-        1.0,
-        2.0,
-    ):
+    for sigma in (0.0, 1.0, 2.0):
         u, last = np.array([0.3]), problem({0: flat(1.0)})
         pictures = last.pictures(u)
         assert pictures is not None
@@ -57,10 +53,7 @@ def test_a_target_out_of_focus_is_told_by_how_much() -> None:
 
 def test_what_is_left_is_noise_or_is_not() -> None:
     """A blot of 3 x 3 pixels is enough."""
-    for blot, noise in (
-        (0, True),
-        (3, False),
-    ):
+    for blot, noise in ((0, True), (3, False)):
         u, last = np.array([0.3]), problem({0: flat(1.0)})
         pictures = last.pictures(u)
         assert pictures is not None

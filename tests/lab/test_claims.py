@@ -69,10 +69,7 @@ def test_a_figure_without_a_record_is_found() -> None:
 
 
 def test_what_is_no_figure_is_not_found() -> None:
-    for text in (
-        "In 1980 it was 256² and `3 ms`.",
-        "See [one](a-3.1.md), Figure 5, W0501.",
-    ):
+    for text in ("In 1980 it was 256² and `3 ms`.", "See [one](a-3.1.md), Figure 5, W0501."):
         assert not list(uncovered(text, [], {}))
 
 

@@ -82,12 +82,9 @@ def test_train_usage() -> None:
 
 def test_a_checkpoint_that_cannot_be_gone_on_with_ends_a_training_in_words() -> None:
     """A damaged one, and one of the right configuration with another training's tensors."""
-    for damaged in (
-        True,
-        False,
-    ):
+    for damaged in (True, False):
         name, path = tiny_config(), Path("run/checkpoint.safetensors")
-        path.parent.mkdir()
+        path.parent.mkdir(exist_ok=True)
         header = {"format": 1, "config": read_config(name).to_json(), "iteration": 1, "seconds": 1.0}
         save_tensors(path, {"network.codes": torch.zeros(2)}, header)
         if damaged:

@@ -19,29 +19,29 @@ def model() -> Model:
     return load_model("solids3d")
 
 
-def test_scenes_are_what_their_set_says(model: Model) -> None:
-    for name in [name for name, config in SOLID_SETS.items() if not config.trees]:
-        config, scene = SOLID_SETS[name], scenes_of(model, name, 3)
-        made = [scene(index) for index in range(4)]
-        assert made[1] == scene(1)
-        assert made[1] != made[2]
-        chains = [s.nodes[0].children for s in made]
-        solids = [link.node for chain in chains for link in chain]
-        low, high = config.objects
-        assert all(low <= len(chain) <= high for chain in chains)
-        assert all(s.canvas == config.canvas for s in made)
-        assert any(link.op != "union" for chain in chains for link in chain) == (config.unions < 1)
-        media = [solid.material.name == "volumetric" for solid in solids]
-        assert (any(media), all(media)) == (config.media > 0, config.media == 1)
-        warped = any(
-            t.kind in ("twirl", "bend", "twist", "displace") for solid in solids for t in solid.transforms
-        )
-        assert warped == (config.warp > 0 or config.shuffled)
-        assert any(getattr(s, word) != "default" for s in made for word in STAGE) == config.staged
-        drawn = {"sphere", "torus"} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
-        assert {solid.geometry for solid in solids} == drawn
-        for s in made:
-            compile_scene(s)  # raises where it is refused
+@pytest.mark.parametrize("name", [name for name, config in SOLID_SETS.items() if not config.trees])
+def test_scenes_are_what_their_set_says(name: str, model: Model) -> None:
+    config, scene = SOLID_SETS[name], scenes_of(model, name, 3)
+    made = [scene(index) for index in range(6)]
+    assert made[2] == scene(2)
+    assert made[2] != made[3]
+    chains = [s.nodes[0].children for s in made]
+    solids = [link.node for chain in chains for link in chain]
+    low, high = config.objects
+    assert all(low <= len(chain) <= high for chain in chains)
+    assert all(s.canvas == config.canvas for s in made)
+    assert any(link.op != "union" for chain in chains for link in chain) == (config.unions < 1)
+    media = [solid.material.name == "volumetric" for solid in solids]
+    assert (any(media), all(media)) == (config.media > 0, config.media == 1)
+    warped = any(
+        t.kind in ("twirl", "bend", "twist", "displace") for solid in solids for t in solid.transforms
+    )
+    assert warped == (config.warp > 0 or config.shuffled)
+    assert any(getattr(s, word) != "default" for s in made for word in STAGE) == config.staged
+    drawn = {"sphere", "torus"} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
+    assert {solid.geometry for solid in solids} == drawn
+    for s in made:
+        compile_scene(s)  # raises where it is refused
 
 
 def test_a_scene_covers_what_its_objects_do(model: Model) -> None:

@@ -74,10 +74,6 @@ def test_half_rays_are_as_long_in_a_sphere_as_in_closed_form() -> None:
 
 
 def test_the_configurations_are_known() -> None:
-    for name, width in (
-        ("solids3d", 8),
-        ("solids3d-w4", 4),
-        ("solids3d-w16", 16),
-    ):
+    for name, width in (("solids3d", 8), ("solids3d-w4", 4), ("solids3d-w16", 16)):
         assert is_solids(config_data(name))
         assert read_solids_config(name).network == SolidConfig(width=width, segment=32)

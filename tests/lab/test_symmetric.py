@@ -27,11 +27,7 @@ def points(count: int) -> Floats:
 
 
 def test_it_has_the_symmetry_and_says_how_it_changes() -> None:
-    for order in (
-        3,
-        4,
-        5,
-    ):
+    for order in (3, 4, 5):
         decoder, p = Decoder(order, KINDS), points(200)
         parameters = decoder.start(np.random.default_rng(1))
         found, slopes = decoder.slopes(parameters, p)

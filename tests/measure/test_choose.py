@@ -104,13 +104,7 @@ def test_points_between_the_fastest_and_the_nearest_are_counted() -> None:
 
 
 def test_the_promise_is_a_high_order_statistic() -> None:
-    for count, rank in (
-        (39, 39),
-        (40, 40),
-        (79, 78),
-        (100, 99),
-        (1000, 976),
-    ):
+    for count, rank in ((39, 39), (40, 40), (79, 78), (100, 99), (1000, 976)):
         values = list(np.random.default_rng(count).permutation(count) + 1.0)
         assert promised(values) == rank
         assert rank == math.ceil(0.975 * (count + 1))
