@@ -22,9 +22,9 @@ from scenelang.cli.main import Reporting
 from scenelang.cli.say import Bar, need_metrics
 
 if TYPE_CHECKING:
+    from lab.frontier.record import Frontier
     from lab.training.config import SolidsConfig
     from scenelang.drawing.neural.load import Model
-    from scenelang.output.frontier import Frontier
 
 SEED, VERIFY_SEED = 2021, 4042  # of measurements; of scenes that promises are verified on
 _FOLDER: Final = click.Path(path_type=Path, file_okay=False)
@@ -127,7 +127,6 @@ def command() -> None:
 @_out
 @_weights
 @_threads
-@inputs.cluster
 def evaluate(
     model: str,
     sets: tuple[str, ...],
@@ -139,7 +138,6 @@ def evaluate(
     out: Path,
     weights: Path | None,
     threads: int,
-    cluster: str | None,
 ) -> None:
     """Draw random scenes with MODEL and compare them with the exact reference.
 
@@ -147,8 +145,6 @@ def evaluate(
     SET-worst.png (network, reference, FLIP map of the worst cases) into FOLDER.
     """
     need_metrics()
-    if cluster is not None and (weights is not None or kept is not None or threads != 1):
-        raise click.UsageError("--cluster is for shipped weights, one thread each, without --kept.")
     import torch
 
     from lab.evaluate import evaluate_set, sheet
@@ -165,7 +161,7 @@ def evaluate(
     for name in chosen:
         with Bar() as bar:
             summary, worst = evaluate_set(
-                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, cluster=cluster, report=bar
+                loaded, name, scenes, seed, side=side, kept=kept, threads=threads, report=bar
             )
         stem = Path(name).stem
         write_json(out / f"{stem}.json", summary)
@@ -383,7 +379,7 @@ def _measure(base: str, out: Path, scenes: int, seed: int, threads: int, kept: P
 
 def _table(frontier: Frontier) -> str:
     """All points, the fastest first."""
-    from scenelang.output.frontier import between
+    from lab.frontier.record import between
 
     lines = [f"{'':2}{'way to draw':44}{'ms':>9}{'FLIP':>9}{'promise':>9}{'PSNR':>7}{'scenes':>8}"]
     for p in frontier.points:
@@ -398,8 +394,9 @@ def _table(frontier: Frontier) -> str:
 def _verify(
     base: str, out: Path, scenes: int, seed: int | None, promises: Path | None, kept: Path | None
 ) -> bool:
+    from lab.frontier.record import Frontier
     from lab.frontier.verify import KEPT, verify
-    from scenelang.output.frontier import MOST_BYTES, Frontier, frontier_path
+    from scenelang.output.frontier import MOST_BYTES, frontier_path
 
     path = promises or frontier_path(base)
     try:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import io
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lab.about import Report, about, silent
 from lab.sets.scenes import draw_scene, scenes_of, spread, summarise
@@ -29,7 +28,6 @@ from scenelang.drawing.metrics import (
     side_by_side,
 )
 from scenelang.drawing.neural.load import Model
-from scenelang.drawing.torch_backend import open_model
 from scenelang.language.scene import Scene
 from scenelang.language.words import COMBINE, TOKENS
 from scenelang.output.plan import reference_of
@@ -99,40 +97,21 @@ def evaluate_set(
     side: int | None = None,
     kept: Path | None = None,
     threads: int = 1,
-    cluster: str | None = None,
     report: Report = silent,
 ) -> tuple[dict[str, Any], list[Case]]:
-    """Draw a set and compare.
+    """Draw a set and compare; returns a summary for JSON, and the cases of the lowest PSNR.
 
     Args:
-        model: what draws.
-        name: the set.
-        count: scenes.
-        seed: of the scenes.
         side: shorter side of the canvas in pixels; by default that of the set.
         kept: folder of exact pictures, which other weights and renderers do not change.
-        threads: for drawing.
-        cluster: scheduler of dask whose workers draw, each with one thread, or ``"local"``; weights are those
-            that ship then, and nothing is kept.
         report: called with the set, scenes done and all.
-
-    Returns:
-        A summary for JSON, and the cases of the lowest PSNR.
     """
     scene_at = scenes_of(model, name, seed, side)
     started = time.perf_counter()
-    if cluster is None:
-        found: Iterable[Case] = (_case(model, scene_at, index, kept, threads) for index in range(count))
-    else:
-        from scenelang.output.workers import by_workers
-
-        asked = ((index, (model.manifest.name, name, seed, side, index)) for index in range(count))
-        found = (result() for _, result in by_workers(cluster, _case_of, asked))
     cases = []
-    for done, case in enumerate(found, 1):
-        cases.append(case)
-        report(name, done, count)
-    cases.sort(key=lambda case: case.index)
+    for index in range(count):
+        cases.append(_case(model, scene_at, index, kept, threads))
+        report(name, index + 1, count)
     scene = scene_at(count - 1)
     worst = sorted(cases, key=lambda c: c.figures["psnr_uncapped"])[:SHOWN]
     summary = {
@@ -167,25 +146,8 @@ def _case(
     program, picture = draw_scene(model, scene, threads)
     exact = exact_of(scene, model.manifest, kept)
     uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
-    return Case(
-        index,
-        _last_word(program.tokens),
-        len(program),
-        {**compare(picture, exact), "psnr_uncapped": uncapped},
-    )
-
-
-def _case_of(asked: tuple[str, str, int, int | None, int]) -> Case:
-    """One scene's figures by a shipped model, where nothing is loaded yet."""
-    model, name, seed, side, index = asked
-    loaded = open_model(model)
-    return _case(loaded, scenes_of(loaded, name, seed, side), index, None, 1)
-
-
-def _last_word(tokens: npt.NDArray[np.int8]) -> str:
-    if not tokens.any():
-        return "all_union"
-    return COMBINE[int(tokens[-1]) & OPERATOR]
+    last = COMBINE[int(program.tokens[-1]) & OPERATOR] if program.tokens.any() else "all_union"
+    return Case(index, last, len(program), {**compare(picture, exact), "psnr_uncapped": uncapped})
 
 
 def _summary(cases: list[Case]) -> dict[str, Any]:

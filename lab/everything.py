@@ -56,7 +56,7 @@ STEPS: Final = (
     Step("lab bench lsp 200"),
     Step("lab bench solids --scenes 1 --side 48 -o {out}/solid-rivals.json", needs=("mitsuba", "povray")),
 )
-"""What is run, in this order: each command of the laboratory and each benchmark that a page cites."""
+"""Commands in their order: each command of the laboratory and each benchmark that a page cites."""
 
 ELSEWHERE: Final = {
     "device": "a GPU",
@@ -102,7 +102,7 @@ def run_everything(
         done: called behind each step with what is returned at the end, as far as it goes.
 
     Returns:
-        Of each step ``command``, and ``seconds``, those of the processor (``processor_s``) and ``exit``, or
+        For each step ``command``, and ``seconds``, those of the processor (``processor_s``) and ``exit``, or
         ``needs`` where it was left out.
     """
     result: list[dict[str, Any]] = []

@@ -150,7 +150,7 @@ def high(angle: float) -> tuple[float, float, float]:
 
 DEPTH = 3 * 2 * 0.6  # optical depth of a medium of middling scale
 MOST = {"operators": 6, "blends": 8, "size": 4, "shear": 4, "canvas": 256}
-"""Of probes of both dimensions, beyond which the exact picture of solids takes too long, or is empty."""
+"""Largest values of probes for which the exact picture of solids is not empty and does not take too long."""
 
 
 MORE = {"warp": (5.0,)}

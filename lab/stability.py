@@ -23,9 +23,8 @@ from lab.sets.scenes import LEAST_COVER, coverage, sized, spread
 from lab.sets.solids import SIDES
 from lab.sets.solids import WARP as SOLID_WARP
 from lab.solid_probes import SOLIDS
-from scenelang.compiler import lifting as exact
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.lifting import LAYOUTS, lift_geometry
+from scenelang.compiler.lifting import LAYOUTS, affine_matrix, leaf_vector, lift_geometry, warp_matrix
 from scenelang.compiler.lower import step_of
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.passes import OPTIONAL
@@ -48,7 +47,7 @@ IDEAL = 8  # samples along a pixel's side of a picture whose own sampling hardly
 
 Array = npt.NDArray[np.float64]
 Row = dict[str, Any]
-"""What was measured at a value of a probe."""
+"""Figures at a value of a probe."""
 
 
 def kit_of(manifest: Manifest) -> Kit:
@@ -133,12 +132,12 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
         vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
         return dataclasses.replace(program, vectors=vectors)
     for row, chain_steps in zip(vectors, steps, strict=True):
-        g = exact.leaf_vector(layout.unpack(row).code.tolist(), layout).astype(np.float32)
+        g = leaf_vector(layout.unpack(row).code.tolist(), layout).astype(np.float32)
         for step in chain_steps:
             if isinstance(step, Affine):
-                matrix = exact.affine_matrix(step.rows, None, layout)
+                matrix = affine_matrix(step.rows, None, layout)
             else:
-                matrix = exact.warp_matrix(step, layout.places.inner, layout)  # type: ignore[arg-type]
+                matrix = warp_matrix(step, layout.places.inner, layout)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
         row[: layout.geometry] = g[: layout.geometry]
     return dataclasses.replace(program, vectors=vectors)
@@ -357,7 +356,7 @@ WARP_OF, SCALES_OF = {2: WARP, 3: SOLID_WARP}, {2: SCALES, 3: SIDES}
 def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
     """Quantity of a manifest -> the probe that varies it, and by what either end of its values is multiplied.
 
-    Of solids the ratio of scales says little: rays may pass over what is thinner than 0.01, at any size.
+    The ratio of scales of solids says little: rays may pass over what is thinner than 0.01, at any size.
     """
     most, scales = WARP_OF[dimension], SCALES_OF[dimension]
     warp = "warp", most, most
@@ -379,7 +378,7 @@ def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
 SOLID = {"displace": "amount", "frequency": "frequency", "thickness": "thickness", "width": "width"}
 FROM_NOTHING = {"smooth", "blend", "displace", "frequency", "width", "texels"}  # the probe starts later
 UNBOUNDED = {"objects", "thin"}
-"""Of these a model has no range where nothing was lost up to the last value: a warning would not say why.
+"""Quantities without a range where nothing was lost up to the last value: a warning would not say why.
 
 Nor has a scale a lower end where nothing was lost down to the first: thin objects are as small one way.
 """

@@ -15,8 +15,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lab import DOCS, RESULTS, ROOT
+from lab.frontier.record import Errors, Frontier, Ratio
 from lab.frontier.ways import FIELD, TITLES
-from scenelang.output.frontier import Errors, Frontier, Ratio, frontier_path
+from scenelang.output.frontier import frontier_path
 
 BASES = {"shapes2d": "", "solids3d": "-solids"}  # models that sets are named after, and endings of names
 

@@ -39,12 +39,13 @@ from lab.docs import solid_rivals
 from lab.docs.blocks import pictured
 from lab.evaluate import Case, sheet
 from lab.frontier.chart import frontier_chart
+from lab.frontier.record import Frontier
 from lab.shadows import measure_shadows
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.neural.load import load_model
 from scenelang.inverse.search import Blur, blurred
 from scenelang.language.diagnostics import SourceFile
-from scenelang.output.frontier import Frontier, frontier_path
+from scenelang.output.frontier import frontier_path
 
 EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"

@@ -116,7 +116,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     **sizes.BLOCKS,
     "all": smallest_run,
 }
-"""What stands between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
+"""Text between ``<!-- begin NAME -->`` and ``<!-- end NAME -->``."""
 
 
 def filled(text: str) -> str:

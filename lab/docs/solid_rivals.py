@@ -7,7 +7,7 @@ from typing import Any
 
 from lab.charts import FAINT, INK, figure_png, pyplot
 from lab.docs.figures import read
-from scenelang.output.frontier import front
+from lab.frontier.record import front
 
 NAME, OURS = "solid-rivals", "network, adaptive"
 SETS = {"diffuse": "diffuse", "solids3d": "solids and media"}

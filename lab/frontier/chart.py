@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from lab.charts import FAINT, INK, figure_png, pyplot
-from scenelang.output.frontier import Frontier, Point, front
+from lab.frontier.record import Frontier, Point, front
 
 LINEAR: Final = 1e-4
 """FLIP below which the axis is linear, so that 0 has its place at the bottom edge."""

@@ -23,6 +23,7 @@ import torch
 from lab.about import Report, about, revision, silent
 from lab.evaluate import exact_of
 from lab.frontier.fit import fit_cost
+from lab.frontier.record import Errors, Frontier, Point, Quality, Ratio, Times, front
 from lab.frontier.ways import PAPER, Draw, Way, paired, ways_of
 from lab.sets.scenes import interval, scenes_of, usual_set
 from scenelang.compiler.compile import compile_scene
@@ -33,18 +34,7 @@ from scenelang.drawing.metrics import flip, over_white, psnr
 from scenelang.drawing.small import Load, load_of
 from scenelang.drawing.torch_backend import open_model
 from scenelang.language.scene import Scene
-from scenelang.output.frontier import (
-    Cost,
-    Errors,
-    Frontier,
-    Point,
-    Quality,
-    Ratio,
-    Times,
-    error_scale,
-    front,
-    yardstick,
-)
+from scenelang.output.frontier import Cost, error_scale, yardstick
 from scenelang.output.plan import reference_of
 
 SHOWN = 4  # scenes whose pictures are kept
@@ -282,11 +272,11 @@ def _point(way: Way, record: Record, paper: Record | None) -> Point:
     errors = quality = None
     if record.flip:
         errors = Errors(
-            float(np.mean(record.flip)),
-            float(np.percentile(record.flip, 95)),
-            margin(len(record.flip)) * max(map(promised, [record.flip, *record.others])),
-            max(record.flip),
-            interval(record.flip),
+            bound=margin(len(record.flip)) * max(map(promised, [record.flip, *record.others])),
+            mean=float(np.mean(record.flip)),
+            p95=float(np.percentile(record.flip, 95)),
+            worst=max(record.flip),
+            interval=interval(record.flip),
         )
         quality = Quality(
             float(np.mean(record.psnr)),

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from lab.frontier.chart import LINEAR, base_of, mark_of, short_name
+from lab.frontier.record import Frontier, Point
 from scenelang.drawing.image import Image
-from scenelang.output.frontier import Frontier, Point
 
 _PAGE: Final = Path(__file__).with_name("page.html")
 _LARGE: Final = 24_000

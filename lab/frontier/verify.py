@@ -10,13 +10,14 @@ import torch
 from lab.about import Report, about, silent
 from lab.evaluate import exact_of
 from lab.frontier.measure import CASES, SIDE
+from lab.frontier.record import Frontier
 from lab.frontier.ways import ways_of
 from lab.sets.scenes import scenes_of, usual_set
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.metrics import flip, over_white
 from scenelang.drawing.torch_backend import open_model
-from scenelang.output.frontier import Frontier, error_scale
+from scenelang.output.frontier import error_scale
 
 KEPT: Final = 0.95
 """Share of scenes in which a promise has to hold."""

@@ -18,16 +18,7 @@ from scenelang.assets.element import Element
 from scenelang.drawing.exact.mesh import Mesh
 from scenelang.inverse.grids import corners
 
-SIDES: Final = (
-    17,
-    25,
-    33,
-    49,
-    65,
-    97,
-    129,
-    193,
-)  # nodes along an axis; the last only where an error is asked
+SIDES: Final = 17, 25, 33, 49, 65, 97, 129, 193  # nodes along an axis; the last only where an error is asked
 NEAR: Final = 0.025  # root mean square of channels off, 0 to 1, that is near enough
 MOST_BYTES: Final = 150_000  # of a grid that is tried where that is not met
 SAMPLES: Final = 20_000

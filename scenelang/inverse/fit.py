@@ -17,7 +17,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from scenelang.assets.records import Record
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.how import Samples
@@ -37,6 +36,7 @@ from scenelang.inverse.search import (
     Point,
     Report,
     SearchBox,
+    Target,
     blurred,
     central,
     descend,
@@ -54,77 +54,29 @@ MOST_SOLID: Final = 128  # the same at most of solids, which take longer
 MOST_TARGETS: Final = 64
 
 
-class Task(Record):
-    """A scene, its params and what it is to look like.
-
-    Args:
-        problems: pictures of sizes from small to large; the last compare what is drawn in the end.
-        space: the params that are searched.
-        first: where they start.
-        kept: the others that have been set, as text of the language.
-    """
-
-    problems: tuple[Together, ...]
-    space: SearchBox
-    first: Point
-    kept: dict[str, str]
-
-
-def task_of(
-    scene: str | os.PathLike[str] | SourceFile,
-    target: Given | Mapping[int, Given],
-    *,
-    params: Iterable[str] = (),
-    start: Mapping[str, Any] = {},
-    fixed: Mapping[str, Any] = {},
-    mask: Given | None = None,
-    crop: tuple[int, int, int, int] | None = None,
-    background: tuple[float, float, float] = WHITE,
-    model: str | None = None,
-    root: str | os.PathLike[str] | None = None,
-    frame: int = 0,
-) -> Task:
-    """Prepare the search of `scenelang.fit`, which has the same arguments and errors."""
-    diagnostics = Diagnostics()
-    given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
-    source = Source(**given, params=fixed, model=model, root=root).parsed(diagnostics)
-    if diagnostics.errors:
-        raise SceneError(diagnostics)
-    targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
-    if not 0 < len(targets) <= MOST_TARGETS:
-        raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
-    moments = [Moment(source, number) for number in sorted(targets)]
-    evaluation, first_scene = moments[0].evaluated(start)
-    space = space_of(evaluation, params, fixed)
-    for name in start:
-        if name not in space.names:
-            raise FitError(f"a start for `{name}`, which is not among the params to find")
-    first = space.point({})
-    solid = True in {_is_solid(each, space.values(first), first_scene.canvas) for each in moments}
-    goals = [
-        target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
-        for each in moments
-    ]
+def problems_of(
+    moments: Sequence[Moment], goals: Sequence[Target], space: SearchBox, canvas: tuple[int, int]
+) -> list[Together]:
+    """Comparisons of frames with their targets, from small to large; the last is of the final pictures."""
+    values = space.values(space.point({}))
+    solid = True in {_is_solid(each, values, canvas) for each in moments}
     smallest = min(min(goal.weights.shape) for goal in goals)
-    short = min(MOST_SOLID if solid else SIDES[-1], *first_scene.canvas, smallest)
-    sides = [side for side in SIDES if side < short] + [short]
+    short = min(MOST_SOLID if solid else SIDES[-1], *canvas, smallest)
 
     def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
-        canvas = _sized(first_scene.canvas, side)
+        size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
         return Together(
             [
-                Problem(each, space, goal, canvas, light=solid, soft=soft, samples=samples, levels=levels)
+                Problem(each, space, goal, size, light=solid, soft=soft, samples=samples, levels=levels)
                 for each, goal in zip(moments, goals, strict=True)
             ]
         )
 
-    problems = [
+    result = [
         compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
-        for at, side in enumerate(sides)
+        for at, side in enumerate([side for side in SIDES if side < short] + [short])
     ]
-    if not solid:
-        problems.append(compared(short, "adaptive", 1, False))
-    return Task(tuple(problems), space, first, literals_of(evaluation, fixed))
+    return result if solid else [*result, compared(short, "adaptive", 1, False)]
 
 
 def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
@@ -140,11 +92,6 @@ def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]
     return manifest.renderer == "solid"
 
 
-def _sized(canvas: tuple[int, int], side: int) -> tuple[int, int]:
-    factor = side / min(canvas)
-    return max(1, round(canvas[0] * factor)), max(1, round(canvas[1] * factor))
-
-
 WIDEST: Final = 8.0  # standard deviation, pixels
 ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the error may be noise
 
@@ -154,7 +101,6 @@ class Lens:
 
     Args:
         problem: of the last size.
-        space: the params.
         until: no descent starts after this time of `time.monotonic`.
     """
 
@@ -189,7 +135,10 @@ class Lens:
         best = place, Blur()
         if not sigma:
             return best
-        wide, start = self.space.beside(Axis("blur", 0.0, WIDEST)), np.append(place.point, sigma / WIDEST)
+        wide, start = (
+            SearchBox(self.space.knobs, Axis("blur", 0.0, WIDEST)),
+            np.append(place.point, sigma / WIDEST),
+        )
         for light in ways:
             if time.monotonic() > self.until:
                 break
@@ -218,62 +167,39 @@ _UNSEEN: Final = 1e-4  # root mean square change over a whole range up to which 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One fitted number, or one of a vector.
+    """One fitted number, or one of a vector; its range and value are in base units."""
 
-    Args:
-        label: ``k``, or ``ink.2`` of a vector.
-        low, high: its range, in base units.
-        value: its fitted value, in base units.
-        felt: change, in shares of its range, that changes the picture by 1/255 (root mean square of all
-            channels); inf where the picture does not show it, NaN where it is not known.
-    """
-
-    label: str
+    label: str  # `k`, or `ink.2` of a vector
     low: float
     high: float
     value: float
+    # change, in shares of its range, that changes the picture by 1/255 (root mean square of all channels);
+    # inf where the picture does not show it, NaN where it is not known
     felt: float
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Result of `scenelang.fit`.
+    """Result of `scenelang.fit`."""
 
-    Args:
-        text: the scene with the values as defaults; comments and layout stay.
-        values: the values as text of the language, by param.
-        psnr: PSNR of the picture of ``text`` to the target in dB, over pixels that count; at most 100.
-        blur: estimated blur of the target.
-        blurred_psnr: PSNR of the picture after the same blur.
-        start_psnr: PSNR of the picture before the search.
-        size: width and height of the pictures that were compared.
-        done: true where the search converged before the time was out.
-        notes: obstacles to a nearer picture or a surer value, in sentences without a full stop.
-        numbers: continuous params and how sensitive the picture is to each.
-        tied: pairs of their labels and their correlation, from `TIED` on.
-        others: values of other places whose pictures are about as near.
-        frames: pictures that were drawn.
-        before, after, target: pictures (H, W, 3) of that size, of several targets one below the other.
-        way: scenes from the start to the result, as `scenelang.animate` takes them.
-    """
-
-    text: str = field(repr=False)
-    values: dict[str, str]
-    psnr: float
-    blur: Blur
-    blurred_psnr: float
-    start_psnr: float
-    size: tuple[int, int]
-    done: bool
-    notes: tuple[str, ...]
-    numbers: tuple[Number, ...]
-    tied: tuple[tuple[str, str, float], ...]
-    others: tuple[dict[str, str], ...]
-    frames: int
+    text: str = field(repr=False)  # the scene with the values as defaults; comments and layout stay
+    values: dict[str, str]  # as text of the language, by param
+    psnr: float  # of the picture of ``text`` to the target in dB, over pixels that count; at most 100
+    blur: Blur  # estimated blur of the target
+    blurred_psnr: float  # PSNR of the picture after the same blur
+    start_psnr: float  # PSNR of the picture before the search
+    size: tuple[int, int]  # width and height of the pictures that were compared
+    done: bool  # true where the search converged before the time was out
+    notes: tuple[str, ...]  # obstacles to a nearer picture or a surer value, without a full stop
+    numbers: tuple[Number, ...]  # continuous params and how sensitive the picture is to each
+    tied: tuple[tuple[str, str, float], ...]  # pairs of their labels and their correlation, from `TIED` on
+    others: tuple[dict[str, str], ...]  # values of other places whose pictures are about as near
+    frames: int  # pictures that were drawn
+    # pictures (H, W, 3) of that size, of several targets one below the other
     before: Image = field(repr=False)
     after: Image = field(repr=False)
     target: Image = field(repr=False)
-    way: tuple[Scene, ...] = field(repr=False)
+    way: tuple[Scene, ...] = field(repr=False)  # from the start to the result, for `scenelang.animate`
 
     def told(self) -> list[str]:
         """The report, line by line."""
@@ -345,12 +271,7 @@ def hindrances(
     worst: tuple[str, Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
-    """Reasons why the picture is no nearer, as far as they are known.
-
-    Args:
-        worst: label of the picture that is farthest off, and the errors (H, W) of its pixels.
-        noise: true where these are like noise.
-    """
+    """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `Together`."""
     notes = []
     if not done:
         notes.append("not converged: the last rounds still found nearer pictures, or time was out")
@@ -421,66 +342,63 @@ def fit(
         OSError: a file cannot be read.
     """
     until = time.monotonic() + budget_s
-    task = task_of(
-        scene, target, params=params, start=start or {}, fixed=fixed or {}, mask=mask, crop=crop,
-        background=background, model=model, root=root, frame=frame,
-    )  # fmt: skip
-    lens = Lens(task.problems[-1], task.space, until)
-    places, done = solve(
-        task.problems,
-        task.space,
-        task.first,
-        seed=seed,
-        until=until,
-        noise=lens.noise,
-        report=progress,
-    )
+    start, fixed, diagnostics = start or {}, fixed or {}, Diagnostics()
+    given = {"text": scene} if isinstance(scene, SourceFile) else {"path": scene}
+    source = Source(**given, params=fixed, model=model, root=root).parsed(diagnostics)
+    if diagnostics.errors:
+        raise SceneError(diagnostics)
+    targets = {int(at): one for at, one in target.items()} if isinstance(target, Mapping) else {frame: target}
+    if not 0 < len(targets) <= MOST_TARGETS:
+        raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
+    moments = [Moment(source, number) for number in sorted(targets)]
+    evaluation, first_scene = moments[0].evaluated(start)
+    space = space_of(evaluation, params, fixed)
+    for name in start:
+        if name not in space.names:
+            raise FitError(f"a start for `{name}`, which is not among the params to find")
+    goals = [
+        target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
+        for each in moments
+    ]
+    problems, first = problems_of(moments, goals, space, first_scene.canvas), space.point({})
+    last = problems[-1]
+    lens = Lens(last, space, until)
+    places, done = solve(problems, space, first, seed=seed, until=until, noise=lens.noise, report=progress)
     if not places:
         raise FitError("no values that were tried give a picture")
-    return _fit(task, lens, *lens.ended(places), done)
-
-
-def _fit(task: Task, lens: Lens, places: list[Found], blur: Blur, done: bool) -> Fit:
-    """Result of the places that a search reached and of the target's blur."""
-    space, problems, first = task.space, task.problems, task.first
-    last, best = problems[-1], places[0].point
-    every = [space.literals(place.point) for place in places]
-    moment = last.parts[0].moment
-    text = rewritten(moment.tree, {**task.kept, **every[0]})
-    after = last.drawn([part.moment.reads(text).program({}, last.canvas) for part in last.parts])
+    places, blur = lens.ended(places)
+    best, every = places[0].point, [space.literals(place.point) for place in places]
+    text = rewritten(moments[0].tree, {**literals_of(evaluation, fixed), **every[0]})
+    after = last.drawn([each.reads(text).program({}, last.canvas) for each in moments])
     before = last.pictures(first)
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
-    near = _db(last, after)
     soft = [blurred(one, blur) for one in after]
+    soft_db = _db(last, soft)
     step = 2 * STEPS[min(len(problems), len(STEPS)) - 1]
     slopes = central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
-    others = [
-        literals
-        for place, literals in zip(places[1:], every[1:], strict=True)
-        if place.cost <= max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
-    ]
+    alike = max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
     return Fit(
         text=text,
         values=every[0],
-        psnr=near,
+        psnr=_db(last, after),
         blur=blur,
-        blurred_psnr=_db(last, soft),
+        blurred_psnr=soft_db,
         start_psnr=_db(last, before) if before is not None else -math.inf,
         size=last.canvas,
         done=done,
-        notes=hindrances(
-            space, best, numbers, _db(last, soft), done, last.worst(soft), last.noise(best, blur)
-        ),
+        notes=hindrances(space, best, numbers, soft_db, done, last.worst(soft), last.noise(best, blur)),
         numbers=numbers,
         tied=ties(space, slopes),
-        others=tuple(others),
+        others=tuple(
+            literals for place, literals in zip(places[1:], every[1:], strict=True) if place.cost <= alike
+        ),
         frames=sum(problem.frames for problem in (*problems, lens.finer)),
         before=_image(after if before is None else before),
         after=_image(after),
         target=_image([part.colours for part in last.parts]),
-        way=tuple(_scenes(moment, space, [first, *places[0].way, best])),
+        way=tuple(_scenes(moments[0], space, [first, *places[0].way, best])),
     )
 
 

@@ -5,12 +5,9 @@ a param moves a little. Here one sample tells how much of its pixel is covered: 
 of union, subtraction and intersection, and the one that reads coverage) are made as wide as a pixel. Nothing
 else of the network changes.
 
-Pixels know nothing of each other. So each has numbers of its own, and two reverse passes tell how all pixels
-change with theirs: one through the cell, by distances, colours and widths of blends, and one through decoders
-and frames, of the few pixels that change with a distance at all.
-
-Params that change different numbers are moved together, so that a scene of many params is compiled about as
-often as one object has params (Curtis, Powell and Reid 1974).
+Two reverse passes tell how all pixels change with numbers of their own: one through the cell, by distances,
+colours and widths of blends, and one through decoders and frames, of the few pixels that change with a
+distance at all. Params that change different numbers are moved together (Curtis, Powell and Reid 1974).
 """
 
 from __future__ import annotations
@@ -60,19 +57,12 @@ _LEAST: Final = 1e-30  # of a square, whose root has no derivative at 0
 
 
 class _Parts(NamedTuple):
-    """Numbers of N objects and of the background, or n rates of these.
+    """Numbers of N objects and of the background, or n rates of these."""
 
-    Args:
-        geometry: geometry vectors (N, G, n).
-        colours: (N, 3, n).
-        widths: widths of the blends by which objects join (N, n).
-        behind: colour of the background (3, n).
-    """
-
-    geometry: Tensor
-    colours: Tensor
-    widths: Tensor
-    behind: Tensor
+    geometry: Tensor  # geometry vectors (N, G, n)
+    colours: Tensor  # (N, 3, n)
+    widths: Tensor  # of the blends by which objects join (N, n)
+    behind: Tensor  # colour of the background (3, n)
 
 
 class SoftPlane:
@@ -237,12 +227,7 @@ def alike(a: Program, b: Program) -> bool:
 
 
 class Rates:
-    """Derivatives of a Program's numbers.
-
-    Args:
-        program: compiles the scene of a point; gives None where its values have no scene.
-        space: the params.
-    """
+    """Derivatives of a Program's numbers; ``program`` compiles the scene of a point, or gives None."""
 
     def __init__(self, program: Callable[[Point], Program | None], space: SearchBox) -> None:
         self.program, self.space = program, space

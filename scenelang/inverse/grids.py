@@ -1,9 +1,8 @@
 """The smallest grids of distances within an error.
 
-Pyramids of two kinds of coarsest grid grow level by level, the smaller one first. A grid that is true at its
-nodes cuts the edges and corners of a shape between them. So the nodes of the finest grid are moved by the
-errors at points of the surface, in some rounds (SIRT; Gilbert 1972), which halves the error there. Each grid
-is measured as it is drawn: its distances and its normals at other points of the true surface.
+Pyramids of two kinds of coarsest grid grow level by level. A grid that is true at its nodes cuts edges and
+corners between them, so the nodes of the finest grid are moved by the errors at points of the surface (SIRT;
+Gilbert 1972), which halves the error. Each is measured as it is drawn, at other points of the true surface.
 """
 
 from __future__ import annotations
@@ -72,22 +71,14 @@ NEAR: Final = {2: 1e-4, 3: 1.5e-4}  # mean distance off that is near enough, by 
 
 
 class Rung(NamedTuple):
-    """One pyramid that was tried.
+    """One pyramid that was tried."""
 
-    Args:
-        side: nodes along an axis of its finest grid.
-        error: mean distance off at the surface, in leaf units.
-        worst: 99th percentile of the distance off.
-        normal_deg: median angle between normals.
-        thin: share of the surface with no inside of the grid, or of the shape, within a cell.
-    """
-
-    side: int
+    side: int  # nodes along an axis of its finest grid
     bytes: int
-    error: float
-    worst: float
-    normal_deg: float
-    thin: float
+    error: float  # mean distance off at the surface, in leaf units
+    worst: float  # 99th percentile of the distance off
+    normal_deg: float  # median angle between normals
+    thin: float  # share of the surface with no inside of the grid, or of the shape, within a cell
 
 
 @dataclass(slots=True)
@@ -187,15 +178,8 @@ def fit(
             break
     assert best is not None
     rung, kept = best
-    said = {
-        **(about or {}),
-        "error": rung.error,
-        "thin": rung.thin,
-        "steps": len(tried),
-        "ended": ended,
-        "size": shape.size,
-    }
-    said |= dict(zip("xyz", shape.centre, strict=False))
+    said = {**(about or {}), "error": rung.error, "thin": rung.thin, "steps": len(tried), "ended": ended}
+    said |= {"size": shape.size, **dict(zip("xyz", shape.centre, strict=False))}
     return replace(kept, about=said), tried
 
 

@@ -18,8 +18,7 @@ from scenelang.assets.element import TEXELS, Element
 from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import MOST_BYTES, Zoo, is_said, read_zoo, zoo_bytes
-from scenelang.drawing.exact import originals as parts
-from scenelang.drawing.exact import outline
+from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
 from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
 from scenelang.drawing.exact.originals import MOST_OF, said
@@ -44,32 +43,19 @@ COARSER: Final = 2.0  # most times the error of the whole that a part may have, 
 
 @dataclass(frozen=True, slots=True)
 class LearnOptions:
-    """Options of learning elements.
-
-    Args:
-        sign: rule for the inside of a mesh.
-        max_error: mean distance off that is near enough, in leaf units, `NEAR` if left out; of textures root
-            mean square off of channels in [0, 1], `NEAR_COLOUR` if left out.
-        budget_s: for each file; nothing new is begun after it.
-        steps: forms that are tried at most, whatever the time; the same number gives the same bytes.
-        license: of the originals.
-        source: where they are from.
-        pictures: kind of element that a picture becomes.
-        texels: most of a texture along its longer side.
-        parts: true makes each part of a file an element; if left out, only those of drawings.
-        color_error: root mean square off of a mesh's colours that is near enough, of channels in [0, 1];
-            `scenelang.inverse.colours.NEAR` if left out.
-    """
+    """Options of learning elements; those of `learn` are described there."""
 
     sign: Sign = "auto"
+    # in leaf units, `NEAR` if left out; of textures root mean square off of channels in [0, 1]
     max_error: float | None = None
     budget_s: float = math.inf
     steps: int | None = None
     license: str | None = None
     source: str | None = None
     pictures: Literal["texture", "outline"] = "texture"
-    texels: int = TEXELS
+    texels: int = TEXELS  # most of a texture along its longer side
     parts: bool | None = None
+    # root mean square off of a mesh's colours that is near enough, of channels in [0, 1]
     color_error: float | None = None
 
     def __post_init__(self) -> None:
@@ -132,15 +118,12 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
         request: the ``suffix``, the ``name`` of the element, its facts (``about``), the ``options``, and
             bytes of the ``files`` that the original names.
         tell: called with ``say`` and a line, or with ``progress`` and its arguments.
-
-    Raises:
-        FitError: no element can be made of it.
     """
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
     if options.paints(suffix):
         return zoo_bytes([_texture(data, name, job)])
-    brought = parts.brought(data, suffix, name, request["files"], options.sign, options.parts)
+    brought = originals.brought(data, suffix, name, request["files"], options.sign, options.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
     group, elements = list(brought.group), []
     for called, shape in brought.shapes.items():
@@ -245,9 +228,8 @@ def learn_files(
     The file is written after each element, whole or not at all. An element that it already holds of the same
     original and options is not made again. So the same call continues work that was interrupted.
 
-    Args:
-        files, out, name, cluster, say: as for `scenelang.learn`, which raises the same.
-        progress: called with what is done, how much of it, and all.
+    Arguments and errors are those of `scenelang.learn`; ``progress`` is called with what is done, how much of
+    it, and all.
     """
     names = names_of(files, options, name)
     first = held = _writable(out)
@@ -317,14 +299,13 @@ def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[
 def names_of(
     files: Sequence[str | os.PathLike[str]], options: LearnOptions, name: str | None = None
 ) -> list[str]:
-    """Names of the elements of files; that of a single file is ``name``.
-
-    Raises:
-        ValueError: scenes cannot say a name, or it is that of two.
-    """
+    """Names of the elements of files; raises `ValueError` where one is not a name, or two are the same."""
     if name is not None and len(files) > 1:
         raise ValueError("a name is for one file")
-    names = [_word(Path(file).stem) if name is None else name for file in files]
+    names = [said(Path(file).stem) for file in files]
+    names = [f"_{word}" if word[:1].isdigit() else word for word in names]
+    if name is not None:
+        names = [name] * len(files)
     owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
     for file, word in zip(files, names, strict=True):
         if not (word.isascii() and word.isidentifier()):
@@ -333,12 +314,6 @@ def names_of(
         if first is not file:
             raise ValueError(f"`{first}` and `{file}` would both be `{word}`")
     return names
-
-
-def _word(stem: str) -> str:
-    """A file's name as an element's."""
-    word = said(stem)
-    return f"_{word}" if word[:1].isdigit() else word
 
 
 def _writable(out: str | os.PathLike[str]) -> Zoo:
@@ -365,11 +340,7 @@ def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
 
 
 def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
-    """Write a file's elements and the new ones, which replace those of the same names and their groups.
-
-    Raises:
-        OSError: it cannot be written, or would be more than can be read.
-    """
+    """Write a file's elements and the new ones, which replace those of the same names and their groups."""
     elements, groups = _named(held), dict(held.groups)
     for name, zoo in made:
         groups.pop(name, None)

@@ -29,17 +29,11 @@ LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along 
 
 
 class Moment(Record, frozen=False):
-    """A frame of a scene, to be run with other values of its params.
+    """A frame of a scene, to be run with other values of its params."""
 
-    Args:
-        source: the scene, parsed, with values of params that are not searched.
-        frame: which one, from 0.
-        trouble: diagnostics of the last values that gave no scene.
-    """
-
-    source: Source
-    frame: int = 0
-    trouble: tuple[Diagnostic, ...] = ()
+    source: Source  # the scene, parsed, with values of params that are not searched
+    frame: int = 0  # its number
+    trouble: tuple[Diagnostic, ...] = ()  # of the last values that gave no scene
 
     def reads(self, text: str) -> Moment:
         """The same frame of another text, in which all params have their values."""
@@ -53,11 +47,7 @@ class Moment(Record, frozen=False):
         return self.source.tree
 
     def evaluated(self, values: Mapping[str, Any]) -> tuple[Evaluation, Scene]:
-        """The scene of values of its params.
-
-        Raises:
-            SceneError: it has errors.
-        """
+        """The scene of values of its params; raises `SceneError` where it has errors."""
         diagnostics = Diagnostics()
         params = {**self.source.values, **values}
         evaluation = replace(self.source, params=params).evaluation(diagnostics, frame=self.frame)
@@ -80,9 +70,6 @@ class Problem:
     """Residuals of pictures of one size against the target.
 
     Args:
-        moment: makes the scenes.
-        space: the params.
-        target: what they are to look like.
         canvas: width and height of the pictures.
         light: true where pixels are means of linear light, as those of solids are.
         soft: true gives outlines of the plane the width of a pixel; else they are sharp.
@@ -142,13 +129,8 @@ class Problem:
         """The picture of a point, None where its values give no scene."""
         return self.drawn(self.program(u))
 
-    def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,), whose squares sum to the mean square errors of all levels of the pyramid."""
-        picture = self.picture(u)
-        return None if picture is None else self.residuals(picture, self.levels)
-
     def residuals(self, picture: Picture, levels: int = 1) -> Point:
-        """Residuals of a picture, at so many levels of the pyramid."""
+        """Residuals (R,), whose squares sum to the mean square errors of so many levels of the pyramid."""
         return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
@@ -171,18 +153,12 @@ def _pyramid(gap: Picture, levels: int) -> Matrix:
     """Rows (R, n) of all pixels and channels of each level, of n pictures (H, W, 3 n), channels first."""
     parts: list[Matrix] = []
     for level in range(levels):
-        if level:
-            gap = _halved(gap)
+        if level:  # means of 2 x 2 pixels; the last row and column of an odd size stand twice
+            x = np.pad(gap, ((0, gap.shape[0] % 2), (0, gap.shape[1] % 2), (0, 0)), mode="edge")
+            gap = (x[::2, ::2] + x[1::2, ::2] + x[::2, 1::2] + x[1::2, 1::2]) / 4
         rows = gap.reshape(gap.shape[0] * gap.shape[1] * 3, -1)
         parts.append(rows / np.sqrt(len(rows)))
     return np.concatenate(parts)
-
-
-def _halved(x: Picture) -> Picture:
-    """Means of 2 x 2 pixels; the last row and column of an odd size stand twice."""
-    height, width = x.shape[:2]
-    x = np.pad(x, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    return np.asarray((x[::2, ::2] + x[1::2, ::2] + x[::2, 1::2] + x[1::2, 1::2]) / 4)
 
 
 EDGE: Final = 2 ** (LEVELS - 1)  # side in pixels of the squares whose means the last level has
@@ -192,11 +168,7 @@ SOFTER: Final = 0.98  # most of the error that a blur may leave to count as one
 
 
 class Together:
-    """Residuals of the pictures of several frames against their targets.
-
-    Args:
-        parts: a frame each, of one size.
-    """
+    """Residuals of the pictures of several frames of one size against their targets."""
 
     def __init__(self, parts: Sequence[Problem]) -> None:
         self.parts, self.canvas = tuple(parts), parts[0].canvas

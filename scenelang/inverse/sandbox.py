@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any, Final
 
 from scenelang.assets.files import read_regular
@@ -58,9 +57,7 @@ class SandboxProcess:
     def __enter__(self) -> SandboxProcess:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._process is not None:
             self._process.kill()
             self._end()
@@ -75,7 +72,16 @@ class SandboxProcess:
         Raises:
             FitError: it cannot be made or takes more memory or time, or a library has failed.
         """
-        process = self._begun()
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-c", _CODE, json.dumps(sys.path)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=_environment(),
+                start_new_session=True,  # an interruption is ours to tell it
+            )
+        process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
         files = request.get("files", {})
@@ -92,18 +98,6 @@ class SandboxProcess:
                 raise FitError(*values)
             hear[kind](*values)
         raise FitError(_ended(self._end()))
-
-    def _begun(self) -> subprocess.Popen[bytes]:
-        if self._process is None:
-            self._process = subprocess.Popen(
-                [sys.executable, "-I", "-c", _CODE, json.dumps(sys.path)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env=_environment(),
-                start_new_session=True,  # an interruption is ours to tell it
-            )
-        return self._process
 
     def _end(self) -> int:
         process, self._process = self._process, None
@@ -218,10 +212,9 @@ _NAMES: Final = {
 
 
 def files_beside(data: bytes, suffix: str, folder: Path) -> dict[str, bytes]:
-    """The bytes of the files that a mesh names, and of those that its materials name, by these names.
+    """The bytes of the files that a mesh and its materials name, by these names.
 
-    Only regular files in the folder or below it are read, of at most `MOST_BYTES` each and `MOST_TOGETHER` in
-    all.
+    Only regular files in the folder or below it are read, within `MOST_BYTES` each and `MOST_TOGETHER`.
     """
     result: dict[str, bytes] = {}
     left = MOST_TOGETHER

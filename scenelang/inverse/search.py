@@ -1,22 +1,18 @@
 """The nearest picture: a look around, then descents from the best places, from coarse to fine.
 
 A point holds a number for each axis: of a continuous one in [0, 1], of others the index of a choice. A vector
-has an axis for each of its numbers.
-
-Everything is measured on pictures, so that no feature of a scene, such as shadows or textures, needs code of
-its own here. A descent is Levenberg's and Marquardt's (1944, 1963) on differences, which take a picture for
-each param and one more; J'J measures how sensitive the picture is to each param.
+has an axis for each of its numbers. A descent is Levenberg's and Marquardt's (1944, 1963); J'J measures how
+sensitive the picture is to each param.
 """
 
 from __future__ import annotations
 
-import copy
 import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, product
-from typing import Any, Final, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -50,28 +46,17 @@ class SearchBox:
 
     Args:
         knobs: the params.
-
-    Attributes:
-        axes: axes of all params, in order.
-        smooth: (n,) true where an axis is continuous.
-        most: (n,) largest number of an axis: 1, or the last index of a choice.
-        wraps: (n,) true where an axis is an angle over a full turn.
+        others: axes that belong to no param, behind theirs.
     """
 
-    def __init__(self, knobs: Sequence[Knob]) -> None:
+    def __init__(self, knobs: Sequence[Knob], *others: Axis) -> None:
         self.knobs = tuple(knobs)
-        self.axes = tuple(axis for knob in knobs for axis in knob.axes)
+        self.axes = (*(axis for knob in knobs for axis in knob.axes), *others)
+        # of n axes: true where one is continuous; its largest number, 1 or the last index of a choice; true
+        # where it is an angle over a full turn
         self.smooth = np.array([not axis.choices for axis in self.axes], bool)
         self.most = np.array([max(1, len(axis.choices) - 1) for axis in self.axes], np.float64)
         self.wraps = np.array([axis.wraps for axis in self.axes], bool)
-
-    def beside(self, axis: Axis) -> SearchBox:
-        """The same box with a continuous axis that belongs to no param, behind the others."""
-        wide = copy.copy(self)
-        wide.axes = (*self.axes, axis)
-        wide.smooth, wide.most = np.append(self.smooth, True), np.append(self.most, 1.0)
-        wide.wraps = np.append(self.wraps, axis.wraps)
-        return wide
 
     def inside(self, u: Point) -> Point:
         """The nearest point of the box; full turns are taken off."""
@@ -125,12 +110,7 @@ def _plain(value: Any) -> Any:
 
 
 def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> SearchBox:
-    """The box of a scene's params.
-
-    Args:
-        evaluation: of the scene, after a run.
-        names: the params; by default all that have a range.
-        fixed: those that keep their value.
+    """The box of a scene's params: those of ``names``, or all that have a range, without those of ``fixed``.
 
     Raises:
         FitError: there is no such param, or it has no values to search among.
@@ -160,17 +140,11 @@ WHITE: Final = (1.0, 1.0, 1.0)
 
 
 class Target(Record):
-    """Picture to compare with, and the weights of its pixels.
+    """Picture to compare with, and the weights of its pixels."""
 
-    Args:
-        colours: (H, W, 3), sRGB-encoded in [0, 1], laid over ``under`` where it was transparent.
-        weights: (H, W), in [0, 1]: how much a pixel counts.
-        under: the colour behind what is transparent, of the target and of the scene.
-    """
-
-    colours: Picture
-    weights: Picture
-    under: tuple[float, float, float] = WHITE
+    colours: Picture  # (H, W, 3), sRGB-encoded in [0, 1], laid over ``under`` where it was transparent
+    weights: Picture  # (H, W), in [0, 1]: how much a pixel counts
+    under: tuple[float, float, float] = WHITE  # behind what is transparent, in the target and in the scene
 
     def sized(self, canvas: tuple[int, int], light: bool) -> tuple[Picture, Picture]:
         """Colours and weights on a canvas; ``light`` has the means of linear light, as solids' pixels are."""
@@ -197,15 +171,10 @@ def over(picture: npt.NDArray[np.floating], under: tuple[float, float, float]) -
 
 
 class Blur(NamedTuple):
-    """Blur of a picture.
+    """Blur of a picture."""
 
-    Args:
-        sigma: standard deviation of a Gaussian, pixels; 0 where it is not.
-        light: true blurs linear light, as a lens out of focus does, false the sRGB-encoded numbers.
-    """
-
-    sigma: float = 0.0
-    light: bool = True
+    sigma: float = 0.0  # standard deviation of a Gaussian, pixels; 0 without a blur
+    light: bool = True  # blurs linear light, as a lens out of focus does; else the sRGB-encoded numbers
 
 
 def blurred(picture: Picture, blur: Blur, finer: int = 1) -> Picture:
@@ -236,18 +205,11 @@ def target_of(
     crop: tuple[int, int, int, int] | None = None,
     under: tuple[float, float, float] = WHITE,
 ) -> Target:
-    """A target for scenes of a canvas.
+    """A target for scenes of a canvas; arguments and errors are those of `scenelang.fit`.
 
     Args:
-        picture: a file (.png, .jpg), or an array (H, W, 3 or 4) of sRGB-encoded values in [0, 1].
         canvas: width and height of the scene, whose aspect the picture needs.
-        mask: of the picture's size, brighter where pixels count for more; in its darkness they do not count.
-        crop: x, y, width and height of the part that shows the scene, pixels of the picture.
         under: the colour behind what is transparent.
-
-    Raises:
-        FitError: a file is damaged, or the sizes do not fit.
-        OSError: a file cannot be read.
     """
     result = over(_read(picture), under)
     weights = np.ones(result.shape[:2]) if mask is None else over(_read(mask), (0.0, 0.0, 0.0)).mean(2)
@@ -290,17 +252,6 @@ Report = Callable[[str, int, int], None]
 Matrix = npt.NDArray[np.float64]
 
 
-@runtime_checkable
-class Steep(Protocol):
-    """Residuals with derivatives."""
-
-    def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,)."""
-
-    def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
-        """Derivatives (R, n), in shares of ranges, and a mask (n,) of their axes; None without any."""
-
-
 MANY: Final = 6  # numbers from which on derivatives by reverse passes cost less than differences
 APART: Final = 0.02  # least distance of two solutions, in shares of a range
 LOOKS: Final = 48  # places that a round looks at, times n + 1 of n numbers
@@ -320,17 +271,11 @@ _GRAIN: Final = 1e-7  # mean square error below which a difference is invisible
 
 
 class Found(Record):
-    """A place that a search reached.
+    """A place that a search reached."""
 
-    Args:
-        point: its coordinates.
-        cost: sum of squares of the residuals there.
-        way: earlier points of the search, each nearer than the one before in pictures of its size.
-    """
-
-    point: Point
-    cost: float
-    way: tuple[Point, ...] = ()
+    point: Point  # its coordinates
+    cost: float  # sum of squares of the residuals there
+    way: tuple[Point, ...] = ()  # earlier points, each nearer than the one before in pictures of its size
 
     def after(self, before: Found) -> Found:
         """The same place with the way of an earlier one in front of its own."""
@@ -370,10 +315,11 @@ def slopes(
         fine: true takes central differences of `FINE` of the step.
     """
     result = np.zeros((len(at), len(u)))
-    if np.count_nonzero(free) >= MANY and isinstance(residuals, Steep):
-        exact = residuals.slopes(u)
-        if exact is not None:
-            result, free = exact[0], free & ~exact[1]
+    by_passes = getattr(
+        residuals, "slopes", None
+    )  # (R, n), and a mask (n,) of the axes that it knows; or None
+    if np.count_nonzero(free) >= MANY and by_passes is not None and (exact := by_passes(u)) is not None:
+        result, free = exact[0], free & ~exact[1]
     if fine and free.any() and (better := central(residuals, space, u, step * FINE, free)) is not None:
         return np.where(free, better, result)
     for axis in np.flatnonzero(free):
@@ -419,8 +365,7 @@ def descend(
     Args:
         step: of differences, in shares of a range.
         most: number of steps at most.
-        fine: true takes central differences of a third of the step: twice the pictures, but they follow a
-            narrow valley that others lose.
+        fine: take central differences: twice the pictures, but they follow a narrow valley that others lose.
         enough: least relative gain of a step; the first with less is the last.
     """
     at = residuals(u)
@@ -558,11 +503,9 @@ def solve(
 
     Args:
         problems: residuals at sizes from small to large, those of the last by pixels alone.
-        start: a place that is looked at first.
         until: no new descent is begun after this time, as of `time.monotonic`.
         near: sum of squares that is near enough.
         noise: returns whether only noise is left at a place of the last size, so that none is nearer.
-        report: called with what is done, how much of it, and all.
 
     Returns:
         Distinct places, none where no place has a picture, and whether the search converged by itself.

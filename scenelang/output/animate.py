@@ -1,8 +1,4 @@
-"""Animations to files: draw what is missing, encode, put in place.
-
-In order: `frames` finds the target of a file name, compiles frames and caches them on disk; `painting` and
-`workers` draw them; `encoders` write films; `make` runs it all. `render_frames` and `animate` are the API.
-"""
+"""Animations to files: draw what is missing, encode, put in place."""
 
 from __future__ import annotations
 
@@ -14,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
+from PIL import features
+
 from scenelang.assets.files import output_place, write_whole
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
 from scenelang.drawing.image import output_file
@@ -24,12 +22,10 @@ from scenelang.language.scene import Scene
 from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
 from scenelang.output.frames import (
     Clip,
-    Encoder,
     Film,
     FrameRange,
     Store,
     Target,
-    deliver,
     find_target,
     put_frame,
 )
@@ -52,17 +48,11 @@ _TRIED: Final = 3  # frames drawn here before that is decided
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of an animation.
+    """Progress of an animation."""
 
-    Args:
-        stage: ``"drawing"`` or ``"encoding"``.
-        done: of this stage, in frames for drawing and as a share for encoding.
-        total: final value of ``done``.
-    """
-
-    stage: str
-    done: float
-    total: float
+    stage: str  # "drawing" or "encoding"
+    done: float  # of this stage, in frames for drawing and as a share for encoding
+    total: float  # final value of ``done``
 
     @property
     def told(self) -> str:
@@ -72,31 +62,18 @@ class Progress:
 
 @dataclass(slots=True)
 class RenderResult:
-    """An animation that was written.
+    """An animation that was written."""
 
-    Args:
-        files: the written files, in order.
-        frames: number of frames.
-        drawn: pictures that were drawn now; equal frames are drawn once.
-        resumed: pictures of a previous run, which was interrupted.
-        compile_s: time to evaluate and compile all frames.
-        draw_s: time to draw, encode pictures and wait for other processes.
-        encode_s: time to encode the film.
-        jobs: processes that drew.
-        asked: requested processes, where that is more than there are frames or cores.
-        keys: digest of each frame's inputs; empty for a frame that was left out.
-    """
-
-    files: list[Path]
-    frames: int
-    drawn: int = 0
-    resumed: int = 0
-    compile_s: float = 0.0
-    draw_s: float = 0.0
-    encode_s: float = 0.0
-    jobs: int = 1
-    asked: int | None = None
-    keys: list[str] = field(default_factory=list)
+    files: list[Path]  # in order
+    frames: int  # number of frames
+    drawn: int = 0  # pictures that were drawn now; equal frames are drawn once
+    resumed: int = 0  # pictures of a previous run, which was interrupted
+    compile_s: float = 0.0  # time to evaluate and compile all frames
+    draw_s: float = 0.0  # time to draw, encode pictures and wait for other processes
+    encode_s: float = 0.0  # time to encode the film
+    jobs: int = 1  # processes that drew
+    asked: int | None = None  # requested processes, where that is more than there are frames or cores
+    keys: list[str] = field(default_factory=list)  # digest of each frame's inputs; empty where left out
 
     def lines(self) -> list[str]:
         """Report of the run, line by line."""
@@ -130,20 +107,16 @@ def make(
     continues with those that are missing.
 
     Args:
-        jobs: processes that draw; by default this one, and others as soon as they would pay.
-        cluster: address of a dask scheduler whose workers draw instead, or ``"local"``.
-        palette, dither: as for `write_gif`.
+        jobs, cluster, palette, dither, progress: as for `animate`, which raises the same.
         strict: count warnings as errors.
         beside: called with each frame before it is drawn; gives the further files of a sequence.
         failed: called with a frame that has errors and is left out; by default such a frame ends the run.
-        progress: called from any thread.
-
-    Raises:
-        SceneError: a frame has errors.
-        RenderError: a frame cannot be drawn, or the format cannot be written.
-        OSError: a file cannot be written.
     """
-    ready(target)
+    place = output_place(target.path)
+    if target.kind == "video":
+        find_codec(target.path.suffix.lower())
+    elif target.kind == "webp" and not features.check("webp"):
+        raise RenderError("this Pillow is built without WebP")
     if target.kind != "sequence" and not _FPS[0] <= (fps := painter.clip.animation.fps) <= _FPS[1]:
         least, most = _FPS
         raise RenderError(f"a film of {fps:g} frames a second, where {least:g} to {most:,.0f} can be written")
@@ -162,14 +135,16 @@ def make(
             files = [store.file(key) for key in result.keys]
             film = Film(files, animation.fps, animation.loop, painter.clip.first.scene.canvas, run.alpha)
             part = store.folder / f"film{target.path.suffix}"
-            encoders: dict[str, Encoder] = {
+            encoders: dict[str, Callable[..., None]] = {
                 "gif": partial(write_gif, palette=palette, dither=dither),
                 "apng": write_apng,
                 "webp": write_webp,
                 "video": partial(write_video, suffix=target.path.suffix.lower()),
             }
             encoders[target.kind](film, part, lambda share: progress(Progress("encoding", share, 1.0)))
-            deliver(part, target.path)
+            with part.open("rb") as written:
+                os.fsync(written.fileno())
+            os.replace(part, place)
             result.files = [target.path]
         result.encode_s = time.perf_counter() - started
         store.remove()
@@ -310,18 +285,6 @@ def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[P
     return files
 
 
-def ready(target: Target) -> None:
-    """Raise `RenderError` where a format cannot be written, `NotWritten` where an input would be lost."""
-    output_place(target.path)
-    if target.kind == "video":
-        find_codec(target.path.suffix.lower())
-    elif target.kind == "webp":
-        from PIL import features
-
-        if not features.check("webp"):
-            raise RenderError("this Pillow is built without WebP")
-
-
 Frames = range | str | None
 Drawn = str | os.PathLike[str] | Scene | Iterable[Scene]
 
@@ -417,17 +380,9 @@ def animate(
     clip = _opened(path, fps, size, params, model, root)
     if target.kind != "sequence":
         _ = clip.animation  # raises before anything is drawn
-    painter = Painter(clip, How(**how).checked())
-    return make(
-        painter,
-        target,
-        _numbers(clip, frames),
-        jobs=jobs,
-        cluster=cluster,
-        palette=palette,
-        dither=dither,
-        progress=progress,
-    )
+    painter, numbers = Painter(clip, How(**how).checked()), _numbers(clip, frames)
+    gif: dict[str, Any] = {"palette": palette, "dither": dither}
+    return make(painter, target, numbers, jobs=jobs, cluster=cluster, **gif, progress=progress)
 
 
 def _opened(

@@ -1,8 +1,7 @@
 """Encoders of animations, frame by frame: GIF, APNG, WebP and video by ffmpeg.
 
-Pillow's own writers of GIF and APNG, also in 13.0, hold every frame until the last has come, and give each
-frame of a GIF its own palette. The writers here hold one frame, and find a palette that is exact for all
-frames where there is one.
+Pillow's own writers of GIF and APNG, also in 13.0, hold every frame until the last has come. The writers here
+hold one, and find a palette that is exact for all frames where there is one.
 
 Sources: CompuServe, Graphics Interchange Format, version 89a; W3C, Portable Network Graphics (PNG)
 Specification, third edition, 2025, chapters 4.9 and 11.3.6.
@@ -17,7 +16,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen, run
 from typing import BinaryIO, Final, Literal
@@ -62,16 +61,24 @@ def write_gif(
     census = Census(most)
     count = len(lengths)
     if palette != "frame":
-        for index, (pixels, length) in enumerate(film.runs(lengths)):
-            census.add(pixels, length)
+        for index, (file, length) in enumerate(runs(film.files, lengths)):
+            census.add(film.read(file), length)
             progress(0.4 * index / count)
     own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
     common = None if own else census.choose()
     with part.open("wb") as out:
-        _head(out, film, common)
+        # bits of an index; the colour after the last is the transparent one
+        bits = 0 if common is None else max(1, len(common).bit_length())
+        flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
+        out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
+        if common is not None:
+            out.write(common.tobytes().ljust(3 << bits, b"\0"))
+        if film.loop:
+            out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
         shown: npt.NDArray[np.uint8] | None = None
         mapper = Mapper(common, dither) if common is not None else None
-        for index, (pixels, length) in enumerate(film.runs(lengths)):
+        for index, (file, length) in enumerate(runs(film.files, lengths)):
+            pixels = film.read(file)
             if own:
                 one = Census(most)
                 one.add(pixels)
@@ -80,17 +87,6 @@ def write_gif(
             shown = _frame(out, film, pixels, shown, mapper, length, own)
             progress(0.4 + 0.6 * index / count)
         out.write(b";")
-
-
-def _head(out: BinaryIO, film: Film, common: Colours | None) -> None:
-    # bits of an index; the colour after the last is the transparent one
-    bits = 0 if common is None else max(1, len(common).bit_length())
-    flags = 0x70 | (0x80 | (bits - 1) if common is not None else 0)
-    out.write(b"GIF89a" + struct.pack("<HHBBB", *film.size, flags, 0, 0))
-    if common is not None:
-        out.write(common.tobytes().ljust(3 << bits, b"\0"))
-    if film.loop:
-        out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
 
 
 def _frame(
@@ -162,14 +158,12 @@ class Census:
         shown = numbers[pixels[..., 3] >= 128] if pixels.shape[2] == 4 else numbers
         result, counts = np.unique(shown, return_counts=True)
         self.crowded |= len(result) > self.most
-        both = np.concatenate([self.colours, result])
-        self.colours, index = np.unique(both, return_inverse=True)
-        total = np.zeros(len(self.colours), np.int64)
-        np.add.at(total, index, np.concatenate([self.counts, counts * weight]))
-        self.counts = total
+        self.colours, index = np.unique(np.concatenate([self.colours, result]), return_inverse=True)
+        total = np.bincount(index, np.concatenate([self.counts, counts * weight]))
+        self.counts = total.astype(np.int64)
         if len(self.colours) > _MOST_KNOWN:
             frequent = np.sort(np.argsort(total, kind="stable")[len(total) // 2 :])
-            self.colours, self.counts, self.thinned = self.colours[frequent], total[frequent], True
+            self.colours, self.counts, self.thinned = self.colours[frequent], self.counts[frequent], True
 
     @property
     def fits(self) -> bool:
@@ -204,8 +198,7 @@ class Mapper:
 
     def __init__(self, colours: Colours, dither: bool) -> None:
         self.colours, self.dither = colours, dither
-        self._wide = colours.astype(np.int32)
-        self._known: dict[int, int] = {}
+        self._nearest = lru_cache(_MOST_KNOWN)(partial(_nearest, colours.astype(np.int32)))
 
     def __call__(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
         """Indices (H, W)."""
@@ -213,25 +206,18 @@ class Mapper:
         result, inverse = np.unique(flat, return_inverse=True)
         index = np.array([self._nearest(number) for number in result.tolist()], np.uint8)
         exact = (self.colours[index] == unpacked(result)).all(axis=1).all()
-        if self.dither and not exact:
-            return self._dithered(pixels)
-        return index[inverse].reshape(flat.shape)
-
-    def _nearest(self, number: int) -> int:
-        known = self._known.get(number)
-        if known is None:
-            rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
-            known = int(((self._wide - rgb) ** 2).sum(axis=1).argmin())
-            if len(self._known) < _MOST_KNOWN:
-                self._known[number] = known
-        return known
-
-    def _dithered(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
+        if exact or not self.dither:
+            return index[inverse].reshape(flat.shape)
         table = Image.new("P", (1, 1))
         table.putpalette(self.colours.tobytes())
         image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
         index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
         return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
+
+
+def _nearest(colours: npt.NDArray[np.int32], number: int) -> int:
+    rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
+    return int(((colours - rgb) ** 2).sum(axis=1).argmin())
 
 
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:

@@ -3,9 +3,6 @@
 A frame's file is named by a digest of all that determines its pixels: the compiled Program, the weights, the
 renderer and its split of the picture. So a frame of another text, import, param, size or model is never taken
 for one of this run, and equal frames share a file.
-
-A file is read, parsed and prepared once. A frame runs only the statements that ``t``, ``u`` or ``frame``
-reach, and where its nodes are those of the frame before, so is its Program.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ import hashlib
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -26,11 +23,11 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as pillow
 
-from scenelang.assets.files import lock, open_own, output_place, write_whole
+from scenelang.assets.files import lock, open_own, write_whole
 from scenelang.compiler.lower import Memory
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import image_format
-from scenelang.language.diagnostics import Diagnostics, plural
+from scenelang.language.diagnostics import Diagnostics, SourceFile, plural
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.library import SpanMap
 from scenelang.language.reports import SceneError
@@ -75,9 +72,9 @@ class FrameRange:
     def among(self, frames: int) -> range:
         """The numbers in an animation of ``frames`` frames; raises `FramesError` if some are outside it."""
         last = frames - 1 if self.last is None else self.last
-        outside = self.first if self.first >= frames else last if last >= frames else None
-        if outside is not None:
-            raise FramesError(f"frame {outside} is outside 0..{frames - 1}")
+        for end in (self.first, last):
+            if end >= frames:
+                raise FramesError(f"frame {end} is outside 0..{frames - 1}")
         return range(self.first, last + 1)
 
 
@@ -170,10 +167,9 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """Parse ``out``: a file with one of the suffixes of `ENCODED`, a pattern, or a folder.
+    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder, whose files start with ``stem``.
 
-    The files in a folder start with ``stem``. Raises `TargetError` where the name fits none of these, or its
-    folder is not there.
+    Raises `TargetError` where it is none of these.
     """
     path = Path(out)
     if is_pattern(out):
@@ -227,14 +223,9 @@ def frame_key(*parts: object) -> str:
 
 
 class Store:
-    """A folder of cached frames, locked while it is open; created where it does not exist.
+    """A folder of cached frames, locked while it is open; raises `Busy` where another process has it.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
-
-    Raises:
-        Busy: another process has it.
-        RenderError: the folder, or what is locked in it, is a link.
-        OSError: the folder cannot be made.
     """
 
     def __init__(self, folder: Path, suffix: str = ".png") -> None:
@@ -312,14 +303,6 @@ def put_frame(files: Mapping[Path, bytes]) -> None:
         write_whole(file, data, flush=False)
 
 
-def deliver(part: Path, target: Path) -> None:
-    """Flush a finished file to the disk and rename it over ``target``, which stays unchanged on an error."""
-    place = output_place(target)
-    with part.open("rb") as file:
-        os.fsync(file.fileno())
-    os.replace(part, place)
-
-
 @dataclass(frozen=True, slots=True)
 class Film:
     """Finished frames in the order in which they are shown; read from the disk one at a time."""
@@ -338,11 +321,6 @@ class Film:
             raise OSError(f"{file} has another size")
         return pixels
 
-    def runs(self, lengths: Sequence[int]) -> Iterator[tuple[Pixels, int]]:
-        """Pictures that differ from their neighbours, and how long each is shown."""
-        for file, length in runs(self.files, lengths):
-            yield self.read(file), length
-
 
 def changed(before: Pixels | None, now: Pixels) -> Box:
     """The smallest box around all pixels that differ; one pixel where none does."""
@@ -354,10 +332,6 @@ def changed(before: Pixels | None, now: Pixels) -> Box:
     if not len(rows):
         return 0, 0, 1, 1
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-
-
-Encoder = Callable[[Film, Path, Callable[[float], None]], None]
-"""Writes a film to a file in one format, and reports the share that is done."""
 
 
 STILL = Animation(seconds=1.0, fps=1.0)
@@ -380,6 +354,7 @@ class FixedFrames:
     scenes: tuple[Scene, ...]  # at least one
     fps: float | None = None  # frames a second; None for those of the first scene's animation
     wanted: tuple[Path, ...] = ()
+    sources: tuple[SourceFile, ...] = ()
 
     @property
     def animates(self) -> bool:
@@ -407,11 +382,6 @@ class Clip:
         source: the scene, one that is prepared, or its frames.
         diagnostics: collects diagnostics of each frame; a mistake in any frame ends the clip.
         fps: frames a second, instead of those of the first Scene's animation.
-        reuse: cache parts that frames share; else each frame is computed by itself.
-
-    Raises:
-        SceneError: the scene's file is not text.
-        OSError: it cannot be opened.
     """
 
     def __init__(
@@ -420,19 +390,17 @@ class Clip:
         diagnostics: Diagnostics | None = None,
         *,
         fps: float | None = None,
-        reuse: bool = True,
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
-        self.reuse = reuse
         self._evaluation: Evaluation | FixedFrames = (
-            source.evaluation(self.diagnostics, replays=reuse)
+            source.evaluation(self.diagnostics, replays=True)
             if isinstance(source, Source)
             else FixedFrames(source, fps)
             if isinstance(source, tuple)
             else source
         )
         self._last: tuple[Shot, Program] | None = None
-        self._memory = Memory() if reuse else None
+        self._memory: Memory | None = Memory()
         self.wanted = self._evaluation.wanted
         """All files that it imports, also those that do not exist."""
 
@@ -449,15 +417,13 @@ class Clip:
     @property
     def texts(self) -> tuple[str, ...]:
         """Texts of its files."""
-        given = self._evaluation
-        return () if isinstance(given, FixedFrames) else tuple(source.text for source in given.sources)
+        return tuple(source.text for source in self._evaluation.sources)
 
     @property
     def animation(self) -> Animation:
         """Length, frames a second and whether it is a loop."""
-        if isinstance(self._evaluation, FixedFrames):
-            return self._evaluation.animation
-        return self.first.scene.animation or STILL
+        given = self._evaluation
+        return given.animation if isinstance(given, FixedFrames) else self.first.scene.animation or STILL
 
     @property
     def frames(self) -> int:
@@ -487,7 +453,7 @@ class Clip:
         """Compile a frame; raises `SceneError`, or `FileNotFoundError` where the model has no weights."""
         from scenelang.compiler.compile import compile_scene
 
-        if self.reuse and self._last is not None and same_nodes(self._last[0].scene, shot.scene):
+        if self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
         program = compile_scene(
             shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory

@@ -1,11 +1,8 @@
 """Frames to pictures: in this process, in others, and on the workers of a cluster.
 
-Each other process is a plain ``python -m scenelang.output.painting`` that reads compiled Programs from a pipe
-and ends with it, so that none outlives this process. Processes of `concurrent.futures` would run an
-embedder's main module again, and stay where this one is killed.
-
-Workers of a cluster get Programs as bytes, with the elements and textures that they draw, and return files as
-bytes, so that no file system need be shared.
+Each other process reads compiled Programs from a pipe and ends with it. Processes of `concurrent.futures`
+would run an embedder's main module again, and stay where this one is killed. Workers of a cluster get and
+return bytes, so that no file system need be shared.
 """
 
 from __future__ import annotations
@@ -62,7 +59,7 @@ class Painter:
     clip: Clip  # the animation
     how: How = DEFAULT  # how they are drawn
     # the previous picture, whose unchanged parts are reused
-    kept: Kept | None = field(default=None, repr=False)
+    kept: Kept = field(default_factory=Kept, repr=False)
     outputs: tuple[Output, ...] = ()  # next to each picture
     single: bool = False  # draw each frame as a single picture: small ones by numpy
     load_s: float = 0.0  # time of loading torch
@@ -72,27 +69,21 @@ class Painter:
 
         Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
         """
-        result = self._picture(shot, single or self.single)
-        if not self.outputs:
-            return result
-        # outputs name objects and their places in the text
-        program = result.program
-        places: tuple[object, ...] = (self.clip.texts,)
-        if program is not None:
-            places = program.numbers, program.objects, program.places
-        return replace(result, key=frame_key(result.key, self.outputs, *places))
-
-    def _picture(self, shot: Shot, single: bool) -> Drawable:
+        program, place = None, "cpu"
         if self.how.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
             key = frame_key("reference", _version("scenelang"), scene.to_json())
-            return Drawable(shot.number, key, shot, None)
-        program = self.clip.program(shot)
-        place = self._place(program, single)
-        library = place if place == "numpy" else "torch"
-        cores = () if place == "numpy" and program.stage is None else (self.split(program),)
-        way = self.how.backend, *self.how.care.values()
-        key = frame_key(place, _version("scenelang"), _version(library), *way, *cores, program.digest())
+            names: tuple[object, ...] = (self.clip.texts,)
+        else:
+            program = self.clip.program(shot)
+            place = self._place(program, single or self.single)
+            library = place if place == "numpy" else "torch"
+            cores = () if place == "numpy" and program.stage is None else (self.split(program),)
+            way = self.how.backend, *self.how.care.values()
+            key = frame_key(place, _version("scenelang"), _version(library), *way, *cores, program.digest())
+            names = program.numbers, program.objects, program.places
+        if self.outputs:  # they name objects and their places in the text
+            key = frame_key(key, self.outputs, *names)
         return Drawable(shot.number, key, shot, program, place)
 
     def _place(self, program: Program, single: bool) -> str:
@@ -112,9 +103,7 @@ class Painter:
 
     def split(self, program: Program) -> int:
         """Number of threads for which a picture is split; it affects the last bits of its pixels."""
-        if self.how.threads is not None:
-            return self.how.threads
-        return threads_for(program.canvas)
+        return threads_for(program.canvas) if self.how.threads is None else self.how.threads
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
@@ -124,13 +113,11 @@ class Painter:
             return draw_exact(frame.shot.scene, spans=frame.shot.spans)
         from scenelang.drawing.render import draw
 
-        if self.kept is None and self.clip.reuse:
-            self.kept = Kept()
-        split = self.split(frame.program)
-        how = self.how._replace(threads=split)
-        return draw(
-            frame.program, how, place=frame.place, split=split, kept=self.kept, progress=progress
-        ).image
+        how = self.how._replace(threads=self.split(frame.program))
+        drawing = draw(
+            frame.program, how, place=frame.place, split=how.threads, kept=self.kept, progress=progress
+        )
+        return drawing.image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -251,22 +238,18 @@ def main() -> None:
         program = source.read(head["bytes"])
         if len(program) < head["bytes"]:
             return
+        errand, answer = Errand(*head["errand"]), dict[str, Any]()
         try:
-            answers.write(json.dumps(_answer(head, program, cache)).encode() + b"\n")
+            put_frame(errand.run(program, cache))
+        except RenderError as error:
+            answer = {"error": str(error)}
+        except OSError as error:
+            answer = {"error": error.strerror or str(error), "errno": error.errno or 5, "file": errand.file}
+        try:
+            answers.write(json.dumps(answer).encode() + b"\n")
             answers.flush()
         except BrokenPipeError:  # the parent process is gone
             os._exit(0)
-
-
-def _answer(head: dict[str, Any], program: bytes, cache: Kept) -> dict[str, Any]:
-    errand = Errand(*head["errand"])
-    try:
-        put_frame(errand.run(program, cache))
-    except RenderError as error:
-        return {"error": str(error)}
-    except OSError as error:
-        return {"error": error.strerror or str(error), "errno": error.errno or 5, "file": errand.file}
-    return {}
 
 
 if __name__ == "__main__":
@@ -311,12 +294,7 @@ class Cluster:
             self._send()
 
     def take(self) -> None:
-        """Send an incomplete batch, and write the next files that come back.
-
-        Raises:
-            RenderError: it cannot be drawn, several workers ended over it, or the scheduler is gone.
-            OSError: a file cannot be written.
-        """
+        """Send an incomplete batch, and write the next files that come back; raises as `Link.result`."""
         self._send()
         self._receive()
 
@@ -340,14 +318,7 @@ class Cluster:
 
 
 def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
-    """Draw Programs on this machine: the processor's seconds, and the files of each by their names.
-
-    Args:
-        batch: bytes of Programs, and their errands.
-
-    Raises:
-        RenderError: one cannot be drawn.
-    """
+    """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
     cache = _local.__dict__.setdefault("kept", Kept())
     started = time.process_time()  # others on this machine do not make batches smaller
     result = [

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
-
-import numpy as np
 
 from scenelang.compiler.choose import why_chosen
 from scenelang.compiler.graph import Fold, Graph, nodes
@@ -39,11 +38,8 @@ def token_counts(tokens: Iterable[int]) -> dict[str, int]:
 def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
     """Sizes after ``lower`` and each pass, and whether the pass changed anything.
 
-    Returns:
-        For each stage ``objects`` (leaves), ``matrices`` (affine maps and deformations on leaves and folds:
-        each is one matrix of the lifting), of these ``affines`` and ``deformations``, ``folds`` (groups,
-        chains and boolean nodes) and ``tokens`` (children of folds by the word that joins them, of the words
-        in use).
+    Each affine map and deformation is one of the ``matrices`` of the lifting; ``tokens`` are children of
+    folds by the word that joins them.
     """
     out: list[dict[str, Any]] = []
     before: Graph | None = None
@@ -90,22 +86,16 @@ def plan_of(
 
 def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
     """The model that draws a scene, the reason (or that it was ``asked`` for), and the runner-up."""
-    others = [load_manifest(name) for name in available() if name != chosen]
-    refused = {model.name: refusals(scene, model) for model in others}
-    able = [model for model in others if not refused[model.name]]
+    lacking, able = {}, []
+    for model in (load_manifest(name) for name in available() if name != chosen):
+        lower(scene, model, None, diagnostics := Diagnostics())
+        if diagnostics.errors:
+            lacking[model.name] = list(dict.fromkeys(error.message for error in diagnostics.errors))
+        else:
+            able.append(model)
     runner_up = min(able, key=lambda model: (model.flip(), model.name), default=None)
-    return {
-        "model": chosen,
-        "why": why_chosen(scene, asked),
-        "runner_up": runner_up.name if runner_up else None,
-        "lacking": {name: facts for name, facts in refused.items() if facts},
-    }
-
-
-def refusals(scene: Scene, manifest: Manifest) -> list[str]:
-    """Messages about parts of a scene that a model cannot draw, each once."""
-    lower(scene, manifest, None, diagnostics := Diagnostics())
-    return list(dict.fromkeys(error.message for error in diagnostics.errors))
+    why, second = why_chosen(scene, asked), runner_up.name if runner_up else None
+    return {"model": chosen, "why": why, "runner_up": second, "lacking": lacking}
 
 
 def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
@@ -133,31 +123,29 @@ def drawing_cost(
     """
     by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
 
-    def draw() -> Drawing:
-        return (
-            draw_small(program, threads=threads)
-            if by_numpy
-            else draw_program(program, model, threads=threads)
-        )
-
-    drawing = draw()
     times = []
-    for _ in range(REPEATS):
+    for _ in range(1 + REPEATS):
         started = time.perf_counter()
-        drawing = draw()
+        if by_numpy:
+            drawing = draw_small(program, threads=threads)
+        else:
+            drawing = draw_program(program, model, threads=threads)
         times.append(1000 * (time.perf_counter() - started))
     own, unknown = over_white(drawing.image), None
     try:
         exact = over_white(reference_of(scene, model.manifest, spans=spans))
     except ValueError as error:
         exact, unknown = None, str(error)
+    off = None
+    with suppress(ImportError):
+        off = None if exact is None else round(flip(own, exact), 5)
     return {
         "pixels": program.canvas[0] * program.canvas[1],
         "refined": drawing.refined,
         **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
-        "ms": round(min(times), 2),
+        "ms": round(min(times[1:]), 2),
         "psnr": None if exact is None else round(min(MOST_DB, psnr(own, exact)), 2),
-        "flip": None if exact is None else _flip(own, exact),
+        "flip": off,
         "unknown": unknown,
         "parameters": sum(p.numel() for p in model.network.parameters()),
     }
@@ -189,10 +177,3 @@ def _rays(work: Work) -> dict[str, int]:
         "steps": work.steps,
         "evaluations": work.met,
     }
-
-
-def _flip(picture: np.ndarray, exact: np.ndarray) -> float | None:
-    try:
-        return round(flip(picture, exact), 5)
-    except ImportError:
-        return None

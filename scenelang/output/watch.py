@@ -1,8 +1,6 @@
 """A watched scene, drawn again on each save, and its picture in the terminal.
 
-Files are polled by size, time and identity, which takes microseconds a file. So no change is missed where an
-editor renames a new file over the old one, a folder is created, a save falls between two waits, or a network
-folder sends no notifications.
+Files are polled by size, time and identity, as notifications miss renamed files and network folders.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.neural.draw import Kept
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     import PIL.Image
 
     from scenelang.drawing.image import Image
-    from scenelang.drawing.neural.draw import Kept
     from scenelang.output.frames import Target
 
 
@@ -82,7 +80,7 @@ class Easel:
     seen: Stamps = field(default_factory=dict)  # their stamps when their names were read
     _key: str | None = None
     _image: Image | None = None
-    _kept: Kept | None = None
+    _kept: Kept = field(default_factory=Kept)
     _took_s: float = float("inf")  # drawing time of the last picture
 
     def __post_init__(self) -> None:
@@ -94,13 +92,7 @@ class Easel:
         return Path(self.source.path or "")
 
     def draw(self, before: Stamps) -> Outcome:
-        """Read, compile, draw and save.
-
-        Raises:
-            Outdated: files differ from ``before``, which ends the drawing of an animation.
-            RenderError: there is no such device, or no weights.
-            OSError: the picture cannot be written, or the scene not be read.
-        """
+        """Read, compile, draw and save; raises `Outdated` where files differ from ``before`` meanwhile."""
         outcome = Outcome()
         diagnostics = Diagnostics()
         with contextlib.suppress(SceneError):  # its diagnostics are collected
@@ -121,7 +113,9 @@ class Easel:
             diagnostics.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
             raise SceneError(diagnostics)
         if self.target is not None and (clip.animates or self.target.kind == "sequence"):
-            self._film(painter, self.target, numbers, outcome, before)
+            run = make(painter, self.target, numbers, progress=checking(before))
+            outcome.good, outcome.files = True, run.files
+            outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
             return
         frame = painter.prepare(clip.shot(self.frame), single=True)
         outcome.load_s = painter.load_s
@@ -134,23 +128,22 @@ class Easel:
         started = time.perf_counter()
         outcome.image = painter.draw(frame, checking(before))
         outcome.draw_s = self._took_s = time.perf_counter() - started
-        self._kept, self._image = painter.kept, outcome.image
-        started = time.perf_counter()
-        outcome.image.save(self.out)
-        outcome.save_s = time.perf_counter() - started
-        outcome.good, outcome.files, self._key = True, [self.out], frame.key
+        self._image = outcome.image
+        self._save(outcome, outcome.image, frame.key)
 
     def _draft(self, painter: Painter, frame: Drawable, outcome: Outcome) -> None:
         started = time.perf_counter()
         outcome.image = painter.draft(frame)
         outcome.draw_s = time.perf_counter() - started
         if outcome.image is not None:
-            self._key = None  # the file is not the picture of a scene now
-            started = time.perf_counter()
-            outcome.image.save(self.out)
-            outcome.save_s = time.perf_counter() - started
-            outcome.good, outcome.files = True, [self.out]
+            self._save(outcome, outcome.image, None)  # the file is not the picture of a scene now
             self.drafted(outcome)
+
+    def _save(self, outcome: Outcome, image: Image, key: str | None) -> None:
+        started, self._key = time.perf_counter(), None
+        image.save(self.out)
+        outcome.save_s = time.perf_counter() - started
+        outcome.good, outcome.files, self._key = True, [self.out], key
 
     def _open(self, diagnostics: Diagnostics) -> Clip:
         defines = Defines(self.source.values)
@@ -162,13 +155,6 @@ class Easel:
         defines.report_unused(diagnostics)
         _ = clip.first
         return clip
-
-    def _film(
-        self, painter: Painter, target: Target, numbers: range, outcome: Outcome, before: Stamps
-    ) -> None:
-        run = make(painter, target, numbers, progress=checking(before))
-        outcome.good, outcome.files = True, run.files
-        outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
 
 
 # ---------------------------------------------------------------- waiting for changes
@@ -234,12 +220,7 @@ class Screen:
     def __init__(self, show: Show, colour: bool) -> None:
         self.colour = colour
         self.terminal = sys.stdout.isatty()
-        self._shown = _find(show) if show != "never" and (self.terminal or show == "always") else None
-
-    @property
-    def shows(self) -> bool:
-        """True where pictures are shown."""
-        return self._shown is not None
+        self.shows = _find(show) if show != "never" and (self.terminal or show == "always") else None
 
     def clear(self) -> None:
         """Clear a terminal's screen."""
@@ -258,22 +239,22 @@ class Screen:
 
     def show(self, picture: PIL.Image.Image) -> None:
         """Show a picture, no larger than the screen; after an error report it once and show no more."""
-        if self._shown is None:
+        if self.shows is None:
             return
         try:
-            self._print(picture, self._shown)
+            self._print(picture, self.shows)
         except (ArithmeticError, LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
-            self._shown = None
+            self.shows = None
             self.say(f"cannot show pictures in this terminal: {error}")
 
     def _print(self, picture: PIL.Image.Image, shown: Any) -> None:
         from rich.console import Console
+        from textual_image._terminal import get_cell_size
 
         columns, lines = shutil.get_terminal_size()
         console = Console(force_terminal=True, width=columns, color_system="truecolor", legacy_windows=False)
-        room = max(4, lines - _LINES)
-        cell_width, cell_height = _cell()
-        wide, high = picture.width / cell_width, picture.height / cell_height
+        room, cell = max(4, lines - _LINES), get_cell_size()
+        wide, high = picture.width / cell.width, picture.height / cell.height
         scale = min(room / high, columns / wide)
         if not shown.__module__.endswith("halfcell"):  # coarse pictures are better large
             scale = min(1.0, scale)
@@ -307,14 +288,6 @@ def _find(show: Show) -> Any:
         truecolor = os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit")
         return HalfcellImage if show == "always" or truecolor else None
     return Image
-
-
-def _cell() -> tuple[int, int]:
-    """Pixels of a character."""
-    from textual_image._terminal import get_cell_size
-
-    size = get_cell_size()
-    return size.width, size.height
 
 
 def over_grey(picture: PIL.Image.Image) -> PIL.Image.Image:

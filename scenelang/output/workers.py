@@ -52,8 +52,7 @@ class Link:
             machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
         libraries: packages whose versions must agree, besides those that draw.
 
-    Raises:
-        RenderError: there is no dask, scheduler or worker, or a worker would give other results.
+    Raises `RenderError` without dask, scheduler or worker, or where a worker would give other results.
     """
 
     def __init__(self, address: str, libraries: tuple[str, ...] = ()) -> None:
@@ -109,12 +108,7 @@ class Link:
         return next(self._done)
 
     def result(self, future: Future[Any]) -> Any:
-        """Result of a task that is done; raises the exception of the task.
-
-        Raises:
-            GivenUp: several workers ended over it.
-            RenderError: the scheduler is gone.
-        """
+        """Result of a task that is done; raises its exception, `GivenUp`, or `RenderError`."""
         from distributed.comm.core import CommClosedError
         from distributed.scheduler import KilledWorker
 
@@ -136,7 +130,7 @@ class Link:
 
     def _compare(self) -> int:
         """Number of workers; raises `RenderError` where one would give other results."""
-        result = self._client.run(look, self._libraries, on_error="return")
+        result = self._client.run(fingerprint, self._libraries, on_error="return")
         for address, theirs in result.items():
             if not isinstance(theirs, dict):
                 raise RenderError(f"worker {address} cannot run scenelang: {_told(theirs)}")
@@ -157,15 +151,12 @@ def by_workers(
     """Map one of our functions over items, by workers.
 
     Args:
-        address, libraries: as for `Link`.
+        address, libraries: as for `Link`, which raises the same.
         items: arguments with their names; the next one is taken when it can be sent.
 
     Yields:
         Names in the order in which items are done, each with a function that returns the result or raises as
         `Link.result`, to be called before the next name is taken.
-
-    Raises:
-        RenderError: as `Link`.
     """
     link = Link(address, libraries)
     under_way: dict[Future[Any], K] = {}
@@ -243,11 +234,7 @@ def _checked(
 
 @cache
 def fingerprint(libraries: tuple[str, ...] = ()) -> dict[str, str]:
-    """Facts that determine results on this machine: versions, digests of the code and of models' weights.
-
-    Args:
-        libraries: further packages whose versions count.
-    """
+    """Facts that determine results on this machine: versions, digests of the code and of models' weights."""
     result = {"python": platform.python_version(), "processor": platform.machine()}
     for name in (*_NEEDED, *libraries):
         try:
@@ -262,11 +249,6 @@ def fingerprint(libraries: tuple[str, ...] = ()) -> dict[str, str]:
     for weights in sorted(MODELS.glob("*/weights.safetensors")):
         result[f"weights of {weights.parent.name}"] = hashlib.sha256(weights.read_bytes()).hexdigest()[:12]
     return result
-
-
-def look(libraries: tuple[str, ...] = ()) -> dict[str, str]:
-    """The fingerprint of the machine on which it runs."""
-    return fingerprint(libraries)
 
 
 def differences(ours: dict[str, str], theirs: dict[str, str]) -> tuple[list[str], list[str]]:

@@ -10,12 +10,13 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
+from lab.frontier.record import Errors, Frontier
 from scenelang.cli import jobs
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import available
 from scenelang.drawing.small import load_of
 from scenelang.output import frontier as frontier_file
-from scenelang.output.frontier import Cost, Errors, Frontier
+from scenelang.output.frontier import Cost
 from tests.cli.conftest import Folder
 from tests.measure.test_choose import frontier, point
 

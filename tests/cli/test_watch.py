@@ -224,7 +224,7 @@ def test_terminals_that_misbehave(
     pytest.importorskip("textual_image")
     from scenelang.output import watch as module
 
-    monkeypatch.setattr(module, "_cell", lambda: 1 // 0)
+    monkeypatch.setattr(module, "over_grey", lambda _: 1 // 0)
     screen = module.Screen("always", False)
     picture = Image.new("RGB", (8, 8))
     screen.show(picture)

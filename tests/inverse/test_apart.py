@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 from typing import Any
@@ -65,12 +64,6 @@ def test_what_was_read_has_longer(made: Any) -> None:
 def test_what_ends_it_is_an_error_of_the_file(made: Any, code: str, words: str) -> None:
     with pytest.raises(FitError, match=words):
         made(code, 1.0)
-
-
-def test_it_ends_with_ours(made: Any) -> None:
-    pid = int(made("return str(os.getpid()).encode()")[0])
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
 
 
 def test_what_workers_of_dask_set_does_not_slow_it_down(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:

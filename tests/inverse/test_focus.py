@@ -35,19 +35,19 @@ def test_a_picture_goes_through_a_gaussian_and_to_larger_pixels(
     )
 
 
-@pytest.mark.parametrize("light", [True, False])
-def test_a_blur_is_found_with_the_size_that_would_make_up_for_it(light: bool) -> None:
+def test_a_blur_is_found_with_the_size_that_would_make_up_for_it() -> None:
     """The target is of eight times as many pixels along each side, blurred in light or not, and averaged."""
-    sharp = scenelang.loads(TEXT.replace("64, 64", "512, 512"), params={"size": 0.5})
-    seen = np.asarray(scenelang.render(sharp), float)
-    soft = ndimage.gaussian_filter(decoded(seen) if light else seen, (9.6, 9.6, 0))
-    mean = soft.reshape(64, 8, 64, 8, 3).mean((1, 3))
-    found = scenelang.fit(SourceFile("a.nsg", TEXT), encoded(mean) if light else mean)
-    assert found.blur.sigma == pytest.approx(1.2, abs=0.05)
-    assert found.blur.light == light
-    assert found.blurred_psnr > 45 > found.psnr
-    assert float(found.values["size"]) == pytest.approx(0.5, abs=0.003)
-    assert any("after a blur of 1.2" in line for line in found.told())
+    for light in (True, False):
+        sharp = scenelang.loads(TEXT.replace("64, 64", "512, 512"), params={"size": 0.5})
+        seen = np.asarray(scenelang.render(sharp), float)
+        soft = ndimage.gaussian_filter(decoded(seen) if light else seen, (9.6, 9.6, 0))
+        mean = soft.reshape(64, 8, 64, 8, 3).mean((1, 3))
+        found = scenelang.fit(SourceFile("a.nsg", TEXT), encoded(mean) if light else mean)
+        assert found.blur.sigma == pytest.approx(1.2, abs=0.05)
+        assert found.blur.light == light
+        assert found.blurred_psnr > 45 > found.psnr
+        assert float(found.values["size"]) == pytest.approx(0.5, abs=0.003)
+        assert any("after a blur of 1.2" in line for line in found.told())
 
 
 def test_a_target_in_focus_has_no_blur() -> None:

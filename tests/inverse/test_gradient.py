@@ -89,11 +89,11 @@ def test_residuals_change_as_their_slopes_say(name: str) -> None:
     u = here(drawn)
     found = drawn.slopes(u)
     assert found is not None
-    at = drawn(u)
-    assert at is not None
+    whole = Together([drawn])
+    assert whole(u) is not None
     expected = np.zeros_like(found[0])
     for axis in range(3):
-        ends = [drawn(u + sign * 3e-4 * np.eye(3)[axis]) for sign in (1, -1)]
+        ends = [whole(u + sign * 3e-4 * np.eye(3)[axis]) for sign in (1, -1)]
         assert ends[0] is not None
         assert ends[1] is not None
         expected[:, axis] = (ends[0] - ends[1]) / 6e-4

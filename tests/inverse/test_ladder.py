@@ -44,16 +44,6 @@ def test_the_same_steps_give_the_same_bytes(ring: Mesh) -> None:
     assert made[0].about["steps"] == 3
 
 
-def test_what_is_too_thin_is_told() -> None:
-    """A plate thinner than a cell of a grid is not in it, however near to its faces the grid's surface is."""
-    plate = trimesh.creation.box((1.6, 1.0, 0.02))
-    plate.apply_transform(trimesh.transformations.rotation_matrix(0.4, (1, 2, 0)))  # between nodes
-    mesh = mesh_of(np.asarray(plate.vertices), np.asarray(plate.faces, np.int64))
-    tried = [rung.thin for rung in fit(mesh, "plate", max_error=1e-9, steps=6)[1]]
-    assert tried[0] > 0.3
-    assert tried[-1] < 0.05
-
-
 def test_what_would_take_too_long_is_not_begun(ring: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was reached till then is kept; steps that are asked for are tried all the same."""
     monkeypatch.setattr(grids, "LONG_S", 0.0)

@@ -62,25 +62,23 @@ def made(kind: str) -> Any:
     return box
 
 
-@pytest.mark.parametrize(
-    ("kind", "suffix"), [("vertex", ".ply"), ("vertex", ".glb"), ("face", ".ply"), ("texture", ".glb")]
-)
-def test_what_files_say_is_what_the_surface_shows(kind: str, suffix: str) -> None:
-    box = made(kind)
-    solids, _ = read_solids(box.export(file_type=suffix[1:]), suffix, {})
-    mesh = whole(solids)
-    shares = np.random.default_rng(1).dirichlet((1, 1, 1), len(box.faces))
-    points = (box.triangles * shares[..., None]).sum(1)
-    found = mesh.look.at(*mesh.touched(points / mesh.size))  # type: ignore[union-attr]
-    for face, (share, colour) in enumerate(zip(shares, found, strict=True)):
-        if kind == "vertex":
-            expected = share @ box.visual.vertex_colors[box.faces[face], :3] / 255
-            expected = encoded(expected) if suffix == ".glb" else expected
-        elif kind == "face":
-            expected = box.visual.face_colors[face, :3] / 255
-        else:
-            expected = by_hand(PICTURE, *(share @ box.visual.uv[box.faces[face]]))
-        assert colour == pytest.approx(expected, abs=0.01)
+def test_what_files_say_is_what_the_surface_shows() -> None:
+    for kind, suffix in (("vertex", ".ply"), ("vertex", ".glb"), ("face", ".ply"), ("texture", ".glb")):
+        box = made(kind)
+        solids, _ = read_solids(box.export(file_type=suffix[1:]), suffix, {})
+        mesh = whole(solids)
+        shares = np.random.default_rng(1).dirichlet((1, 1, 1), len(box.faces))
+        points = (box.triangles * shares[..., None]).sum(1)
+        found = mesh.look.at(*mesh.touched(points / mesh.size))  # type: ignore[union-attr]
+        for face, (share, colour) in enumerate(zip(shares, found, strict=True)):
+            if kind == "vertex":
+                expected = share @ box.visual.vertex_colors[box.faces[face], :3] / 255
+                expected = encoded(expected) if suffix == ".glb" else expected
+            elif kind == "face":
+                expected = box.visual.face_colors[face, :3] / 255
+            else:
+                expected = by_hand(PICTURE, *(share @ box.visual.uv[box.faces[face]]))
+            assert colour == pytest.approx(expected, abs=0.01)
 
 
 def test_factors_of_gltf_are_linear() -> None:

@@ -85,9 +85,8 @@ def test_what_is_there_many_times_counts_once() -> None:
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
 
 
-@pytest.mark.parametrize(
-    ("vertices", "triangles", "words"),
-    [
+def test_what_is_no_solid() -> None:
+    for vertices, triangles, words in (
         (SQUARE, [], "no triangles"),
         (SQUARE * np.nan, [[0, 1, 2]], "not finite"),
         (SQUARE, [[0, 1, 4]], "corner that it does not hold"),
@@ -97,16 +96,13 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
         (SQUARE, [[0, 1, 1]], "flat"),
         (SQUARE, [[0, 1, 2], [0, 2, 3]], "encloses no solid"),
         (*arrays(box(2, 2, 1e-4)), "encloses no solid"),
-    ],
-)
-def test_what_is_no_solid(vertices: np.ndarray, triangles: Any, words: str) -> None:
-    with pytest.raises(FitError, match=words):
-        mesh_of(vertices, np.asarray(triangles, np.int64).reshape(-1, 3)).surface(100)
+    ):
+        with pytest.raises(FitError, match=words):
+            mesh_of(vertices, np.asarray(triangles, np.int64).reshape(-1, 3)).surface(100)
 
 
-@pytest.mark.parametrize(
-    ("suffix", "data", "words"),
-    [
+def test_damaged_files() -> None:
+    for suffix, data, words in (
         (".obj", b"", "no triangles|damaged"),
         (".obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "damaged"),
         (".stl", bytes(200), "no triangles|damaged"),
@@ -116,8 +112,6 @@ def test_what_is_no_solid(vertices: np.ndarray, triangles: Any, words: str) -> N
             b"ply\nformat ascii 1.0\nelement vertex 1000000000\nproperty float x\nend_header\n",
             "damaged",
         ),
-    ],
-)
-def test_damaged_files(suffix: str, data: bytes, words: str) -> None:
-    with pytest.raises(FitError, match=words):
-        whole(read_solids(data, suffix)[0])
+    ):
+        with pytest.raises(FitError, match=words):
+            whole(read_solids(data, suffix)[0])

@@ -76,21 +76,21 @@ def winding(p: np.ndarray, corners: np.ndarray) -> float:
     return float(np.arctan2((a * np.cross(b, c)).sum(1), below).sum() / (2 * np.pi))
 
 
-@pytest.mark.parametrize("sign", ["winding", "closed"])
-def test_distances_and_slopes_of_a_mesh(sign: str) -> None:
-    torus = trimesh.creation.torus(0.7, 0.3, major_sections=9, minor_sections=5)
-    mesh = mesh_of(np.asarray(torus.vertices), np.asarray(torus.faces), sign)  # type: ignore[arg-type]
-    p = np.random.default_rng(0).uniform(-1, 1, (60, 3))
-    corners = mesh.vertices[mesh.triangles]
-    slow = np.array([slow_nearest(q, corners) * (-1 if winding(q, corners) > 0.5 else 1) for q in p])
-    np.testing.assert_allclose(mesh.distances(p), slow, atol=1e-12)
-    steps = 1e-6 * np.eye(3)
-    slopes = np.stack([(mesh.distances(p + e) - mesh.distances(p - e)) / 2e-6 for e in steps], 1)
-    np.testing.assert_allclose(mesh.slopes(p), slopes, atol=1e-5)
-    middle, across = corners.mean(1), np.cross(*(corners[:, i] - corners[:, 0] for i in (1, 2)))
-    across /= np.linalg.norm(across, axis=1)[:, None]
-    for off in (1e-7, -1e-7):  # where differences of points say nothing
-        np.testing.assert_allclose(mesh.slopes(middle + off * across), across, atol=1e-6)
+def test_distances_and_slopes_of_a_mesh() -> None:
+    for sign in ("winding", "closed"):
+        torus = trimesh.creation.torus(0.7, 0.3, major_sections=9, minor_sections=5)
+        mesh = mesh_of(np.asarray(torus.vertices), np.asarray(torus.faces), sign)  # type: ignore[arg-type]
+        p = np.random.default_rng(0).uniform(-1, 1, (60, 3))
+        corners = mesh.vertices[mesh.triangles]
+        slow = np.array([slow_nearest(q, corners) * (-1 if winding(q, corners) > 0.5 else 1) for q in p])
+        np.testing.assert_allclose(mesh.distances(p), slow, atol=1e-12)
+        steps = 1e-6 * np.eye(3)
+        slopes = np.stack([(mesh.distances(p + e) - mesh.distances(p - e)) / 2e-6 for e in steps], 1)
+        np.testing.assert_allclose(mesh.slopes(p), slopes, atol=1e-5)
+        middle, across = corners.mean(1), np.cross(*(corners[:, i] - corners[:, 0] for i in (1, 2)))
+        across /= np.linalg.norm(across, axis=1)[:, None]
+        for off in (1e-7, -1e-7):  # where differences of points say nothing
+            np.testing.assert_allclose(mesh.slopes(middle + off * across), across, atol=1e-6)
 
 
 @pytest.mark.parametrize(

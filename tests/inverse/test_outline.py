@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -37,9 +36,8 @@ def frame(p: np.ndarray) -> np.ndarray:
     return np.maximum(tile(p), -tile(2 * p) / 2)
 
 
-@pytest.mark.parametrize(
-    ("body", "formula"),
-    [
+def test_drawings() -> None:
+    for body, formula in (
         ('<circle cx="30" cy="40" r="20"/>', disc),
         ('<path d="M10 40 A 20 20 0 0 0 50 40 A 20 20 0 0 0 10 40"/>', disc),
         ('<g transform="translate(9 9) scale(3)"><rect width="10" height="10"/></g>', tile),
@@ -48,14 +46,12 @@ def frame(p: np.ndarray) -> np.ndarray:
         ('<path fill-rule="evenodd" d="M0 0h8v8h-8z M2 2h4v4h-4z"/>', frame),
         ('<path d="M0 0h8v8h-8z M2 2h4v4h-4z"/>', tile),
         ('<path d="M0 0h8v8h-8z M2 2v4h4v-4z"/>', frame),
-    ],
-)
-def test_drawings(body: str, formula: Callable[[np.ndarray], np.ndarray]) -> None:
-    shape = drawn(body)
-    true, found = formula(POINTS), shape.distances(POINTS)
-    outside = true > 0  # inside of an unfilled corner a formula of maxima says less than the distance
-    assert abs(found - true)[outside].max() < 0.003
-    assert ((found < 0) == (true < 0))[abs(true) > 0.003].all()
+    ):
+        shape = drawn(body)
+        true, found = formula(POINTS), shape.distances(POINTS)
+        outside = true > 0  # inside of an unfilled corner a formula of maxima says less than the distance
+        assert abs(found - true)[outside].max() < 0.003
+        assert ((found < 0) == (true < 0))[abs(true) > 0.003].all()
 
 
 def test_up_is_up_and_layers_are_a_union() -> None:
@@ -66,37 +62,34 @@ def test_up_is_up_and_layers_are_a_union() -> None:
     assert shape.distances(np.array([[0, 0.6]])) < -0.05  # where both lie there is no edge between
 
 
-@pytest.mark.parametrize(
-    ("body", "lost"),
-    [
+def test_only_lines_that_are_lost_are_too_thin() -> None:
+    """A disc and a square that are drawn as near as is asked were said to be."""
+    for body, lost in (
         ('<circle cx="1.5" cy="1.5" r="1.2"/>', False),
         ('<rect width="80" height="80" transform="rotate(17)"/>', False),
         ('<path d="M5 5 L95 61" stroke="#000" stroke-width="0.05"/><circle cx="50" cy="50" r="5"/>', True),
-    ],
-)
-def test_only_lines_that_are_lost_are_too_thin(body: str, lost: bool) -> None:
-    """A disc and a square that are drawn as near as is asked were said to be."""
-    thin = fit(drawn(body), "x", steps=8)[1][-1].thin
-    assert thin > 0.3 if lost else thin == 0
+    ):
+        thin = fit(drawn(body), "x", steps=8)[1][-1].thin
+        assert thin > 0.3 if lost else thin == 0
 
 
-@pytest.mark.parametrize("odd", [False, True])
-def test_inside_agrees_with_a_loop(odd: bool) -> None:
+def test_inside_agrees_with_a_loop() -> None:
     """Also at the heights of corners, where an edge counts at one of its ends."""
-    random = np.random.default_rng(0)
-    corners = random.integers(0, 12, (40, 2)).astype(float)
-    edges = np.stack([corners, np.roll(corners, -1, 0)], 1)
-    points = np.concatenate([random.uniform(-1, 13, (300, 2)), random.integers(0, 12, (100, 2))])
-    counts = []
-    for x, y in points:
-        turns = 0
-        for (ax, ay), (bx, by) in edges:
-            if (ay <= y) != (by <= y):
-                left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
-                turns += (1 if left else 0) if by > ay else (0 if left else -1)
-        counts.append(turns)
-    found = winding(edges, odd)(points)
-    assert found.tolist() == [turns % 2 != 0 if odd else turns != 0 for turns in counts]
+    for odd in (False, True):
+        random = np.random.default_rng(0)
+        corners = random.integers(0, 12, (40, 2)).astype(float)
+        edges = np.stack([corners, np.roll(corners, -1, 0)], 1)
+        points = np.concatenate([random.uniform(-1, 13, (300, 2)), random.integers(0, 12, (100, 2))])
+        counts = []
+        for x, y in points:
+            turns = 0
+            for (ax, ay), (bx, by) in edges:
+                if (ay <= y) != (by <= y):
+                    left = (bx - ax) * (y - ay) - (x - ax) * (by - ay) > 0
+                    turns += (1 if left else 0) if by > ay else (0 if left else -1)
+            counts.append(turns)
+        found = winding(edges, odd)(points)
+        assert found.tolist() == [turns % 2 != 0 if odd else turns != 0 for turns in counts]
 
 
 @pytest.mark.parametrize("opaque", [False, True])
@@ -112,16 +105,8 @@ def test_pictures(opaque: bool, tmp_path: Path) -> None:
     assert abs(shape.distances(POINTS) - disc(POINTS)).max() < 0.01
 
 
-def test_what_becomes_of_a_drawing_is_small() -> None:
-    star = "M50 0 L61 35 98 35 68 57 79 91 50 70 21 91 32 57 2 35 39 35Z"
-    element, _ = fit(drawn(f'<path d="{star}"/>'), "star")
-    assert element.about["error"] <= 1e-4  # type: ignore[operator]
-    assert (element.dimension, len(element.data) < 5000) == (2, True)
-
-
-@pytest.mark.parametrize(
-    ("suffix", "data", "words"),
-    [
+def test_what_is_no_outline() -> None:
+    for suffix, data, words in (
         (".svg", b"", "damaged|draws nothing"),
         (".svg", b"<svg", "damaged|draws nothing"),
         (".svg", b'<svg><rect width="1" height="1" fill="none"/></svg>', "draws nothing"),
@@ -134,11 +119,9 @@ def test_what_becomes_of_a_drawing_is_small() -> None:
             "nowhere thicker",
         ),
         (".png", b"no picture", "neither a PNG nor a JPEG"),
-    ],
-)
-def test_what_is_no_outline(suffix: str, data: bytes, words: str) -> None:
-    with pytest.raises(FitError, match=words):
-        read_outline(data, suffix).surface(100)
+    ):
+        with pytest.raises(FitError, match=words):
+            read_outline(data, suffix).surface(100)
 
 
 def test_an_entity_bomb_ends() -> None:
@@ -179,12 +162,6 @@ def test_colours_of_drawings(body: str, colours: list[tuple[float, float, float]
     body = body.replace("@", 'width="10" height="10"')
     found = read_outline(f'<svg xmlns="http://www.w3.org/2000/svg">{body}</svg>'.encode(), ".svg")
     assert [colour for colour, _ in found.painted()] == [pytest.approx(c, abs=0.01) for c in colours]
-
-
-def test_areas_and_strokes_are_counted() -> None:
-    line = '<path d="M 1 1 L 9 1" fill="none" stroke="#000"/>'
-    assert drawn('<rect width="9" height="9"/>' + line).notes[0] == "1 area, 1 stroke"
-    assert drawn(2 * line).notes[0] == "0 areas, 2 strokes"
 
 
 def test_what_of_a_drawing_is_lost_is_said() -> None:

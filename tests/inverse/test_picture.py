@@ -39,9 +39,8 @@ OVER = np.where(np.arange(8)[:, None] < 4, RAMP, 255)
 GREY = np.linspace(0, 65535, 96).astype(np.uint16).reshape(12, 8)
 
 
-@pytest.mark.parametrize(
-    ("data", "expected", "said"),
-    [
+def test_what_is_read() -> None:
+    for data, expected, said in (
         (file(Image.fromarray(RAMP)), RAMP, ()),
         (turned(6), np.rot90(RAMP, -1), ("turned as its EXIF says",)),
         (turned(3), RAMP[::-1, ::-1], ("turned as its EXIF says",)),
@@ -52,15 +51,13 @@ GREY = np.linspace(0, 65535, 96).astype(np.uint16).reshape(12, 8)
         (file(Image.fromarray(RAMP).quantize(256)), RAMP, ()),
         (file(clear().quantize(97)), OVER, ("laid over white",)),
         (file(Image.new("1", (3, 2), 1)), np.full((2, 3, 3), 255), ()),
-    ],
-)
-def test_what_is_read(data: bytes, expected: np.ndarray, said: tuple[str, ...]) -> None:
-    found = read_picture(data)
-    assert found.notes[1:] == said
-    assert found.colours.dtype == np.uint8
-    np.testing.assert_allclose(
-        found.colours, expected, atol=12 if "P" in Image.open(io.BytesIO(data)).mode else 0
-    )
+    ):
+        found = read_picture(data)
+        assert found.notes[1:] == said
+        assert found.colours.dtype == np.uint8
+        np.testing.assert_allclose(
+            found.colours, expected, atol=12 if "P" in Image.open(io.BytesIO(data)).mode else 0
+        )
 
 
 def test_colours_of_ink_are_light() -> None:
@@ -94,20 +91,17 @@ def test_larger_pictures_are_made_smaller() -> None:
     assert abs(found.colours[2:-2, 2:-2, 0] - true[2:-2, 2:-2]).max() < 3
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
+def test_what_is_not_read() -> None:
+    for data, words in (
         (b"", "neither a PNG nor a JPEG"),
         (b"no picture", "neither a PNG nor a JPEG"),
         (file(Image.fromarray(RAMP))[:-40], "damaged or not a picture"),
         (file(Image.fromarray(RAMP), "GIF"), "neither a PNG nor a JPEG"),
         (file(Image.new("1", (9000, 9000))), "more than 50,000,000 pixels"),
         (file(Image.new("1", (20000, 20000))), "damaged or not a picture: Image size"),
-    ],
-)
-def test_what_is_not_read(data: bytes, words: str) -> None:
-    with pytest.raises(FitError, match=words):
-        read_picture(data)
+    ):
+        with pytest.raises(FitError, match=words):
+            read_picture(data)
 
 
 def photo() -> np.ndarray:
@@ -123,16 +117,16 @@ def flag() -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize(("colours", "coding"), [(photo(), "av1"), (flag(), "webp")])
-def test_the_smallest_that_is_near_enough(colours: np.ndarray, coding: str) -> None:
-    element, tried = fit_picture(Picture(colours), "a")
-    off = np.sqrt(((texels(element) * 255.0 - colours) ** 2).mean()) / 255
-    assert element.coding == coding
-    assert element.about["error"] == pytest.approx(off, abs=1e-6)
-    assert off <= NEAR_COLOUR
-    enough = [coded.bytes for coded in tried if coded.error <= NEAR_COLOUR]
-    assert len(element.data) == min(enough)
-    assert element.about["steps"] == len(tried)
+def test_the_smallest_that_is_near_enough() -> None:
+    for colours, coding in ((photo(), "av1"), (flag(), "webp")):
+        element, tried = fit_picture(Picture(colours), "a")
+        off = np.sqrt(((texels(element) * 255.0 - colours) ** 2).mean()) / 255
+        assert element.coding == coding
+        assert element.about["error"] == pytest.approx(off, abs=1e-6)
+        assert off <= NEAR_COLOUR
+        enough = [coded.bytes for coded in tried if coded.error <= NEAR_COLOUR]
+        assert len(element.data) == min(enough)
+        assert element.about["steps"] == len(tried)
 
 
 def test_a_smaller_error_takes_more_bytes_and_none_is_exact() -> None:

@@ -7,8 +7,11 @@ import pytest
 from scipy import ndimage
 
 from scenelang.drawing.image import decoded, encoded
-from scenelang.inverse.fit import Task, task_of
-from scenelang.language.diagnostics import SourceFile
+from scenelang.inverse.fit import problems_of
+from scenelang.inverse.problem import Moment, Together
+from scenelang.inverse.search import space_of, target_of
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Source
 
 TEXT = """
 canvas(40, 40); background(#ffffff); animate(seconds = 1s, fps = 4); param x = 0 in -0.5..0.5;
@@ -16,8 +19,13 @@ square { scale(0.5); translate(x, u); material flat { color(#000000); } }
 """
 
 
-def task(targets: dict[int, np.ndarray]) -> Task:
-    return task_of(SourceFile("a.nsg", TEXT), targets)
+def problem(targets: dict[int, np.ndarray]) -> Together:
+    """The last comparison with targets by frame."""
+    source = Source(text=SourceFile("a.nsg", TEXT)).parsed(Diagnostics())
+    moments = [Moment(source, frame) for frame in targets]
+    evaluation, scene = moments[0].evaluated({})
+    goals = [target_of(target, scene.canvas) for target in targets.values()]
+    return problems_of(moments, goals, space_of(evaluation), scene.canvas)[-1]
 
 
 def flat(level: float) -> np.ndarray:
@@ -26,29 +34,29 @@ def flat(level: float) -> np.ndarray:
 
 def test_errors_of_frames_are_averaged() -> None:
     u = np.array([0.5])
-    both = task({0: flat(1.0), 2: flat(0.5)}).problems[-1](u)
-    parts = [task({frame: flat(level)}).problems[-1](u) for frame, level in ((0, 1.0), (2, 0.5))]
+    both = problem({0: flat(1.0), 2: flat(0.5)})(u)
+    parts = [problem({frame: flat(level)})(u) for frame, level in ((0, 1.0), (2, 0.5))]
     assert both is not None
     assert both @ both == pytest.approx(np.mean([part @ part for part in parts if part is not None]))
 
 
-@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0])
-def test_a_target_out_of_focus_is_told_by_how_much(sigma: float) -> None:
+def test_a_target_out_of_focus_is_told_by_how_much() -> None:
     """Whose noise is as large as the blur's error."""
-    u, last = np.array([0.3]), task({0: flat(1.0)}).problems[-1]
-    pictures = last.pictures(u)
-    assert pictures is not None
-    seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
-    target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
-    assert task({0: target}).problems[-1].blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
+    for sigma in (0.0, 1.0, 2.0):
+        u, last = np.array([0.3]), problem({0: flat(1.0)})
+        pictures = last.pictures(u)
+        assert pictures is not None
+        seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
+        target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
+        assert problem({0: target}).blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
 
 
-@pytest.mark.parametrize(("blot", "noise"), [(0, True), (3, False)])
-def test_what_is_left_is_noise_or_is_not(blot: int, noise: bool) -> None:
+def test_what_is_left_is_noise_or_is_not() -> None:
     """A blot of 3 x 3 pixels is enough."""
-    u, last = np.array([0.3]), task({0: flat(1.0)}).problems[-1]
-    pictures = last.pictures(u)
-    assert pictures is not None
-    target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
-    target[20 : 20 + blot, 30 : 30 + blot] = 0.5
-    assert task({0: target}).problems[-1].noise(u) is noise
+    for blot, noise in ((0, True), (3, False)):
+        u, last = np.array([0.3]), problem({0: flat(1.0)})
+        pictures = last.pictures(u)
+        assert pictures is not None
+        target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
+        target[20 : 20 + blot, 30 : 30 + blot] = 0.5
+        assert problem({0: target}).noise(u) is noise

@@ -86,18 +86,15 @@ def test_ends_of_a_full_turn_are_one_place() -> None:
     assert space.inside(np.array([1.25, 1.25])) == pytest.approx([0.25, 1.0])
 
 
-@pytest.mark.parametrize(
-    ("names", "text", "fact"),
-    [
+def test_what_cannot_be_searched_is_said() -> None:
+    for names, text, fact in (
         (("kk",), TEXT, "no param `kk`"),
         (("free",), "param free = 2; square { scale(free); }", "param `free` has no range"),
         ((), "square { }", "no param to fit"),
         (("n",), "param n = 0 in 0..1000000 step 1; square { rotate(n * 1deg); }", "more than 1,000 steps"),
-    ],
-)
-def test_what_cannot_be_searched_is_said(names: tuple[str, ...], text: str, fact: str) -> None:
-    with pytest.raises(FitError, match=fact):
-        box(text, names)
+    ):
+        with pytest.raises(FitError, match=fact):
+            box(text, names)
 
 
 def test_digits_are_those_that_a_range_asks_for() -> None:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import shlex
 
-import pytest
-
 from lab.about import command_line
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
+def test_folders_are_left_out() -> None:
+    for given, said in (
         (
             "eval shapes2d --set chains --scenes 300 -o /tmp/x",
             "eval shapes2d --set chains --scenes 300",
@@ -20,7 +17,5 @@ from lab.about import command_line
         ("eval solids3d --originals /tmp/x -o y", "eval solids3d --originals FOLDER"),
         ("stability solids3d -o", "stability solids3d"),
         ("eval 'a b.safetensors'", "eval 'a b.safetensors'"),
-    ],
-)
-def test_folders_are_left_out(given: str, said: str) -> None:
-    assert command_line(["python -m lab", *shlex.split(given)]) == f"python -m lab {said}"
+    ):
+        assert command_line(["python -m lab", *shlex.split(given)]) == f"python -m lab {said}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import itertools
 import json
@@ -17,10 +16,11 @@ from matplotlib.text import Text
 
 from lab.charts import pyplot
 from lab.frontier.chart import frontier_chart, frontier_figure, short_name
-from lab.frontier.page import frontier_page, picture_uri
+from lab.frontier.page import frontier_page
+from lab.frontier.record import Frontier, between
 from scenelang.compiler.manifest import available
 from scenelang.drawing.image import Image, from_samples
-from scenelang.output.frontier import between, frontier_path, load_frontier
+from scenelang.output.frontier import frontier_path
 from tests.measure.test_choose import frontier, point
 
 ROOT = Path(__file__).parents[2]
@@ -88,14 +88,6 @@ def test_the_page_is_well_formed_and_says_all_points_without_scripts(page: str) 
     assert rows[0][1:7] == ["2", "500×", "0.025", "0.05", "40.0", "100"]
 
 
-def test_the_data_hold_every_point_and_its_pictures(page: str) -> None:
-    data = json.loads(Reader(page).scripts[0])
-    assert [p["name"] for p in data["points"]] == [p.title for p in POINTS]
-    assert [len(p["pictures"]) for p in data["points"]] == [2] * 6 + [0]
-    assert [p["command"] for p in data["points"]] == [p.command for p in POINTS]
-    assert len(data["exact"]) == 2
-
-
 def test_nothing_is_fetched(page: str) -> None:
     read = Reader(page)
     assert not re.search(r"https?:|//[a-z]+\.|url\(|@import|import\(|fetch\(|XMLHttp", page)
@@ -110,18 +102,6 @@ def test_names_are_data_not_markup(page: str) -> None:
     assert len(read.scripts) == 2
     assert "alert(1)" in json.loads(read.scripts[0])["points"][5]["name"]
     assert not [a for a in read.attributes if a[0] == "more"]
-
-
-def test_pictures_are_what_was_drawn() -> None:
-    kind, _, data = picture_uri(FLAT).partition(";base64,")
-    assert kind == "data:image/png"
-    np.testing.assert_array_equal(
-        np.asarray(PIL.Image.open(io.BytesIO(base64.b64decode(data)))), FLAT.to_uint8()
-    )
-    kind, _, data = picture_uri(NOISE).partition(";base64,")
-    assert kind == "data:image/webp"
-    back = np.asarray(PIL.Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), np.float64)
-    assert back.shape == NOISE.shape
 
 
 def test_charts_label_every_point_that_has_an_error() -> None:
@@ -149,8 +129,7 @@ def test_charts_label_every_point_that_has_an_error() -> None:
 @pytest.mark.skipif(not frontier_path("shapes2d").exists(), reason="no frontier is shipped")
 def test_the_shipped_frontier_keeps_its_promises() -> None:
     """It is of models that ship, and its promises were kept in 95 % of other scenes."""
-    shipped = load_frontier("shapes2d")
-    assert shipped is not None
+    shipped = Frontier.from_json(frontier_path("shapes2d").read_bytes())
     assert {p.model for p in shipped.points if p.model is not None} <= set(available())
     assert between(shipped.points) >= 8
     found = json.loads((ROOT / "docs/results/frontier-verified.json").read_text("utf-8"))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import scenelang as nsg
 from lab.docs import parsimony as script
-from lab.parsimony import WAYS, example_plan, measure_examples, shown_frame
+from lab.parsimony import WAYS, example_plan, shown_frame
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -31,14 +31,6 @@ def test_an_animation_is_shown_by_its_end_where_it_does_not_loop() -> None:
     assert shown_frame(EXAMPLES / "reveal.nsg") == 47
     assert shown_frame(EXAMPLES / "spinner.nsg") == 0
     assert shown_frame(EXAMPLES / "hello.nsg") == 0
-
-
-def test_examples_are_measured_and_told() -> None:
-    seen: list[str] = []
-    found = measure_examples([EXAMPLES / "logo.nsg"], lambda plan: seen.append(plan["file"]))
-    assert seen == ["logo.nsg"]
-    assert json.loads(json.dumps(found)) == found
-    assert "1.0 × | 1.0 ×" in script.ways_text(found)
 
 
 def test_what_passes_took_away_is_counted() -> None:

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
-from click.testing import CliRunner
 
-from lab.cli import command
 from lab.shadows import shadow_mask
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.spaces import Camera, Light
@@ -45,14 +40,3 @@ def test_the_mask_is_what_the_ball_of_mist_darkens() -> None:
     assert mask[surely & (missed < 0.9 * radius)].all()
     assert not mask[surely & (missed > 1.05 * radius)].any()
     assert mask.sum() > 20
-
-
-def test_the_command_measures_inside_shadows(tmp_path: Path) -> None:
-    asked = ["shadows", "--scenes", "2", "--side", "32", "-o", str(tmp_path)]
-    done = CliRunner().invoke(command, asked)
-    assert done.exit_code == 0, done.output
-    found = json.loads((tmp_path / "shadows.json").read_text("utf-8"))
-    assert found["scenes"] == 2
-    assert found["wrong_percent"]["mean"] < 2  # of a picture without shadows it is 100
-    assert found["psnr_uncapped"]["worst"] > found["without"]["worst"] + 10
-    assert (tmp_path / "shadows.png").exists()

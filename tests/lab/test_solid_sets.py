@@ -44,12 +44,6 @@ def test_scenes_are_what_their_set_says(name: str, model: Model) -> None:
         compile_scene(s)  # raises where it is refused
 
 
-def test_a_set_is_drawn_in_other_sizes(model: Model) -> None:
-    small, usual = scenes_of(model, "wide", 5, 12)(1), scenes_of(model, "wide", 5)(1)
-    assert small.canvas == (20, 12)
-    assert small.nodes == usual.nodes
-
-
 def test_a_scene_covers_what_its_objects_do(model: Model) -> None:
     """A sphere of a tenth of the view's height, in the middle or out of view, and one around the eye."""
     ball = Object("sphere", Scale.uniform(0.2))

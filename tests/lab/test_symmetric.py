@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lab.symmetric import LEAVES, Decoder, Floats, Start, hiding, placed
+from lab.symmetric import LEAVES, Decoder, Floats, hiding, placed
 from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.neural.network import RADIUS
 
@@ -26,35 +26,29 @@ def points(count: int) -> Floats:
     return radius * np.array([np.cos(angle), np.sin(angle)])
 
 
-@pytest.mark.parametrize("order", [3, 4, 5])
-def test_it_has_the_symmetry_and_says_how_it_changes(order: int) -> None:
-    decoder, p = Decoder(order, KINDS), points(200)
-    parameters = decoder.start(np.random.default_rng(1))
-    found, slopes = decoder.slopes(parameters, p)
-    assert found == pytest.approx(answered(decoder.numbers(parameters), p))
-    assert found == pytest.approx(decoder.distance(parameters, p * [[1], [-1]]))
-    turn = math.tau / order
-    turned = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]) @ p
-    assert found == pytest.approx(decoder.distance(parameters, turned))
-    for at in range(0, len(parameters), 7):
-        step = 1e-7 * (np.arange(len(parameters)) == at)
-        ahead = decoder.distance(parameters + step, p)
-        assert (ahead - found) / 1e-7 == pytest.approx(slopes[:, at], abs=1e-4)
+def test_it_has_the_symmetry_and_says_how_it_changes() -> None:
+    for order in (3, 4, 5):
+        decoder, p = Decoder(order, KINDS), points(200)
+        parameters = decoder.start(np.random.default_rng(1))
+        found, slopes = decoder.slopes(parameters, p)
+        assert found == pytest.approx(answered(decoder.numbers(parameters), p))
+        assert found == pytest.approx(decoder.distance(parameters, p * [[1], [-1]]))
+        turn = math.tau / order
+        turned = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]) @ p
+        assert found == pytest.approx(decoder.distance(parameters, turned))
+        for at in range(0, len(parameters), 7):
+            step = 1e-7 * (np.arange(len(parameters)) == at)
+            ahead = decoder.distance(parameters + step, p)
+            assert (ahead - found) / 1e-7 == pytest.approx(slopes[:, at], abs=1e-4)
 
 
-def test_a_start_learns_its_leaf() -> None:
-    start = Start("square", ("gg", "gg"), 1)
-    first = start.run(1, 400)
-    assert start.run(60, 400) < 0.01 * first
-
-
-@pytest.mark.parametrize("leaf", sorted({"square", "triangle", "star", "pentagon"}))
-def test_leaves_have_a_vertex_at_x(leaf: str) -> None:
-    p, turn = points(100), math.pi / 4 if leaf == "square" else math.pi / 2
-    cos, sin = math.cos(turn), math.sin(turn)
-    assert LEAVES[leaf].distance(p) == pytest.approx(
-        leaf_distance(leaf, np.array([[cos, -sin], [sin, cos]]) @ p)
-    )
+def test_leaves_have_a_vertex_at_x() -> None:
+    for leaf in sorted({"square", "triangle", "star", "pentagon"}):
+        p, turn = points(100), math.pi / 4 if leaf == "square" else math.pi / 2
+        cos, sin = math.cos(turn), math.sin(turn)
+        assert LEAVES[leaf].distance(p) == pytest.approx(
+            leaf_distance(leaf, np.array([[cos, -sin], [sin, cos]]) @ p)
+        )
 
 
 def test_two_decoders_hide_a_third() -> None:

@@ -13,8 +13,7 @@ from PIL import Image
 import scenelang as nsg
 from scenelang.language.evaluation import ParamError
 from scenelang.output.animate import Progress
-from scenelang.output.sweep import MOST_SIDE, render_many, write_sheet
-from scenelang.output.sweep_rows import Line, TableError
+from scenelang.output.sweep import MOST_SIDE, Line, TableError, render_many, write_sheet
 
 TEXT = """\
 canvas(24, 16);
@@ -135,12 +134,6 @@ def test_pictures_of_another_sweep_are_left_alone(scene: Path, tmp_path: Path, c
     assert {path: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
 
 
-def test_a_scene_that_means_the_same_goes_on(scene: Path, tmp_path: Path) -> None:
-    render_many(scene, tmp_path / "out", grid={"k": "0,1"})
-    scene.write_text(f"// a comment\n{TEXT}")
-    assert render_many(scene, tmp_path / "out", grid={"k": "0,1"}).made.drawn == 0
-
-
 SOLID = "canvas(24, 16); param x = 0 in -0.5..0.5; sphere { scale(0.4); translate(x, 0, 0); } torus;"
 
 
@@ -165,14 +158,6 @@ def test_all_that_is_known_of_a_picture(tmp_path: Path, jobs: int) -> None:
     again = render_many(path, out, grid={"x": "../2"}, outputs=outputs, jobs=jobs)
     assert (again.made.drawn, again.made.resumed) == (0, 2)
     assert len(list(out.iterdir())) == 15
-
-
-def test_warnings_are_told_once(tmp_path: Path) -> None:
-    path = tmp_path / "w.nsg"
-    path.write_text("canvas(9, 9); param k = 0 in 0..1; let unused = 1; star { scale(1 + k); }")
-    made = render_many(path, tmp_path / "out", grid={"k": "0..1/3"})
-    codes = [d.code for d in made.warnings]
-    assert len(codes) == len(set(codes))
 
 
 @pytest.mark.parametrize(

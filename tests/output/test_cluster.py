@@ -7,27 +7,23 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import scenelang as nsg
+from scenelang.drawing.how import RenderError
 from scenelang.output import painting as ours
+from scenelang.output import workers
 from scenelang.output.animate import Progress
-from scenelang.output.workers import Link
-from tests.output.machines import started
+from scenelang.output.workers import GivenUp, Link, by_workers
+from tests.output.conftest import started
 from tests.output.scenes import DARK, HEAD
 
 distributed = pytest.importorskip("distributed")
 MOVING = HEAD + DARK + "canvas(24, 16); sphere { scale(0.6); } torus { rotate(0.2turn * u); }"
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with started(tmp_path_factory.mktemp("cluster"), 2) as (found, _):
-        yield found
 
 
 @pytest.fixture
@@ -178,13 +174,47 @@ def test_workers_of_this_machine(scene: Path, tmp_path: Path) -> None:
     assert same(one.files, [tmp_path / f"f-{at}.png" for at in range(6)])
 
 
-def test_an_evaluation_has_the_same_figures(address: str) -> None:
-    from lab.evaluate import evaluate_set
-    from scenelang.drawing.neural.load import load_model
+# ---------------------------------------------------------------- who is a worker
 
-    model, timed = load_model("solids3d"), {"seconds"}
-    one, two = (evaluate_set(model, "staged", 4, 5, side=16, cluster=where) for where in (None, address))
-    assert {k: v for k, v in one[0].items() if k not in timed} == {
-        k: v for k, v in two[0].items() if k not in timed
-    }
-    assert one[1] == two[1]
+
+def test_workers_that_would_give_something_else(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their library, weights or code differ, or a package that this work needs besides."""
+    compare, others = workers.differences, ("scipy", "no-such-library")
+    for what in ("numpy", "weights of shapes2d", "scenelang's code", "no-such-library"):
+        monkeypatch.setattr(
+            workers, "differences", lambda a, b, what=what: compare({**a, what: "another"}, b)
+        )
+        with pytest.raises(RenderError, match=rf"worker tcp\S+ has {what} \S+, where another is here"):
+            Link(address, others)
+    here = workers.fingerprint()
+    assert here.keys().isdisjoint(others)
+    assert workers.fingerprint(others)["no-such-library"] == "none"
+    assert compare(here, here) == ([], [])
+    assert compare(here, {**here, "python": "3.9"}) == ([], [f"python 3.9, where {here['python']} is here"])
+
+
+def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "WAIT_S", 0.5)
+    with pytest.raises(RenderError, match=r"no scheduler with workers at `tcp://127\.0\.0\.1:9`"):
+        Link("tcp://127.0.0.1:9")
+
+
+def test_each_item_has_a_result_or_an_error_of_its_own(address: str) -> None:
+    """More of them than are under way at once; one is no number."""
+    items = [(word, word) for word in ["4", "9", "16", "x", "25", "36", "49", "64", "81", "100"]]
+    found, wrong = {}, []
+    for word, result in by_workers(address, float, items):
+        try:
+            found[word] = result()
+        except ValueError:
+            wrong.append(word)
+    assert found == {word: float(word) for word, _ in items if word != "x"}
+    assert wrong == ["x"]
+
+
+@pytest.mark.slow
+def test_what_ends_workers_is_given_up(tmp_path: Path) -> None:
+    with started(tmp_path, 4) as (address, _):
+        for _, result in by_workers(address, os._exit, [("bad", 3)]):
+            with pytest.raises(GivenUp, match="4 workers ended over it"):
+                result()

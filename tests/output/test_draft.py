@@ -53,14 +53,6 @@ def test_flat_and_tiny_pictures_have_none(file: Path, text: str) -> None:
     assert not drafts
 
 
-def test_what_is_drawn_fast_has_none(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watch, "DRAFT_S", float("inf"))
-    drafts: list[Outcome] = []
-    here = easel(file, SOLIDS, drafts)
-    assert here.draw(stamps(here.paths)).good
-    assert not drafts
-
-
 def test_a_save_calls_the_picture_off_and_the_draft_is_not_taken_for_it(file: Path) -> None:
     drafts: list[Outcome] = []
     here = easel(file, SOLIDS, drafts)

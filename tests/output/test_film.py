@@ -136,13 +136,6 @@ def test_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: float, count: int) 
     assert min(times) >= 20  # browsers slow down what is shorter
 
 
-@pytest.mark.parametrize("loop", [True, False])
-def test_gif_loops_as_the_scene_says(tmp_path: Path, loop: bool) -> None:
-    write_gif(film(tmp_path, [stripes(0), stripes(1)], loop=loop), tmp_path / "a.gif", quiet)
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.info.get("loop") == (0 if loop else None)
-
-
 def test_gif_leaves_out_what_is_transparent(tmp_path: Path) -> None:
     pictures = [stripes(step, alpha=True) for step in (0, 4, 8)]
     pictures[1][0, 0] = (9, 9, 9, 100)  # less than half
@@ -198,11 +191,12 @@ def test_apng_is_exact(tmp_path: Path, alpha: bool, fps: float) -> None:
     assert sum(duration for _, duration in frames) == pytest.approx(float(7 * exact), abs=1e-9)
 
 
-@pytest.mark.parametrize("loop", [True, False])
-def test_apng_loops_as_the_scene_says(tmp_path: Path, loop: bool) -> None:
-    write_apng(film(tmp_path, [stripes(0), stripes(1)], loop=loop), tmp_path / "a.apng", quiet)
-    with Image.open(tmp_path / "a.apng") as image:
-        assert image.info["loop"] == (0 if loop else 1)
+def test_films_loop_as_the_scene_says(tmp_path: Path) -> None:
+    for write, times in ((write_gif, None), (write_apng, 1), (write_webp, 1)):
+        for loop in (True, False):
+            write(film(tmp_path, [stripes(0), stripes(1)], loop=loop), tmp_path / "a", quiet)
+            with Image.open(tmp_path / "a") as image:
+                assert image.info.get("loop") == (0 if loop else times)
 
 
 @pytest.mark.parametrize("alpha", [False, True])

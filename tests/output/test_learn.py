@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -24,19 +20,11 @@ import scenelang as nsg
 from scenelang.assets.zoo import load_zoo
 from scenelang.inverse import learn as learning
 from scenelang.inverse.sandbox import LIBRARIES
-from scenelang.output import workers
 from scenelang.output.workers import GivenUp, Link
-from tests.output.machines import started
 
 FILES = ["ball.ply", "star.svg", "tent.obj"]
 TENT = "mtllib tent.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl tex\n"
 TENT += "f 1/1 3/3 2/2\nf 1/1 2/2 4/3\nf 2/2 3/3 4/1\nf 1/1 4/2 3/3\n"
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with started(tmp_path_factory.mktemp("cluster"), 2) as (found, _):
-        yield found
 
 
 @pytest.fixture
@@ -92,34 +80,6 @@ def test_errors_are_of_their_files_alone(folder: Path, address: str) -> None:
     assert Path("True.safetensors").read_bytes() == Path("False.safetensors").read_bytes()
 
 
-def test_what_is_done_is_kept(folder: Path, address: str) -> None:
-    def stop(line: str) -> None:
-        if line.startswith("tent"):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        nsg.learn(["star.svg", "tent.obj"], "z.safetensors", steps=1, cluster=address, say=stop)
-    assert set(load_zoo("z.safetensors").geometries) <= {"star"}
-    nsg.learn(["star.svg", "tent.obj"], "z.safetensors", steps=1, cluster=address)
-    assert set(load_zoo("z.safetensors").geometries) == {"star", "tent"}
-
-
-@pytest.mark.slow
-def test_a_worker_that_is_killed(folder: Path) -> None:
-    """Of two that are at work one ends; the other makes its file too."""
-    files = [*FILES, "again.ply"]
-    Path("again.ply").write_bytes(Path("ball.ply").read_bytes())
-    with started(folder, 2) as (address, (_, first, _)):
-        kills: list[Callable[[], None]] = [partial(os.kill, first.pid, signal.SIGKILL)]
-        nsg.learn(
-            files, "two.safetensors", steps=1, cluster=address, say=lambda _: kills.pop()() if kills else None
-        )
-        assert not kills
-        assert first.wait() == -signal.SIGKILL
-    nsg.learn(files, "one.safetensors", steps=1)
-    assert Path("one.safetensors").read_bytes() == Path("two.safetensors").read_bytes()
-
-
 def backwards(
     address: str, function: Callable[..., Any], items: Iterable[tuple[int, Any]], libraries: tuple[str, ...]
 ) -> Iterator[tuple[int, Callable[[], Any]]]:
@@ -152,30 +112,11 @@ def test_who_is_first_has_no_say(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     assert Path("one.safetensors").read_bytes() == Path("two.safetensors").read_bytes()
 
 
-def test_libraries_count_for_learning_alone(
-    folder: Path, address: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_libraries_of_learning_are_compared(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
     needed = {re.split("[><=]", line)[0] for line in project["optional-dependencies"]["learn"]}
     assert needed | {"pillow"} == {*LIBRARIES}
-    here = workers.fingerprint
-    changed = {"libigl": "0.1"}
-    monkeypatch.setattr(
-        workers, "fingerprint", lambda names=(): here(names) | (changed if "libigl" in names else {})
-    )
-    Link(address).close()
-    with pytest.raises(nsg.RenderError, match=r"worker tcp\S+ has libigl \d\S+, where 0\.1 is here"):
-        nsg.learn("star.svg", "z.safetensors", cluster=address)
-    assert not Path("z.safetensors").exists()
-
-
-@pytest.mark.slow
-def test_workers_of_this_machine(folder: Path) -> None:
-    command = [sys.executable, "-m", "scenelang", "learn", *FILES, "--steps", "1", "-o"]
-    for out, more in (("one", ()), ("two", ("--cluster", "local"))):
-        done = subprocess.run(
-            [*command, f"{out}.safetensors", *more], capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        assert "Traceback" not in done.stderr
-    assert Path("one.safetensors").read_bytes() == Path("two.safetensors").read_bytes()
+    asked: list[Any] = []
+    monkeypatch.setattr(learning, "by_workers", lambda *given: iter(asked.append(given[3]) or ()))
+    learning.learn_files(["star.svg"], "z.safetensors", cluster="tcp://there")
+    assert asked == [LIBRARIES]

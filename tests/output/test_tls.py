@@ -13,7 +13,7 @@ import pytest
 import scenelang as nsg
 from scenelang.output import workers
 from scenelang.output.workers import Link
-from tests.output.machines import started
+from tests.output.conftest import started
 
 pytestmark = pytest.mark.skipif(not shutil.which("openssl"), reason="openssl makes the certificates")
 SCENE = "canvas(16, 16); animate(fps = 2, seconds = 1); star { rotate(90deg * u); }"
@@ -23,15 +23,7 @@ def certificate(folder: Path, name: str) -> dict[str, str]:
     """A certificate that signs itself, as dask's variables name it."""
     key, made = (folder / f"{name}.{kind}.pem" for kind in ("key", "cert"))
     command = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "rsa:2048",
-        "-nodes",
-        "-days",
-        "2",
-        "-subj",
+        *["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj"],
         f"/CN={name}",
     ]
     done = subprocess.run([*command, "-keyout", key, "-out", made], capture_output=True, check=False)

@@ -9,7 +9,7 @@ import pytest
 
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, ParamError, Source, param_named
-from scenelang.output.sweep_rows import Rows, rows_of, text_of, values_of
+from scenelang.output.sweep import Rows, rows_of, text_of, values_of
 
 TEXT = """\
 param k = 0.5 in 0..1;
@@ -35,9 +35,8 @@ def scene() -> Evaluation:
     return evaluation
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "expected"),
-    [
+def test_values(scene: Evaluation) -> None:
+    for name, text, expected in (
         ("k", "0..1/5", ["0", "0.25", "0.5", "0.75", "1"]),
         ("k", "0..<1/4", ["0", "0.25", "0.5", "0.75"]),
         ("k", "../3", ["0", "0.5", "1"]),
@@ -58,15 +57,12 @@ def scene() -> Evaluation:
         ("word", "", ["a", "b, c"]),
         ("side", "[0.1, 0.2],[0.3,0.4]", ["[0.1, 0.2]", "[0.3,0.4]"]),
         ("free", "1..2/2", ["1", "2"]),
-    ],
-)
-def test_values(scene: Evaluation, name: str, text: str, expected: list[str]) -> None:
-    assert list(values_of(scene, param_named(scene, name), text)) == expected
+    ):
+        assert list(values_of(scene, param_named(scene, name), text)) == expected
 
 
-@pytest.mark.parametrize(
-    ("grid", "drawn", "count", "said"),
-    [
+def test_what_cannot_be_asked(scene: Evaluation) -> None:
+    for grid, drawn, count, said in (
         ({"q": "1"}, {}, None, "no param `q`"),
         ({"k": ""}, {}, None, "say how many"),
         ({"k": "0..1/0"}, {}, None, "no values"),
@@ -94,13 +90,9 @@ def test_values(scene: Evaluation, name: str, text: str, expected: list[str]) ->
         ({"k": "0..1/2000", "n": "1..2000"}, {}, None, "can be made"),
         ({}, {"free": ""}, 3, "has no range"),
         ({}, {"k": "5"}, 3, "not a range"),
-    ],
-)
-def test_what_cannot_be_asked(
-    scene: Evaluation, grid: dict[str, str], drawn: dict[str, str], count: int | None, said: str
-) -> None:
-    with pytest.raises(ParamError, match=said):
-        rows_of(scene, grid, drawn, count)
+    ):
+        with pytest.raises(ParamError, match=said):
+            rows_of(scene, grid, drawn, count)
 
 
 def test_a_grid_is_every_combination_once(scene: Evaluation) -> None:
