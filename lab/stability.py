@@ -35,8 +35,7 @@ from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import flip, psnr
 from scenelang.drawing.neural.draw import draw
-from scenelang.drawing.neural.load import Model
-from scenelang.drawing.neural.torch_networks import Framed, Solids
+from scenelang.drawing.neural.load import Framed, Model, Solids
 from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.scene import Chain, Object, Scene
 from scenelang.output.plan import reference_of

@@ -66,7 +66,6 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/drawing/exact/solid.py": ("tests/drawing/test_closed.py", "tests/drawing/test_solid.py"),
     "scenelang/drawing/neural/draw.py": DRAWING,
     "scenelang/drawing/neural/frames.py": DRAWING,
-    "scenelang/drawing/neural/torch_networks.py": DRAWING,
     "scenelang/drawing/neural/coverage.py": DRAWING,
     "scenelang/drawing/neural/field.py": (*TREES, *DRAWING),
     "scenelang/drawing/neural/network.py": DRAWING,

@@ -17,9 +17,8 @@ from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError, replaced
 from scenelang.drawing.how import RenderError, keep_memory, threads_for
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.neural.load import Model, Network, load_model, place_of
+from scenelang.drawing.neural.load import Framed, Model, Network, Solids, load_model, place_of
 from scenelang.drawing.neural.paper import draw_whole
-from scenelang.drawing.neural.torch_networks import Framed, Solids
 
 try:
     import torch

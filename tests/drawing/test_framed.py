@@ -9,16 +9,16 @@ import pytest
 import torch
 
 from lab.sets.plane import SETS, random_scene
+from lab.training.network import Trainee
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
 from scenelang.drawing.metrics import psnr
 from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.draw import draw
 from scenelang.drawing.neural.field import Field
-from scenelang.drawing.neural.load import Model, load_model
+from scenelang.drawing.neural.load import Framed, Model, load_model
 from scenelang.drawing.neural.meetings import raster
 from scenelang.drawing.neural.network import FramedConfig
-from scenelang.drawing.neural.torch_networks import Framed
 from scenelang.language.scene import Object, Scale, Scene, Translate
 from scenelang.output.plan import reference_of
 
@@ -54,7 +54,7 @@ def test_random_weights_draw_noise(model: Model) -> None:
     trained, random = [], []
     for scene in small:
         program, reference = compile_scene(scene), reference_of(scene, model.manifest)
-        network = Framed(FramedConfig(), 4, 1).requires_grad_(False)
+        network = Trainee(FramedConfig(), 4, 1).requires_grad_(False)
         trained.append(psnr(picture(model.network, program), reference))
         random.append(psnr(picture(network, program), reference))
     assert np.mean(random) < 15
@@ -95,8 +95,9 @@ def test_tiles_and_threads_change_nothing(model: Model) -> None:
 
 
 def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
-    """The inference path (channels first, folded weights, skipping off) against `Framed.trace`."""
-    network = model.network
+    """The inference path (channels first, folded weights, skipping off) against `Trainee.trace`."""
+    network = Trainee(model.framed.config, 4, 1).requires_grad_(False)
+    network.load_state_dict(model.network.state_dict())
     for program in programs("chains", 4):
         field, count = Field(network, program.vectors, program.tokens), len(program)
         canvas = (24, 16)

@@ -10,7 +10,7 @@ from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.drawing.exact.field import combine, leaf_distance
 from scenelang.drawing.exact.solid import solid_image
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import Meeting, SolidField

@@ -12,7 +12,7 @@ from lab.training.checkpoint import save_tensors
 from scenelang.compiler.spaces import Light, Stage
 from scenelang.compiler.steps import Displace, Step, Twist
 from scenelang.drawing.neural.files import solid_arrays
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField

@@ -10,7 +10,7 @@ from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Affine, Warp
 from scenelang.drawing.exact.solid import Field, solid_image
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid import light
 from scenelang.drawing.solid.draw import draw_solids
 from tests.assets.shapes import noise

@@ -147,22 +147,6 @@ class FramedNetwork:
         x = self.xp.perceptron(q * (RADIUS / radius.clip(RADIUS)), decoder.layers)
         return (x + (radius - RADIUS).clip(0.0) * decoder.far) * scale
 
-    def step(
-        self, features: Array, state: Array, colour: Array, object_colour: Array, weights: tuple[Array, ...]
-    ) -> tuple[Array, Array]:
-        """One object: the LSTM cell and the register.
-
-        Args:
-            features: (…, F, M).
-            state: (…, S, M).
-            colour: the register (…, R, M).
-            object_colour: (…, R, 1).
-            weights: the `Cell` of the object's token.
-        """
-        lines, bias, candidate, bump = weights
-        levels = self.xp.dense(self.xp.concat([features, state], -2), lines, bias)  # (…, S + L, M)
-        return self.update(levels, candidate @ features, bump, state, colour, object_colour)
-
     def update(
         self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
     ) -> tuple[Array, Array]:
@@ -172,7 +156,9 @@ class FramedNetwork:
             levels: of the gates before they are clamped (…, S + L, M).
             candidate: what the state becomes where its gate is open (…, S, M).
             bump: as in `Cell`, or (…, S, M).
-            state, colour, object_colour: as `step` takes them.
+            state: (…, S, M).
+            colour: the register (…, R, M).
+            object_colour: (…, R, 1).
         """
         s, xp = self.config.state, self.xp
         take = levels[..., :s, :].clip(0.0, 1.0)

@@ -12,7 +12,7 @@ from scenelang.compiler.graph import Fold
 from scenelang.compiler.spaces import Light, Stage
 from scenelang.drawing.closed import ClosedSolids
 from scenelang.drawing.exact.solid import Field, solid_image
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import SolidNetwork, Wanted
