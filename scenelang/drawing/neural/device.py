@@ -429,8 +429,6 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
     """
     meetings, _ = meetings_of(pairs)
     nest, count = nesting(meetings, field.groups), len(field.tokens)
-    if nest is None:
-        return pairs.block, pairs.object, np.zeros(0, int), 1
     result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
 
     def close(closings: list[Closing]) -> None:
