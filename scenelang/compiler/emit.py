@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.compiler.chain import split_levels
-from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row, leaf_box
+from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS
 from scenelang.compiler.lifting import LAYOUTS, WIDTH, lift_colours, lift_geometry, lift_many, lift_material
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Paint, Place, Program, ProgramError
-from scenelang.compiler.spaces import SPACES, Space
+from scenelang.compiler.spaces import SPACES
 from scenelang.compiler.weights import Codes
 from scenelang.language.diagnostics import Span
 from scenelang.language.words import TOKENS
@@ -124,6 +124,10 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     """Boxes (N, 4) of the plane, or balls of space, outside which a row makes no difference."""
     result: list[Bound | None] = []
 
+    def bound_of(leaf: Leaf, level: float) -> Bound:
+        key = "bound", level
+        return leaf.noted(key, lambda leaf: graph.space.bound(leaf.geometry, leaf.steps, level))
+
     def bound(fold: Fold, later: Later, joins: bool) -> None:
         for index in range(len(fold.links) - 1, -1, -1):
             link = fold.links[index]
@@ -131,8 +135,8 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
             if isinstance(link.node, Fold):
                 bound(link.node, own, link.op == "intersect")
             else:
-                everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
-                result.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+                level, everywhere = own.level, link.op == "intersect" or (index == 0 and joins)
+                result.append(None if everywhere or level is None else bound_of(link.node, level))
             later = later.before(link.op, link.width)
 
     bound(graph.root, Later(), False)
@@ -151,12 +155,6 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     low = np.where(rounded[:, :2] > exact[:, :2], np.nextafter(rounded[:, :2], -most), rounded[:, :2])
     high = np.where(rounded[:, 2:] < exact[:, 2:], np.nextafter(rounded[:, 2:], most), rounded[:, 2:])
     return np.concatenate([low, high], axis=1).astype(np.float32)
-
-
-def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
-    if space.dimension == 2:
-        return leaf_box(leaf, level, space)[:4]
-    return leaf.noted(("bound", level), lambda leaf: space.bound(leaf.geometry, leaf.steps, level))
 
 
 def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:

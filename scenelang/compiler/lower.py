@@ -119,12 +119,11 @@ def lower(
 ) -> Graph:
     """The graph of a scene for one model.
 
-    Where a name or a transform is not one the model has, a diagnostic says so and the node is kept
-    without it, so that everything else is checked too.
+    A name or a transform that the model does not have is reported (E03xx, E05xx) and left out, so that
+    everything else is checked too.
 
     Args:
         spans: where nodes were written; None for a scene that did not come from text.
-        diagnostics: receives E03xx and E05xx.
         memory: of the previous frame; holds this one afterwards.
     """
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)

@@ -269,12 +269,9 @@ _DIM: Final = 0.1
 
 
 def check_eye(graph: Graph, context: Context) -> Graph:
-    """Report an eye inside an opaque object, and warn of one deep in a medium.
+    """Report an eye inside an opaque object, and warn of one deep in a medium, by the exact fold there.
 
-    The exact fold is computed at that one point. Geometries without a formula count as far away, and as
-    leaving nothing where they cut.
-
-    Before: STREAM. After: unchanged.
+    Geometries without a formula count as far away. Before: STREAM. After: unchanged.
     """
     if graph.stage is None or not context.whole:
         return graph
@@ -502,9 +499,7 @@ def check_scene(
     without: Collection[str] = (),
     memory: Memory | None = None,
 ) -> Graph:
-    """Lower a scene and run all passes in order.
-
-    The graph is verified after each. No numpy is imported.
+    """Lower a scene, run all passes in order and verify the graph after each. No numpy is imported.
 
     Args:
         spans: where its nodes were written, None if it did not come from text.

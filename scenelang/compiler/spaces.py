@@ -1,27 +1,21 @@
 """The plane and the solid world: maps and deformations that stay in them, bounds of leaves, the stage.
 
-A model's manifest states its dimension; `SPACES` has the space, which is handed down from there. Nothing
-else in the compiler asks whether a scene is flat.
+Nothing else in the compiler asks whether a scene is flat: a model's manifest states the dimension.
 
 Maps and turns. A warp turns (x, y), a twist (x, z); call that plane P, and its axis a. Let M keep P and a
 apart and be s times an orthogonal matrix Q on P, with no shift in P, and m times a coordinate, plus c, along
-a. As R(w) turns P alone, M^-1 R(w) M is R(+-w), the sign being the determinant of Q. So a point M u, which a
-turn by the angle w(M u) carries back to M^-1 R(w(M u)) M u, is one that a turn by +-w(M u) carries back from
-u: M trades places with the turn if w(M u) is an angle of the same kind.
+a. As R(w) turns P alone, M^-1 R(w) M is R(+-w), the sign being the determinant of Q. So M trades places with
+the turn by an angle w if w(M u) is an angle of the same kind:
 
 - A twist has w = k y. With c = 0 it is k m times y.
 - A bend has w = k x, which is k s times the entry of Q^T's first column: it stays a bend along x where Q
   keeps that axis, whatever m and c are; slots of a vector hold no other.
 - A twirl has w = k |M u|, which is k s |u| where |m| = s and c = 0.
 
-Balls. A leaf lies in the unit ball and its distance grows no faster than 1, so the points below a level lie
-in a ball of radius 1 + level / stretch, and a displacement by at most its amount widens that by as much. A
-turn keeps lengths, so that it carries a ball into the one about the origin that encloses it.
-
-Boxes of the plane. A leaf lies within the unit disc and its distance grows no faster than 1, so the
-points below a level lie within a disc of radius 1 + level / stretch. An affine map sends a disc into an
-ellipse; a warp keeps lengths and turns each point by an angle that is bounded over any sector about the
-origin.
+Bounds. A leaf lies in the unit disc or ball and its distance grows no faster than 1, so the points below a
+level lie within a radius of 1 + level / stretch; a displacement widens that by its amount. A turn keeps
+lengths, so that it carries a ball into the one about the origin that encloses it. In the plane, where it
+turns each point by an angle that is bounded over any sector about the origin, it carries a sector into one.
 """
 
 from __future__ import annotations
@@ -81,12 +75,7 @@ def encoded(linear: Triple) -> Triple:
 
 
 class Camera(Record):
-    """The camera.
-
-    Args:
-        eye, target: world points.
-        fov_rad: angle of view across the shorter side of the canvas, in (0, pi).
-    """
+    """The camera: world points, and the angle of view, in (0, pi), across the canvas's shorter side."""
 
     eye: Triple = (0.0, 1.2, 6.0)
     target: Triple = (0.0, 0.0, 0.0)
@@ -127,10 +116,8 @@ class Ground(Record):
 class Stage(Record):
     """All of a 3D scene that is not an object.
 
-    Args:
-        ground: None for a scene without one.
-        horizon, zenith: colours of the sky; the ground fades into the first. A plain background is both.
-        transparent: the sky is not drawn and the picture has alpha.
+    The ground fades into the sky's ``horizon``; a plain background is ``horizon`` and ``zenith``. Where it is
+    ``transparent`` the sky is not drawn and the picture has alpha.
     """
 
     camera: Camera = Camera()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenelang.compiler.choose import why_chosen
+from scenelang.compiler.compile import why_chosen
 from scenelang.compiler.graph import Fold, Graph, nodes
 from scenelang.compiler.groups import OPERATOR
 from scenelang.compiler.lower import Spans, lower

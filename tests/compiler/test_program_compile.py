@@ -8,8 +8,9 @@ import sys
 import numpy as np
 import pytest
 
+from lab.matrices import affine_matrix
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.lifting import PLANE_LAYOUT, affine_matrix
+from scenelang.compiler.lifting import PLANE_LAYOUT
 from scenelang.compiler.program import Place, Program, ProgramError
 from scenelang.compiler.weights import load_codes
 from scenelang.language import scene as schema
