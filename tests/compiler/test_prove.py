@@ -33,7 +33,7 @@ def holds(proof: Proof, scenes: int) -> None:
 
 
 def test_passes_keep_the_picture() -> None:
-    holds(prove(60), 60)
+    holds(prove(50), 50)
 
 
 @pytest.mark.slow

@@ -194,23 +194,6 @@ def stream_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.nda
     return state
 
 
-def graph_picture(graph: Graph, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As `stream_picture`, for a graph at any stage."""
-    from scenelang.compiler.graph import Leaf
-
-    def visit(node, outward):
-        moves = node.moves + outward
-        if isinstance(node, Leaf):
-            return moved_distance(points, node.geometry, moves), np.tile(node.look.colour(), (len(points), 1))
-        state = np.full(len(points), np.inf), np.ones((len(points), 3))
-        for index, link in enumerate(node.links):
-            value = visit(link.node, moves)
-            state = value if index == 0 else combine(link.op, *state, *value, link.k)
-        return state
-
-    return visit(graph.root, ())
-
-
 def assert_same_picture(first, second, edge: float = 1e-9, tolerance: float = 1e-7) -> int:
     """Compare two (D, C) where neither is within ``edge`` of an edge; returns how many points are covered."""
     (d, c), (e, f) = first, second
