@@ -50,7 +50,7 @@ DRAWING = (
 COMPILING = (
     "tests/compiler", "tests/compiler/test_program_compile.py", "tests/compiler/test_flatten.py",
     "tests/compiler/test_check_trained.py", "tests/compiler/test_drop_hidden.py",
-    "tests/compiler/test_prove.py", "tests/compiler/test_pass_picture.py",
+    "tests/compiler/test_prove.py",
     "tests/output/test_clip.py", "tests/conformance",
 )  # fmt: skip
 SOLIDS = (

@@ -11,7 +11,7 @@ import pytest
 from scenelang.compiler import steps as affine
 from scenelang.compiler.chain import Levels, LevelsError, merged, normal, split_levels
 from scenelang.compiler.graph import Move
-from scenelang.compiler.spaces import PLANE, SPACES
+from scenelang.compiler.spaces import PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp
 
 
@@ -144,29 +144,6 @@ def test_levels_keep_the_map() -> None:
         kept += 1
         flat = [*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine)]
         same(chain, flat, rng)
-
-
-def test_stretches_agree_with_numpy() -> None:
-    import numpy as np
-
-    rng = np.random.default_rng(5)
-    for _ in range(200):
-        matrix = rng.normal(size=(3, 4))
-        rows: Rows = tuple(matrix.ravel().tolist())
-        for size in (2, 3):
-            values = np.linalg.svd(matrix[:size, :size], compute_uv=False)
-            assert SPACES[size].stretches(rows) == pytest.approx((values[-1], values[0]), rel=1e-9)
-    assert SPACES[3].stretches(affine.scaling(3, 3, 3)) == pytest.approx((3, 3))
-
-
-def test_rotation_about_any_axis_fixes_it() -> None:
-    rows = affine.rotation(1.1, (1.0, 2.0, -0.5))
-    for i, value in enumerate((1.0, 2.0, -0.5)):
-        assert sum(a * b for a, b in zip(rows[4 * i : 4 * i + 3], (1.0, 2.0, -0.5), strict=True)) == (
-            pytest.approx(value)
-        )
-    quarter = affine.rotation(1.5707963267948966, (0.0, 3.0, 0.0))
-    assert [quarter[2], quarter[8]] == pytest.approx([1, -1])
 
 
 @pytest.mark.parametrize(

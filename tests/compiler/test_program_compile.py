@@ -82,15 +82,6 @@ def test_rows_off_the_canvas_are_not_there() -> None:
     assert compiled(f"canvas(2048, 256); {on} {off}")[0].objects == ("star", "square")
 
 
-def test_rows_that_are_drawn_over_are_not_there() -> None:
-    small, big = "star { scale(0.2); }", "square { scale(0.9); }"
-    assert compiled(small + big)[0].objects == ("square",)
-    assert compiled(big + small)[0].objects == ("square", "star")
-    assert compiled(f"chain {{ {big} subtract {small} {big} }}")[0].objects == ("square",)
-    assert compiled(f"chain {{ {small} {big} smooth {small} }}")[0].objects == ("star", "square", "star")
-    assert compiled(f"chain {{ {small} twirl(1); }}" + big)[0].objects == ("square",)
-
-
 def test_passes_that_only_save_work_can_be_left_out() -> None:
     text = "square { scale(2); } star { scale(0.2); } pentagon { translate(5, 0); } square { scale(3); }"
     assert compiled(text)[0].objects == ("square",)

@@ -98,7 +98,7 @@ def test_no_point_breaks_the_slopes_of_an_element(side: int) -> None:
     assert np.isinf(ends.slopes().rise(p, radius)).all()
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_point_breaks_intervals_through_the_cell(seed: int) -> None:
     """Streams of all tokens: distances and colours at random, folded one by one, all objects and some."""
     rng, blocks, most = RNG(seed), 300, 7

@@ -72,10 +72,6 @@ def test_it_reads_as_the_paper_says() -> None:
             np.testing.assert_allclose(found[b, p], expected, atol=1e-12)
 
 
-def test_the_paper_reads_eight_times() -> None:
-    assert ReadingConfig().reads == 8
-
-
 def test_features_are_periodic_in_steps_of_two() -> None:
     points = torch.tensor([[0.3, -0.7]], dtype=torch.float64)
     here, there = fourier_features(points, 4), fourier_features(points + 2.0, 4)
