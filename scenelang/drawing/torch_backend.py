@@ -79,8 +79,7 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
 def _one_torch_thread() -> Iterator[None]:
     """Torch computes each operation on one core meanwhile.
 
-    The setting is partly the process's and partly a thread's, and worker threads take it over when they
-    start; so it is set around the pool, not inside it, and put back.
+    It is set around the pool, not inside it: worker threads take the setting over when they start.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(1)

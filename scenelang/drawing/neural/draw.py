@@ -170,7 +170,6 @@ def draw(
     """Draw a Program's objects in stream order.
 
     Args:
-        network: trained parameters; the picture is computed on their device.
         threads: tiles drawn at the same time; by default 1.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
@@ -179,8 +178,7 @@ def draw(
         progress: called with the share done, from any thread.
 
     Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
-            proportion; no compiled scene has such.
+        ProgramError: no compiled scene has such vectors.
     """
     (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())

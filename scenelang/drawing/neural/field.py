@@ -40,8 +40,7 @@ class Trace:
     Args:
         paint: (groups, P) how far the object's colour came in.
         margin: (groups, P) by how much what was there before is nearer than the object, world units.
-        joined: the same of groups of the stream that ended, round by round, with which these were and their
-            distances.
+        joined: the same of groups of the stream that ended, round by round, with their distances.
     """
 
     paint: Array
@@ -382,8 +381,7 @@ def rounded(cells: Cell, s: int) -> Cell:
     """Cells with tokens in front, and behind them those of operators whose edges have a width.
 
     A cut that rounds its edge is a smooth union turned inside out: where that takes (D, d) to D', the
-    intersection takes (-D, -d) to -D', and the subtraction (-D, d). So its lines are those that were learned
-    of the union, with their signs turned. Colours are kept: gates of the register stay shut.
+    intersection takes (-D, -d) to -D', and the subtraction (-D, d). Gates of the register stay shut.
     """
     lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
     features = lines.shape[-1] - s

@@ -214,7 +214,7 @@ class Nesting(NamedTuple):
 
 
 def flat_nesting(meetings: Meetings) -> Nesting:
-    """Return the nesting of a stream without groups: all pairs join the stream's own state."""
+    """The nesting of a stream without groups: all pairs join the stream's own state."""
     sizes = [(part, part.stop - part.start) for part in meetings.slots()]
     return Nesting([Turn(p, np.zeros(n, np.intp), np.zeros(n, bool), [], []) for p, n in sizes], 1)
 

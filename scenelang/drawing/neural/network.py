@@ -168,11 +168,7 @@ class FramedNetwork:
 
 
 class FramedArrays(FramedNetwork):
-    """A trained network as numpy arrays.
-
-    Args:
-        arrays: parameters by the names of `parameter_shapes`.
-    """
+    """A trained network as numpy arrays, by the names of `parameter_shapes`."""
 
     xp = NUMPY
 
