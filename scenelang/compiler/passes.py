@@ -149,10 +149,9 @@ _TOLERANCE = 1e-9
 def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
-    Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
-    object is each of the two stretches of its affine maps, and how thin it is their ratio; of an opaque solid
-    it is how thick it is where it is thinnest. A texture's texels are counted where they are densest; of a
-    solid at its centre.
+    Deformations are measured in the normal form; the scale of an object is each of the two stretches of its
+    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest; the
+    texels of a texture are counted where they are densest, of a solid at its centre.
 
     Before: STREAM. After: unchanged.
     """

@@ -42,12 +42,10 @@ from scenelang.language.diagnostics import Diagnostics, Label
 
 
 class Context(Record):
-    """The model a graph is compiled for and where its mistakes go.
+    """The model a graph is compiled for, and where its mistakes (E04xx, E05xx) and warnings go.
 
-    Args:
-        diagnostics: receives E04xx, E05xx and warnings.
-        whole: False after an earlier error, when leaves may lack moves and no bound means anything.
-        moves: the scene is a frame of an animation, where nothing may be in sight for a while.
+    ``whole`` is False after an earlier error, when no bound means anything. ``moves`` is True for a frame of
+    an animation, where nothing may be in sight for a while.
     """
 
     manifest: Manifest

@@ -318,13 +318,7 @@ class Space:
         return self.before(inverted(rows), turn)
 
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
-        """A box around all points of the world whose distance to a leaf is below ``level``.
-
-        Args:
-            geometry: name of the leaf.
-            steps: all its steps into the world, nearest the leaf first.
-            level: world distance, at least 0; 0 for the leaf itself.
-        """
+        """A box of all points of the world at a distance below ``level`` >= 0 of a leaf with such steps."""
         (x, y, z), radius, rows = self._ball(steps, level)
         sides = []
         for row in (rows[:4], rows[4:8], rows[8:]):

@@ -146,10 +146,7 @@ def given(
     size: tuple[int, int] | None,
     backend: Backend,
 ) -> tuple[Program | Scene, Spans | None]:
-    """Input of a backend: a Scene for the reference, a Program for the others; raises as `render`.
-
-    With a Scene of a file comes where its nodes were written.
-    """
+    """Input of a backend: a Scene, and where it was written, for the reference, else a Program."""
     from scenelang.compiler.program import Program
 
     result = program_or_scene

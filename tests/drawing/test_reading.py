@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from scenelang.drawing.neural.paper import Reading, ReadingConfig, fourier_features
+from scenelang.drawing.neural.paper import Reading, ReadingConfig
 
 Array = np.ndarray
 
@@ -70,13 +70,6 @@ def test_it_reads_as_the_paper_says() -> None:
                 )
             expected = weights["head.weight"] @ state + weights["head.bias"]
             np.testing.assert_allclose(found[b, p], expected, atol=1e-12)
-
-
-def test_features_are_periodic_in_steps_of_two() -> None:
-    points = torch.tensor([[0.3, -0.7]], dtype=torch.float64)
-    here, there = fourier_features(points, 4), fourier_features(points + 2.0, 4)
-    torch.testing.assert_close(here[:, 2:], there[:, 2:])
-    assert here.shape == (1, 18)
 
 
 def test_a_union_of_equal_places_ignores_order() -> None:

@@ -112,11 +112,6 @@ def test_sizes_are_checked() -> None:
     assert StreamingConfig(resolution=512).filters(512) == FILTERS[512]
 
 
-def test_filters_may_be_cut_to_as_many_on_all_levels() -> None:
-    config = StreamingConfig(resolution=512, width=1 / 4, most=32)
-    assert [config.filters(r) for r in config.levels] == [32] * 6 + [16, 8, 8]
-
-
 def test_a_cell_on_halves_keeps_its_sums() -> None:
     torch.manual_seed(1)
     level = Streaming(StreamingConfig(resolution=8, width=1 / 32)).stages["8"]

@@ -120,14 +120,11 @@ class Drawing:
 def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
-    """Draw a Program of the plane or of solids, as `draw` does.
+    """Draw a Program of the plane or of solids, as `draw` does, if the network has its dimension.
 
     Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out; all of their
     pixels count as met. There are two further ``samples``: ``"draft"``, one for each 2 x 2 pixels, and
     ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled four times.
-
-    Raises:
-        ProgramError: as `draw`, or the Program and the network are of different dimensions.
     """
     if run.get("samples") == "draft":
         run |= {"samples": "one", "split": None, "kept": None}
@@ -229,11 +226,7 @@ def as_image(picture: npt.NDArray[np.float32]) -> Image:
 
 
 def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, threads: int = 1) -> Outputs:
-    """All outputs that a Program has, its objects numbered as in the scene.
-
-    Raises:
-        ProgramError: no compiled scene has such numbers.
-    """
+    """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene."""
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads)

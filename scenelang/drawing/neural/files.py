@@ -118,11 +118,7 @@ def framed_config(config: Any, size: int) -> FramedConfig:
 
 
 def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
-    """The network that a weights file holds, of so many geometries and materials.
-
-    Raises:
-        ModelError: the file does not fit the model or itself, or holds numbers that are not finite.
-    """
+    """The network in a weights file, if it has so many geometries and materials; else raises ModelError."""
     header, arrays = open_weights(data)
     config = solid_config(header.get("config"))
     check_shapes(arrays, solid_shapes(config, geometries, materials))

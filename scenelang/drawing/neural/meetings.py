@@ -122,13 +122,7 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
 
 
 class Closing(NamedTuple):
-    """Groups that end, one in each of some columns.
-
-    Args:
-        columns: (n,) in ascending order.
-        groups: (n,) their numbers.
-        level: (n,) of the states that go into the ones below them.
-    """
+    """Groups (n,) that end, one in each of some ascending columns, and the levels of their states."""
 
     columns: Index
     groups: Index
@@ -315,8 +309,7 @@ class Shown:
 
     Args:
         picture: premultiplied colour and coverage (4, B).
-        shut: (P,) objects that change nothing in their block.
-        open: (P,) objects behind which nothing matters that came before.
+        shut, open: (P,) objects that change nothing in their block, and ones that hide all before them.
     """
 
     picture: Interval

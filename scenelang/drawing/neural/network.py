@@ -4,13 +4,11 @@ Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, F
 G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
 coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over contiguous numbers.
 
-For a point and an object the frame gives the point's leaf coordinates exactly (`frames.py`). Two learned
-parts then draw:
+The frame gives a point's leaf coordinates exactly (`frames.py`). Two learned parts then draw:
 
 1. The decoder turns leaf coordinates into F distance-like features. Its weights are a linear function of
-   the object's code, so that shapes live in codes: swap two codes and the shapes swap. It has rectified
-   linear units, which represent straight edges exactly, and its output is multiplied by the object's
-   distance scale.
+   the object's code, so that shapes live in codes. It has rectified linear units, which represent straight
+   edges exactly, and its output is multiplied by the object's distance scale.
 2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
    and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
    under one gate of its own, so that colour is kept, not re-learned.
@@ -23,7 +21,7 @@ in a cell, and q within a radius of p,
     |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s,
 
 where s depends on the cell and the radius. `lab.slopes` proves it for learned leaves, and it is shipped
-beside the weights. For elements it is computed from their nodes. Where nothing is known it is infinite.
+beside the weights; for elements it is computed from their nodes. Where nothing is known it is infinite.
 """
 
 from __future__ import annotations
