@@ -35,8 +35,12 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     forms = {name: at for at, name in enumerate(listed)}
     palette, worn = _palette(leaves)
     materials = dict.fromkeys(paint.element for paint in palette)
+    vectors = _vectors(leaves, manifest, codes)
+    for at, row in enumerate(rows):
+        if row.k and row.op != "union":  # a width that is not the usual one belongs to a row, not to a leaf
+            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
     return Program(
-        vectors=_blended(_vectors(leaves, manifest, codes), rows, manifest),
+        vectors=vectors,
         tokens=tokens_of(rows),
         bounds=_bounds(graph),
         canvas=graph.canvas,
@@ -84,16 +88,6 @@ def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArra
         return lifted
     known |= {id(leaf): vector for leaf, vector in zip(fresh, lifted, strict=True)}
     return np.stack([known[id(leaf)] for leaf in leaves])
-
-
-def _blended(
-    vectors: npt.NDArray[np.float32], rows: list[Row], manifest: Manifest
-) -> npt.NDArray[np.float32]:
-    """The vectors with widths of blends that are not the usual one, which belong to rows, not to leaves."""
-    for at, row in enumerate(rows):
-        if row.k and row.op != "union":
-            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
-    return vectors
 
 
 def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:

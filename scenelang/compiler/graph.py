@@ -98,7 +98,8 @@ def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
     result: list[ColourStep] = []
     for step in steps:
         joined: ColourStep | None = step
-        if result and result[-1][0] == step[0] and (step[0] == "hue" or _shares(result[-1])):
+        last = result[-1] if result else ("none",)
+        if last[0] == step[0] and (step[0] == "hue" or all(0.0 <= n <= 1.0 for n in last[1:])):
             joined = _joined(result.pop(), step)
         elif step[0] == "hue":
             joined = _joined(("hue", 0.0), step)
@@ -108,10 +109,6 @@ def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
 
 
 _IDLE: frozenset[ColourStep] = frozenset((("color", 1.0, 1.0, 1.0), ("grayscale", 0.0), ("hue", 0.0)))
-
-
-def _shares(step: ColourStep) -> bool:
-    return all(0.0 <= number <= 1.0 for number in step[1:])
 
 
 def _joined(one: ColourStep, other: ColourStep) -> ColourStep:

@@ -417,17 +417,13 @@ def _in_sight(box: Box, graph: Graph) -> bool:
     wide, high = (reach * pixels / side for pixels in graph.canvas)
     planes: list[Sequence[float]] = [forward]
     for axis, half in ((right, wide), (up, high)):
-        planes += [_plus(forward, axis, half, sign) for sign in (1.0, -1.0)]
+        sides = [(half * f + a, half * f - a) for f, a in zip(forward, axis, strict=True)]
+        planes += zip(*sides, strict=True)  # inward normals of two sides of the camera's frustum
     corners = [*product((box[0], box[2]), (box[1], box[3]), (box[4], box[5]))]
     return all(
         any(not sum(n * (p - e) for n, p, e in zip(plane, at, eye, strict=True)) < 0.0 for at in corners)
         for plane in planes
     )
-
-
-def _plus(forward: Sequence[float], axis: Sequence[float], half: float, sign: float) -> tuple[float, ...]:
-    """The inward normal of a side of the camera's frustum."""
-    return tuple(half * f + sign * a for f, a in zip(forward, axis, strict=True))
 
 
 def _is_far(box: Box) -> bool:

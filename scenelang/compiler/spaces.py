@@ -27,7 +27,7 @@ from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from scenelang.assets.records import Record
-from scenelang.compiler.geometries import GEOMETRIES, Corner
+from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.steps import (
     IDENTITY,
     Affine,
@@ -452,7 +452,16 @@ class Plane(Space):
         if any(isinstance(step, Warp) for step in steps):
             return _grown(_warped(steps, 1.0 + reach))
         row = GEOMETRIES.get(geometry)
-        return _grown(_straight(row.corners if row else (), rows, reach))
+        a, b, x, c, d, y = rows[0], rows[1], rows[3], rows[4], rows[5], rows[7]
+        wide, high = reach * hypot(a, b), reach * hypot(c, d)
+        if row is None or not row.corners:
+            wide, high = wide + hypot(a, b), high + hypot(c, d)
+            return _grown((x - wide, y - high, x + wide, y + high))
+        across = [a * p + b * q for p, q in row.corners]
+        along = [c * p + d * q for p, q in row.corners]
+        return _grown(
+            (x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high)
+        )
 
     def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
         return self.box(geometry, steps, level)[:4]
@@ -493,18 +502,6 @@ def _grown(box: tuple[float, float, float, float]) -> Box:
     grown = (left - more, bottom - more, right + more, top + more, 0.0, 0.0)
     # NaN compares false: what overflowed may be anywhere.
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
-
-
-def _straight(corners: tuple[Corner, ...], rows: Rows, reach: float) -> tuple[float, float, float, float]:
-    a, b, x = rows[0], rows[1], rows[3]
-    c, d, y = rows[4], rows[5], rows[7]
-    wide, high = reach * hypot(a, b), reach * hypot(c, d)
-    if not corners:
-        wide, high = wide + hypot(a, b), high + hypot(c, d)
-        return x - wide, y - high, x + wide, y + high
-    across = [a * p + b * q for p, q in corners]
-    along = [c * p + d * q for p, q in corners]
-    return x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high
 
 
 @dataclass(slots=True)
