@@ -357,11 +357,7 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
 }
-_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {
-    "numbers": ("I32", ()),
-    "forms": ("I32", ()),
-    "worn": ("I32", ()),
-}
+_OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
 _TABLES: dict[str, tuple[str, tuple[int, ...]]] = {"paints": ("I32", (2,)), "steps": ("F32", (4,))}
 _HEADER: dict[str, Any] = {
     "background": list | None,
