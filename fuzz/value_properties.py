@@ -110,8 +110,8 @@ def networks_of_any_size_load_as_they_were_saved(data: st.DataObject) -> None:
     import torch
     from safetensors.torch import save
 
+    from scenelang.drawing.neural.load import Framed
     from scenelang.drawing.neural.network import FramedConfig
-    from scenelang.drawing.neural.torch_networks import Framed
 
     sizes = {
         name: data.draw(st.integers(1, 6), name)

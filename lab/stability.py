@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lab import matrices
 from lab.about import Report, about, revision, silent
 from lab.probes import FLAT, TEXTURES, Kit, Probe, drifting, rng_of, union_of
 from lab.sets.plane import SETS
@@ -24,7 +25,7 @@ from lab.sets.solids import SIDES
 from lab.sets.solids import WARP as SOLID_WARP
 from lab.solid_probes import SOLIDS
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.lifting import LAYOUTS, affine_matrix, leaf_vector, lift_geometry, warp_matrix
+from scenelang.compiler.lifting import LAYOUTS, lift_geometry
 from scenelang.compiler.lower import step_of
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.passes import OPTIONAL
@@ -34,8 +35,7 @@ from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import flip, psnr
 from scenelang.drawing.neural.draw import draw
-from scenelang.drawing.neural.load import Model
-from scenelang.drawing.neural.torch_networks import Framed, Solids
+from scenelang.drawing.neural.load import Framed, Model, Solids
 from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.scene import Chain, Object, Scene
 from scenelang.output.plan import reference_of
@@ -132,12 +132,12 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
         vectors[:, : lifting.codes.shape[1]] = lift_geometry(lifting, chains, leaves)
         return dataclasses.replace(program, vectors=vectors)
     for row, chain_steps in zip(vectors, steps, strict=True):
-        g = leaf_vector(layout.unpack(row).code.tolist(), layout).astype(np.float32)
+        g = matrices.leaf_vector(layout.unpack(row).code.tolist(), layout).astype(np.float32)
         for step in chain_steps:
             if isinstance(step, Affine):
-                matrix = affine_matrix(step.rows, None, layout)
+                matrix = matrices.affine_matrix(step.rows, None, layout)
             else:
-                matrix = warp_matrix(step, layout.places.inner, layout)  # type: ignore[arg-type]
+                matrix = matrices.warp_matrix(step, layout.places.inner, layout)  # type: ignore[arg-type]
             g = matrix.astype(np.float32) @ g
         row[: layout.geometry] = g[: layout.geometry]
     return dataclasses.replace(program, vectors=vectors)

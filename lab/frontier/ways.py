@@ -104,8 +104,8 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
             renderer=manifest.renderer,
             side=side,
             why_not=why_not,
-            parameters=facts.parameters,
-            bytes=facts.bytes,
+            parameters=facts["parameters"],
+            bytes=facts["bytes"],
             command=None if why_not else line,
             **options,
         )

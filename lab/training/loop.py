@@ -15,10 +15,10 @@ from lab.about import revision
 from lab.training.checkpoint import check_config, load_tensors, pack_training, save_tensors, unpack_training
 from lab.training.config import TrainConfig
 from lab.training.losses import image_loss, leaf_loss
+from lab.training.network import Trainee
 from lab.training.scenes import GEOMETRIES, leaf_batch, random_batch
 from scenelang.assets.files import read_regular, write_whole
 from scenelang.drawing.neural.load import load_model
-from scenelang.drawing.neural.torch_networks import Framed
 
 WARM_UP = 200
 _MOST_LOG = 1 << 26  # bytes
@@ -55,7 +55,7 @@ def train(
     """
     folder.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(config.seed)
-    network = Framed(config.network, len(GEOMETRIES), 1).to(device)
+    network = Trainee(config.network, len(GEOMETRIES), 1).to(device)
     decoder, cell = network.parts()
     optimiser = torch.optim.Adam(
         [{"params": cell}, {"params": decoder}], lr=config.rate, betas=(0.9, 0.99), fused=True
@@ -141,7 +141,7 @@ def _cut(log: Path, done: int) -> None:
     write_whole(log, b"".join(kept))
 
 
-def take_cell(network: Framed, model: str) -> None:
+def take_cell(network: Trainee, model: str) -> None:
     """Give a network the cell, the materials and the slopes of a shipped framed model.
 
     Raises `ModelError` where its weights cannot be had, `RuntimeError` where its cell has other sizes.

@@ -9,14 +9,14 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 
+from lab.training.network import Trainee
 from lab.training.scenes import Batch, LeafBatch
-from scenelang.drawing.neural.torch_networks import Framed
 
 SHARP = 0.02  # distances are asked for relative to themselves plus this
 FAR_LEAF, FAR_WORLD = 2.0, 0.4  # leaf and world units: farther outside, a distance makes no difference
 
 
-def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[Tensor, dict[str, float]]:
+def image_loss(network: Trainee, batch: Batch, *, forced: bool = False) -> tuple[Tensor, dict[str, float]]:
     """Loss of a batch of streams at points, and its parts as numbers by name.
 
     Coverage by cross-entropy and distance by relative absolute error, of each object alone and of each
@@ -48,7 +48,7 @@ def image_loss(network: Framed, batch: Batch, *, forced: bool = False) -> tuple[
     return _summed(parts)
 
 
-def leaf_loss(network: Framed, batch: LeafBatch) -> tuple[Tensor, dict[str, float]]:
+def leaf_loss(network: Trainee, batch: LeafBatch) -> tuple[Tensor, dict[str, float]]:
     """Loss of the leaves alone, in their own frames: coverage and distance, as in `image_loss`."""
     radius = torch.linalg.vector_norm(batch.q, dim=1, keepdim=True)
     features = network.decode(batch.q, radius, 1.0, network.decoder_weights(network.codes))[:, 0]

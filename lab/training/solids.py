@@ -27,8 +27,7 @@ from lab.training.leaves import LEAVES, Points, half_rays, leaf_points
 from lab.training.loop import Report, schedule
 from scenelang.assets.files import write_whole
 from scenelang.drawing.exact.field import combine
-from scenelang.drawing.neural.load import load_model
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids, load_model
 from scenelang.drawing.solid.network import BLEND, Wanted
 from scenelang.language.words import TOKENS
 

@@ -14,8 +14,7 @@ import click
 from scenelang.cli.inputs import Input, Request, merged, read_input, stem_of, unused_defines
 from scenelang.cli.main import describe
 from scenelang.cli.say import Clock, say_diagnostics, say_trouble
-from scenelang.compiler.choose import why_chosen
-from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.compile import compile_scene, why_chosen
 from scenelang.drawing.how import DEFAULT, How, threads_for
 from scenelang.language.diagnostics import Diagnostics, plural
 from scenelang.language.reports import SceneError

@@ -84,17 +84,10 @@ def _joined(inner: Step, outer: Turn) -> Turn | None:
 class Levels(Record):
     """A chain of steps as a model's lifting takes it.
 
-    A world point goes back through ``affine``, then ``outer`` from its last to its first, then ``middle``,
-    then ``inner`` from its last to its first. A lifting has room for turns in slots of three strengths:
-    in the plane a warp's twirl and bend; in space a warp's twirl and its bend along x, then the twist after
-    it on the way back.
-
-    Args:
-        inner: turns next to the leaf, nearest the leaf first.
-        middle: the affine map between the two groups of turns; `IDENTITY` where there is none.
-        outer: turns after ``middle``, nearest the leaf first.
-        affine: the last map, into the world; `IDENTITY` where there is none.
-        bulge: the displacement of the leaf itself.
+    A world point goes back through ``affine``, then ``outer`` from its last to its first, ``middle``, and
+    ``inner`` likewise, to the leaf with its ``bulge``. A lifting has room for turns in slots of three
+    strengths: in the plane a warp's twirl and bend; in space its twirl, its bend along x, and the twist
+    after it on the way back.
     """
 
     inner: tuple[Turn, ...] = ()
@@ -124,15 +117,10 @@ def slots(turns: Sequence[Turn], dimension: int) -> list[tuple[float, float, flo
 
 
 def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space = PLANE) -> Levels:
-    """Sort a chain into the levels of a lifting.
+    """Sort a chain, normalised, nearest the leaf first, into the levels that a manifest's ``limits`` allow.
 
     A single run of turns fills ``inner`` first and then ``outer``, with no middle map between. Turns that
     the normal form brought before the first map go back behind it where ``inner`` has no room.
-
-    Args:
-        steps: nearest the leaf first, normalised (no two affine maps are neighbours; see `fold_warps`).
-        limits: a manifest's ``limits``; reads ``inner_warps`` and ``outer_warps``.
-        space: the model's.
 
     Raises:
         LevelsError: the chain does not fit.

@@ -38,9 +38,7 @@ def check_compiles(
 ) -> Manifest | None:
     """Run the compiler's checks; the manifest of the model that draws the scene, None where there is none.
 
-    Args:
-        spans: where its nodes were written, None if it did not come from text.
-        after, memory: as for `check_scene`.
+    ``spans`` is None if it did not come from text; ``after`` and ``memory`` are as for `check_scene`.
     """
     manifest = find_model(scene, diagnostics, spans=spans)
     if manifest is not None:
@@ -61,10 +59,8 @@ def check_frames(
     They share the limits of one frame: where these are met, the rest is left out.
 
     Args:
-        evaluation: has run frame 0.
+        evaluation: has run frame 0, whose scene is ``first``, None if it has errors.
         diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
-        first: the scene of frame 0, None if it has errors.
-        after: as for `check_compiles`.
         every: check all frames, instead of the second, the middle and the last one.
 
     Returns:
@@ -99,16 +95,13 @@ def check_evaluated(
     *,
     frames: Frames = "some",
 ) -> int:
-    """Run all checks that follow evaluation.
+    """Run all checks that follow evaluation; the number of frames left out, beyond the limits of one scene.
 
     Args:
         tree: the syntax tree of its text; None for JSON.
         evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
         scene: the result of the evaluation, None if it has errors.
         diagnostics: those of the evaluation; receives the others.
-
-    Returns:
-        The number of frames that were left out, as they exceed the limits of one scene.
     """
     left = 0
     if scene is not None:

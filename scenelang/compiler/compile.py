@@ -6,14 +6,15 @@ import os
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
-from scenelang.compiler.choose import scene_dimension
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.lower import Memory, Spans
 from scenelang.compiler.manifest import USUAL, Manifest, available, load_manifest
 from scenelang.compiler.passes import check_scene
 from scenelang.language.diagnostics import Diagnostics, Span, did_you_mean
 from scenelang.language.reports import SceneError
-from scenelang.language.scene import Scene
+from scenelang.language.scene import Chain, Object, Scene, SceneNode
+from scenelang.language.scene_data import Brought
+from scenelang.language.words import STAGE, dimension_of
 
 if TYPE_CHECKING:
     from scenelang.compiler.program import Program
@@ -90,6 +91,31 @@ def find_model(
             help = near or help
         diagnostics.add("E0514", f"unknown model `{name}`", place, help=help, fix=fix)
         return None
+
+
+def scene_dimension(scene: Scene) -> int:
+    """The dimension of a scene, 2 or 3: by its first geometry, else 3 where it has a stage."""
+    brought = Brought.of(scene.elements).geometries
+    stack: list[SceneNode] = list(reversed(scene.nodes))
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Object):
+            element = brought.get(node.geometry)
+            dimension = dimension_of(node.geometry) if element is None else element.dimension
+            if dimension is not None:
+                return dimension
+        else:
+            links = [link.node for link in node.children] if isinstance(node, Chain) else list(node.children)
+            stack += links[::-1]
+    return 3 if any(getattr(scene, word) != "default" for word in STAGE) else 2
+
+
+def why_chosen(scene: Scene | None, asked: bool) -> str:
+    """Reason for the model that draws a scene; ``asked`` says whether the command line named it."""
+    if asked:
+        return "by --model"
+    named = scene is not None and scene.model is not None
+    return "named by the scene" if named else "the usual one of its dimension"
 
 
 compile = compile_scene

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.compiler.chain import split_levels
-from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row, leaf_box
+from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS
 from scenelang.compiler.lifting import LAYOUTS, WIDTH, lift_colours, lift_geometry, lift_many, lift_material
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Paint, Place, Program, ProgramError
-from scenelang.compiler.spaces import SPACES, Space
+from scenelang.compiler.spaces import SPACES
 from scenelang.compiler.weights import Codes
 from scenelang.language.diagnostics import Span
 from scenelang.language.words import TOKENS
@@ -35,8 +35,12 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     forms = {name: at for at, name in enumerate(listed)}
     palette, worn = _palette(leaves)
     materials = dict.fromkeys(paint.element for paint in palette)
+    vectors = _vectors(leaves, manifest, codes)
+    for at, row in enumerate(rows):
+        if row.k and row.op != "union":  # a width that is not the usual one belongs to a row, not to a leaf
+            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
     return Program(
-        vectors=_blended(_vectors(leaves, manifest, codes), rows, manifest),
+        vectors=vectors,
         tokens=tokens_of(rows),
         bounds=_bounds(graph),
         canvas=graph.canvas,
@@ -86,16 +90,6 @@ def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArra
     return np.stack([known[id(leaf)] for leaf in leaves])
 
 
-def _blended(
-    vectors: npt.NDArray[np.float32], rows: list[Row], manifest: Manifest
-) -> npt.NDArray[np.float32]:
-    """The vectors with widths of blends that are not the usual one, which belong to rows, not to leaves."""
-    for at, row in enumerate(rows):
-        if row.k and row.op != "union":
-            vectors[at, LAYOUTS[manifest.dimension].places.width] = row.k
-    return vectors
-
-
 def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
     if not leaves:
         return np.zeros((0, WIDTH), np.float32)
@@ -124,6 +118,10 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     """Boxes (N, 4) of the plane, or balls of space, outside which a row makes no difference."""
     result: list[Bound | None] = []
 
+    def bound_of(leaf: Leaf, level: float) -> Bound:
+        key = "bound", level
+        return leaf.noted(key, lambda leaf: graph.space.bound(leaf.geometry, leaf.steps, level))
+
     def bound(fold: Fold, later: Later, joins: bool) -> None:
         for index in range(len(fold.links) - 1, -1, -1):
             link = fold.links[index]
@@ -131,8 +129,8 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
             if isinstance(link.node, Fold):
                 bound(link.node, own, link.op == "intersect")
             else:
-                everywhere = link.op == "intersect" or (index == 0 and joins) or own.level is None
-                result.append(None if everywhere else _bound(link.node, own.level or 0.0, graph.space))
+                level, everywhere = own.level, link.op == "intersect" or (index == 0 and joins)
+                result.append(None if everywhere or level is None else bound_of(link.node, level))
             later = later.before(link.op, link.width)
 
     bound(graph.root, Later(), False)
@@ -151,12 +149,6 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
     low = np.where(rounded[:, :2] > exact[:, :2], np.nextafter(rounded[:, :2], -most), rounded[:, :2])
     high = np.where(rounded[:, 2:] < exact[:, 2:], np.nextafter(rounded[:, 2:], most), rounded[:, 2:])
     return np.concatenate([low, high], axis=1).astype(np.float32)
-
-
-def _bound(leaf: Leaf, level: float, space: Space) -> Bound:
-    if space.dimension == 2:
-        return leaf_box(leaf, level, space)[:4]
-    return leaf.noted(("bound", level), lambda leaf: space.bound(leaf.geometry, leaf.steps, level))
 
 
 def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:

@@ -1,17 +1,15 @@
 """The Graph: leaves and folds with their moves and looks, conservative bounds, and invariants.
 
-A constant material is white everywhere, so moving it changes nothing and every operation acts on one colour,
-in the space it was written in: such a look folds to a colour. The operations of a texture act on each of its
-colours, clamped after each; they are kept in order, as no matrix clamps or turns a hue.
+A constant material is white everywhere, so its look folds to one colour, in the space it was written in. The
+operations of a texture are kept in order, as each clamps, and no matrix clamps or turns a hue.
 
-A leaf is one object. A fold is a boolean node, a group or a chain: its links are joined from the left,
-``(first op second) op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a
-new graph. Walks are without recursion, so that depth costs memory and never the interpreter's stack.
+A leaf is one object. A fold is a boolean node, a group or a chain, joined from the left: ``(first op second)
+op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a new graph. Walks are
+without recursion, so that depth costs memory and never the interpreter's stack.
 
-A *level* asks for more than the leaf itself: the box around all points whose world distance is below it,
-which is what a later `smooth` can feel. World distance is the leaf's own distance times the smallest
-stretch of its affine maps, so a level reaches ``level / stretch`` beyond the leaf in the leaf's own space:
-far, for a thin object.
+A *level* asks for the box around all points whose world distance is below it, which a later `smooth` can
+feel. World distance is the leaf's own distance times the smallest stretch of its affine maps, so a level
+reaches ``level / stretch`` beyond the leaf in the leaf's own space: far, for a thin object.
 """
 
 from __future__ import annotations
@@ -100,7 +98,8 @@ def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
     result: list[ColourStep] = []
     for step in steps:
         joined: ColourStep | None = step
-        if result and result[-1][0] == step[0] and (step[0] == "hue" or _shares(result[-1])):
+        last = result[-1] if result else ("none",)
+        if last[0] == step[0] and (step[0] == "hue" or all(0.0 <= n <= 1.0 for n in last[1:])):
             joined = _joined(result.pop(), step)
         elif step[0] == "hue":
             joined = _joined(("hue", 0.0), step)
@@ -110,10 +109,6 @@ def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
 
 
 _IDLE: frozenset[ColourStep] = frozenset((("color", 1.0, 1.0, 1.0), ("grayscale", 0.0), ("hue", 0.0)))
-
-
-def _shares(step: ColourStep) -> bool:
-    return all(0.0 <= number <= 1.0 for number in step[1:])
 
 
 def _joined(one: ColourStep, other: ColourStep) -> ColourStep:
@@ -211,11 +206,10 @@ class Link(Record):
 
 
 class Fold(Record):
-    """Children folded from the left. Without links it is the empty set: distance +infinity.
+    """Children folded from the left; without links the empty set, at distance +infinity.
 
-    Args:
-        kind: the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
-        moves: steps that apply to all children, nearest the leaf first.
+    ``kind`` is the word it was written with: ``scene``, ``group``, ``chain`` or a boolean. ``moves`` apply to
+    all children, nearest the leaf first.
     """
 
     kind: str
@@ -293,8 +287,7 @@ class Graph(Record):
     def window(self) -> Box:
         """The part of the world that decides the picture.
 
-        In the plane it is what the canvas shows. In space nothing below the ground is seen from above it,
-        nor stands before a light above it; all else may at least throw a shadow on what is seen.
+        In space, what lies below the ground is neither seen nor lit; all else may at least throw a shadow.
         """
         if (stage := self.stage) is not None:
             floor = -inf if stage.ground is None else stage.ground.y
@@ -347,11 +340,9 @@ def links_within(fold: Fold) -> Iterator[Link]:
 
 
 def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:
-    """The graph with ``change`` applied to every leaf.
+    """The graph with ``change`` applied to every leaf; it gives the leaf itself where that stays.
 
-    Args:
-        change: depends on nothing but the leaf and the graph's space; gives the leaf itself where it stays.
-        name: of the change, under which leaves that stay from frame to frame cache its result.
+    ``change`` depends on the leaf and the graph's space alone; its result is noted under its ``name``.
     """
 
     def leaf(node: Leaf) -> Node:
@@ -365,12 +356,7 @@ def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph
 
 
 def leaf_box(leaf: Leaf, level: float, space: Space) -> Box:
-    """A box that contains all points of the world whose distance to ``leaf`` is below ``level``.
-
-    Args:
-        leaf: with all its moves into the world.
-        level: world distance, at least 0; 0 for the leaf itself.
-    """
+    """A box of all points of the world at a distance below ``level`` >= 0 of a leaf with all its moves."""
     return leaf.noted(level, lambda leaf: space.box(leaf.geometry, leaf.steps, level))
 
 

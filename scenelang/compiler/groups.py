@@ -114,9 +114,8 @@ class Felt(NamedTuple):
     """Distances beyond leaves at which N rows matter to what is seen, as `scenelang.compiler.graph.Later`.
 
     Args:
-        total: (N,) world units: widths of the blends that see the row, its own and those of its groups too.
-        widest: (N,) the widest of these, 0 for none.
-        blends: (N,) the number of these.
+        total, widest, blends: (N,) sum and largest of the widths, world units, and number of the blends that
+            see the row, its own and its groups' too.
         everywhere: (N,) whether it matters wherever its leaf is: what it intersects ends outside of it, or
             it is cut out of what a later blend sees.
         inside: (N,) whether a later blend sees how deep inside what it cuts points are.

@@ -149,10 +149,9 @@ _TOLERANCE = 1e-9
 def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
-    Deformations are measured in the normal form, per unit length of the space they act in; the scale of an
-    object is each of the two stretches of its affine maps, and how thin it is their ratio; of an opaque solid
-    it is how thick it is where it is thinnest. A texture's texels are counted where they are densest; of a
-    solid at its centre.
+    Deformations are measured in the normal form; the scale of an object is each of the two stretches of its
+    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest; the
+    texels of a texture are counted where they are densest, of a solid at its centre.
 
     Before: STREAM. After: unchanged.
     """
@@ -269,12 +268,9 @@ _DIM: Final = 0.1
 
 
 def check_eye(graph: Graph, context: Context) -> Graph:
-    """Report an eye inside an opaque object, and warn of one deep in a medium.
+    """Report an eye inside an opaque object, and warn of one deep in a medium, by the exact fold there.
 
-    The exact fold is computed at that one point. Geometries without a formula count as far away, and as
-    leaving nothing where they cut.
-
-    Before: STREAM. After: unchanged.
+    Geometries without a formula count as far away. Before: STREAM. After: unchanged.
     """
     if graph.stage is None or not context.whole:
         return graph
@@ -421,17 +417,13 @@ def _in_sight(box: Box, graph: Graph) -> bool:
     wide, high = (reach * pixels / side for pixels in graph.canvas)
     planes: list[Sequence[float]] = [forward]
     for axis, half in ((right, wide), (up, high)):
-        planes += [_plus(forward, axis, half, sign) for sign in (1.0, -1.0)]
+        sides = [(half * f + a, half * f - a) for f, a in zip(forward, axis, strict=True)]
+        planes += zip(*sides, strict=True)  # inward normals of two sides of the camera's frustum
     corners = [*product((box[0], box[2]), (box[1], box[3]), (box[4], box[5]))]
     return all(
         any(not sum(n * (p - e) for n, p, e in zip(plane, at, eye, strict=True)) < 0.0 for at in corners)
         for plane in planes
     )
-
-
-def _plus(forward: Sequence[float], axis: Sequence[float], half: float, sign: float) -> tuple[float, ...]:
-    """The inward normal of a side of the camera's frustum."""
-    return tuple(half * f + sign * a for f, a in zip(forward, axis, strict=True))
 
 
 def _is_far(box: Box) -> bool:
@@ -502,9 +494,7 @@ def check_scene(
     without: Collection[str] = (),
     memory: Memory | None = None,
 ) -> Graph:
-    """Lower a scene and run all passes in order.
-
-    The graph is verified after each. No numpy is imported.
+    """Lower a scene, run all passes in order and verify the graph after each. No numpy is imported.
 
     Args:
         spans: where its nodes were written, None if it did not come from text.

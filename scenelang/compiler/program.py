@@ -1,13 +1,13 @@
 """The Program: a compiled scene for renderers and embedders, and its files.
 
-A file is safetensors with a JSON header, read as if a stranger had written it. Tensors: ``vectors`` F32
-(N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the header's ``geometries``,
-``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line, end column), all -1 where
-unknown, ``numbers`` I32 (N,) unless 1 to N. The header is metadata ``scenelang``, with a stage of solids.
-Programs with elements have format 2: the header lists these, ``forms`` I32 (N,) has the index of each
-row's geometry, and ``element.0`` and so on are their bytes. Where some are materials it is format 3, with a
-table of paints (`Paint`) and ``worn`` I32 (N,), the index of each row's paint or -1. With
-groups, or cuts that have a width, it is format 4, and has these where the others would.
+A file is safetensors, read as if a stranger had written it, with a JSON header as metadata ``scenelang``.
+Tensors: ``vectors`` F32 (N, 64), ``tokens`` I8 (N,), ``bounds`` F32 (N, 4), ``objects`` I32 (N,) indexing the
+header's ``geometries``, ``places`` I32 (N, 5) as (index into the header's ``files``, line, column, end line,
+end column), all -1 where unknown, ``numbers`` I32 (N,) unless 1 to N. With elements it has format 2: the
+header lists them, ``forms`` I32 (N,) has the index of each row's geometry, and ``element.0`` and so on are
+their bytes. Where some are materials it is format 3, with a table of paints (`Paint`) and ``worn`` I32 (N,),
+the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
+where the others would.
 """
 
 from __future__ import annotations
@@ -41,13 +41,7 @@ STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
 
 
 class Paint(NamedTuple):
-    """An element and operations on its colours, in order, clamped to [0, 1] after each.
-
-    Args:
-        element: a picture, which repeats, or colours of space.
-        steps: ``("color", r, g, b)`` multiplies, ``("grayscale", a)`` mixes with the luma, ``("hue", turns)``
-            shifts H of HSV; float32 numbers.
-    """
+    """An element, a picture or colours of space, and `STEPS` on its colours, clamped to [0, 1] after each."""
 
     element: Element
     steps: tuple[ColourStep, ...] = ()
@@ -75,11 +69,7 @@ def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> d
 def read_paints(
     table: npt.NDArray[Any], steps: npt.NDArray[Any], elements: tuple[Element, ...]
 ) -> tuple[Paint, ...]:
-    """The paints of a table, as `paint_tensors` writes it.
-
-    Raises:
-        TensorError: they do not agree, or name what is not listed.
-    """
+    """The paints of a table, as `paint_tensors` writes it; raises TensorError where they do not agree."""
     kinds, rows, result, first = list(STEPS), steps.tolist(), [], 0
     if not all(kind in range(len(kinds)) for kind, *_ in rows):
         raise TensorError("a paint with a step that this version does not know")
@@ -367,11 +357,7 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "objects": ("I32", ()),
     "places": ("I32", (5,)),
 }
-_OPTIONAL: dict[str, tuple[str, tuple[int, ...]]] = {
-    "numbers": ("I32", ()),
-    "forms": ("I32", ()),
-    "worn": ("I32", ()),
-}
+_OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
 _TABLES: dict[str, tuple[str, tuple[int, ...]]] = {"paints": ("I32", (2,)), "steps": ("F32", (4,))}
 _HEADER: dict[str, Any] = {
     "background": list | None,

@@ -42,12 +42,10 @@ from scenelang.language.diagnostics import Diagnostics, Label
 
 
 class Context(Record):
-    """The model a graph is compiled for and where its mistakes go.
+    """The model a graph is compiled for, and where its mistakes (E04xx, E05xx) and warnings go.
 
-    Args:
-        diagnostics: receives E04xx, E05xx and warnings.
-        whole: False after an earlier error, when leaves may lack moves and no bound means anything.
-        moves: the scene is a frame of an animation, where nothing may be in sight for a while.
+    ``whole`` is False after an earlier error, when no bound means anything. ``moves`` is True for a frame of
+    an animation, where nothing may be in sight for a while.
     """
 
     manifest: Manifest
@@ -59,9 +57,8 @@ class Context(Record):
 def drop_empty(graph: Graph, context: Context) -> Graph:
     """Drop empty folds, and replace folds with one child by that child.
 
-    A fold without links is the empty set, at distance +infinity from everywhere. So a union, `smooth` or
-    subtraction with it changes nothing, subtracting from it or intersecting it leaves it empty, and what
-    is joined to it by union or `smooth` begins the stream anew. All of it is exact, colours too.
+    A fold without links is the empty set, at distance +infinity. A union, `smooth` or subtraction with it
+    changes nothing; subtracting from it or intersecting it leaves it empty. All of it is exact, colours too.
 
     Before: any graph. After: COMPOSITE.
     """
@@ -163,10 +160,8 @@ Cover = tuple[float, Rows, float]
 def drop_hidden(graph: Graph, context: Context) -> Graph:
     """Drop unions and subtractions whose whole leaf lies inside one that a later union draws.
 
-    The effect of a row on the picture stays within its leaf, and there the later union alone decides the
-    sign of the distance and the colour. A blend uses distances, so rows before the last blend stay. A leaf
-    that is drawn twice in the very same place is covered too. A group without blends has its effect within
-    its leaves.
+    A row's effect stays within its leaf, and there the later union alone decides. A blend uses distances, so
+    rows before the last blend stay, and groups with blends. A leaf drawn twice in one place is covered too.
 
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
@@ -294,9 +289,8 @@ class _Open(Record, frozen=False):
 def push_transforms(graph: Graph, context: Context) -> Graph:
     """Append to each leaf's moves those of all folds around it, from the inside out.
 
-    Moves that do nothing vanish and neighbouring affine maps compose, in float64, so that the chain which
-    each group hands down stays short however deep it stands. A leaf's world distance is defined by its
-    whole chain, so only the place of the chain changes.
+    Moves that do nothing vanish and neighbouring affine maps compose, so that chains stay short at any depth.
+    A leaf's world distance is defined by its whole chain, so only the place of the chain changes.
 
     Before: any graph. After: AT_LEAVES, MERGED.
     """
@@ -334,12 +328,9 @@ def _tidy(node: Node, outward: Moves) -> Moves:
 
 
 def fold_looks(graph: Graph, context: Context) -> Graph:
-    """Apply the colour operations of constant materials to their white, and drop moves of their textures.
+    """Fold constant materials to colours; compose moves of textures, normalise their colour operations.
 
-    The moves of a texture compose to one, and its colour operations take their normal form. Objects that
-    share a look still share it afterwards.
-
-    Before: any graph. After: LOOKS.
+    Objects that share a look still share it afterwards. Before: any graph. After: LOOKS.
     """
     folded: dict[int, Look] = {}
 
@@ -355,11 +346,9 @@ def fold_looks(graph: Graph, context: Context) -> Graph:
 def fold_warps(graph: Graph, context: Context) -> Graph:
     """Merge warps, moving them towards the leaf past rotations, reflections and uniform scales.
 
-    Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and each leaf's moves are in the normal form of
-    `scenelang.compiler.chain.normal`, where the rules are proved.
+    A learned lifting knows no merged ones: for it identities alone are dropped.
 
-    A learned lifting knows twirls and bends by themselves, as they are written, and no merged ones: for it
-    identities alone are dropped.
+    Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and chains are in the form of `chain.normal`.
     """
     exact = context.manifest.lifting == "exact"
 

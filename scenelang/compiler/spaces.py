@@ -1,40 +1,33 @@
 """The plane and the solid world: maps and deformations that stay in them, bounds of leaves, the stage.
 
-A model's manifest states its dimension; `SPACES` has the space, which is handed down from there. Nothing
-else in the compiler asks whether a scene is flat.
+Nothing else in the compiler asks whether a scene is flat: a model's manifest states the dimension.
 
 Maps and turns. A warp turns (x, y), a twist (x, z); call that plane P, and its axis a. Let M keep P and a
 apart and be s times an orthogonal matrix Q on P, with no shift in P, and m times a coordinate, plus c, along
-a. As R(w) turns P alone, M^-1 R(w) M is R(+-w), the sign being the determinant of Q. So a point M u, which a
-turn by the angle w(M u) carries back to M^-1 R(w(M u)) M u, is one that a turn by +-w(M u) carries back from
-u: M trades places with the turn if w(M u) is an angle of the same kind.
+a. As R(w) turns P alone, M^-1 R(w) M is R(+-w), the sign being the determinant of Q. So M trades places with
+the turn by an angle w if w(M u) is an angle of the same kind:
 
 - A twist has w = k y. With c = 0 it is k m times y.
 - A bend has w = k x, which is k s times the entry of Q^T's first column: it stays a bend along x where Q
   keeps that axis, whatever m and c are; slots of a vector hold no other.
 - A twirl has w = k |M u|, which is k s |u| where |m| = s and c = 0.
 
-Balls. A leaf lies in the unit ball and its distance grows no faster than 1, so the points below a level lie
-in a ball of radius 1 + level / stretch, and a displacement by at most its amount widens that by as much. A
-turn keeps lengths, so that it carries a ball into the one about the origin that encloses it.
-
-Boxes of the plane. A leaf lies within the unit disc and its distance grows no faster than 1, so the
-points below a level lie within a disc of radius 1 + level / stretch. An affine map sends a disc into an
-ellipse; a warp keeps lengths and turns each point by an angle that is bounded over any sector about the
-origin.
+Bounds. A leaf lies in the unit disc or ball and its distance grows no faster than 1, so the points below a
+level lie within a radius of 1 + level / stretch; a displacement widens that by its amount. A turn keeps
+lengths, so that it carries a ball into the one about the origin that encloses it. In the plane, where it
+turns each point by an angle that is bounded over any sector about the origin, it carries a sector into one.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
 from struct import pack, unpack
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from scenelang.assets.records import Record
-from scenelang.compiler.geometries import GEOMETRIES, Corner
+from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.steps import (
     IDENTITY,
     Affine,
@@ -82,12 +75,7 @@ def encoded(linear: Triple) -> Triple:
 
 
 class Camera(Record):
-    """The camera.
-
-    Args:
-        eye, target: world points.
-        fov_rad: angle of view across the shorter side of the canvas, in (0, pi).
-    """
+    """The camera: world points, and the angle of view, in (0, pi), across the canvas's shorter side."""
 
     eye: Triple = (0.0, 1.2, 6.0)
     target: Triple = (0.0, 0.0, 0.0)
@@ -128,10 +116,8 @@ class Ground(Record):
 class Stage(Record):
     """All of a 3D scene that is not an object.
 
-    Args:
-        ground: None for a scene without one.
-        horizon, zenith: colours of the sky; the ground fades into the first. A plain background is both.
-        transparent: the sky is not drawn and the picture has alpha.
+    The ground fades into the sky's ``horizon``; a plain background is ``horizon`` and ``zenith``. Where it is
+    ``transparent`` the sky is not drawn and the picture has alpha.
     """
 
     camera: Camera = Camera()
@@ -235,77 +221,6 @@ class Refusal(NamedTuple):
     help: str
 
 
-class Space(ABC):
-    """The geometry of one dimension."""
-
-    dimension: ClassVar[int]
-    shown: ClassVar[tuple[tuple[int, ...], ...]]
-    """Entries of `Rows` that determine a map of this space, row by row."""
-    thinner: ClassVar[str]
-    """The image of everything under a singular map, in words."""
-
-    @abstractmethod
-    def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
-        """The map within this space, or the reason why the transform leaves the space."""
-
-    def idle(self, transform: scene.Transform) -> str | None:
-        """The part of a transform that has no effect in this space, if there is one."""
-        return None
-
-    def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
-        """An operation of a material in the space that colours are averaged in."""
-        return op
-
-    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
-        """The inverse of `inked` for a colour: as it is written."""
-        return rgb
-
-    @abstractmethod
-    def holds(self, rows: Rows) -> bool:
-        """True for maps that `fitted` may give."""
-
-    @abstractmethod
-    def stretches(self, rows: Rows) -> tuple[float, float]:
-        """The smallest and largest singular value of the linear block."""
-
-    @abstractmethod
-    def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """The turn before the map ``rows`` that has the effect of ``turn`` after it, if there is one."""
-
-    def after(self, rows: Rows, turn: Turn) -> Turn | None:
-        """The turn after the map ``rows`` that has the effect of ``turn`` before it, if there is one."""
-        return self.before(inverted(rows), turn)
-
-    @abstractmethod
-    def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
-        """A box around all points of the world whose distance to a leaf is below ``level``.
-
-        Args:
-            geometry: name of the leaf.
-            steps: all its steps into the world, nearest the leaf first.
-            level: world distance, at least 0; 0 for the leaf itself.
-        """
-
-    def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
-        """The bound of a leaf in a Program: the flat box, in space a ball, as centre and radius."""
-        return self.box(geometry, steps, level)[:4]
-
-    @abstractmethod
-    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A disc, or ball, about a leaf's own origin that lies within it, where one is known.
-
-        Returns:
-            Its radius and the map from the world to the leaf.
-        """
-
-    def usable(self, rows: Rows) -> bool:
-        """True where the map has an inverse in float64 that float32 can hold."""
-        smallest, largest = self.stretches(rows)
-        offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
-        # Written so that NaN and infinity fail.
-        return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
-
-
 ALIKE = 1e-12
 """Relative tolerance below which entries of a map, stretches or a right angle count as equal."""
 
@@ -313,27 +228,37 @@ _ROUNDING = 1e-9
 """Balls and boxes grow by this much, relative, to cover the rounding of float64."""
 
 
-class Solid(Space):
-    """The solid world."""
+class Space:
+    """The geometry of the solid world; `Plane` has that of the plane."""
 
     dimension = 3
-    shown = ((0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11))
+    shown: tuple[tuple[int, ...], ...] = ((0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11))
+    """Entries of `Rows` that determine a map of this space, row by row."""
     thinner = "a plane, a line or a point"
+    """The image of everything under a singular map, in words."""
 
     def fitted(self, transform: scene.Transform, rows: Rows) -> Rows | Refusal:
+        """The map within this space, or the reason why the transform leaves the space."""
         return rows
 
+    def idle(self, transform: scene.Transform) -> str | None:
+        """The part of a transform that has no effect in this space, if there is one."""
+        return None
+
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
-        """The operation in linear colours, as light adds up."""
+        """An operation of a material in the space that colours are averaged in; here linear, as light is."""
         return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
 
-    def written(self, rgb: tuple[float, float, float]) -> tuple[float, float, float]:
+    def written(self, rgb: Triple) -> Triple:
+        """The inverse of `inked` for a colour: as it is written."""
         return encoded(rgb)
 
     def holds(self, rows: Rows) -> bool:
+        """True for maps that `fitted` may give."""
         return True
 
     def stretches(self, rows: Rows) -> tuple[float, float]:
+        """The smallest and largest singular value of the linear block."""
         a, b, c = rows[0], rows[1], rows[2]
         d, e, f = rows[4], rows[5], rows[6]
         g, h, i = rows[8], rows[9], rows[10]
@@ -364,7 +289,10 @@ class Solid(Space):
         return min(smallest, middle), largest
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """A turn in the plane of x and j; the module's docstring has the proof."""
+        """The turn before the map ``rows`` that has the effect of ``turn`` after it, if there is one.
+
+        The module's docstring has the proof.
+        """
         # P is the plane of x and j, k the axis a; entry (r, c) of the map is rows[4 r + c].
         j, k = (2, 1) if isinstance(turn, Twist) else (1, 2)
         a, b, c, d, along = rows[0], rows[j], rows[4 * j], rows[5 * j], rows[5 * k]
@@ -385,7 +313,12 @@ class Solid(Space):
             return None
         return type(turn)(sign * scale * turn.twirl, (sign * a * bend, 0.0)) if not turn.bend[1] else None
 
+    def after(self, rows: Rows, turn: Turn) -> Turn | None:
+        """The turn after the map ``rows`` that has the effect of ``turn`` before it, if there is one."""
+        return self.before(inverted(rows), turn)
+
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
+        """A box of all points of the world at a distance below ``level`` >= 0 of a leaf with such steps."""
         (x, y, z), radius, rows = self._ball(steps, level)
         sides = []
         for row in (rows[:4], rows[4:8], rows[8:]):
@@ -399,12 +332,13 @@ class Solid(Space):
         return xmin, ymin, xmax, ymax, zmin, zmax
 
     def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
+        """The bound of a leaf in a Program: centre and radius of a ball, in the plane the flat box."""
         (x, y, z), radius, rows = self._ball(steps, level)
         x, y, z = _mapped(rows, (x, y, z))
         radius *= self.stretches(rows)[1]
         return x, y, z, radius + _ROUNDING * (1.0 + hypot(x, y, z) + radius)
 
-    def _ball(self, steps: Sequence[Step], level: float) -> tuple[tuple[float, float, float], float, Rows]:
+    def _ball(self, steps: Sequence[Step], level: float) -> tuple[Triple, float, Rows]:
         """Centre and radius of a ball around all points below a level, and the affine map behind it."""
         radius, pending = 1.0, IDENTITY
         if level > 0.0:
@@ -424,15 +358,25 @@ class Solid(Space):
         return centre, radius, pending
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A ball; turns before the first affine map leave one about the origin in place."""
+        """Radius of a disc or ball about a leaf's origin within it, and the map from the world to the leaf.
+
+        Turns before the first affine map leave it in place. None where none is known.
+        """
         maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
         inner = row.inner - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
         return (inner, inverted(composed(steps))) if inner > 0.0 else None
 
+    def usable(self, rows: Rows) -> bool:
+        """True where the map has an inverse in float64 that float32 can hold."""
+        smallest, largest = self.stretches(rows)
+        offset = max(abs(rows[3]), abs(rows[7]), abs(rows[11]), 1.0)
+        # Written so that NaN and infinity fail.
+        return smallest > SINGULAR * largest and offset < REACH * smallest and largest < REACH
 
-def _mapped(rows: Rows, p: tuple[float, float, float]) -> tuple[float, float, float]:
+
+def _mapped(rows: Rows, p: Triple) -> Triple:
     x, y, z = p
     a, b, c, u, d, e, f, v, g, h, i, w = rows
     return a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
@@ -466,6 +410,12 @@ class Plane(Space):
         if not isinstance(transform, scene.Scale) or transform.z in (1.0, transform.x):
             return None  # `scale(s)` has the same factor along all axes
         return f"`scale` by {transform.z:g} along z"
+
+    def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
+        return op
+
+    def written(self, rgb: Triple) -> Triple:
+        return rgb
 
     def holds(self, rows: Rows) -> bool:
         return not rows[2] and not rows[6] and rows[8:] == IDENTITY[8:]
@@ -502,16 +452,19 @@ class Plane(Space):
         if any(isinstance(step, Warp) for step in steps):
             return _grown(_warped(steps, 1.0 + reach))
         row = GEOMETRIES.get(geometry)
-        return _grown(_straight(row.corners if row else (), rows, reach))
+        a, b, x, c, d, y = rows[0], rows[1], rows[3], rows[4], rows[5], rows[7]
+        wide, high = reach * hypot(a, b), reach * hypot(c, d)
+        if row is None or not row.corners:
+            wide, high = wide + hypot(a, b), high + hypot(c, d)
+            return _grown((x - wide, y - high, x + wide, y + high))
+        across = [a * p + b * q for p, q in row.corners]
+        along = [c * p + d * q for p, q in row.corners]
+        return _grown(
+            (x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high)
+        )
 
-    def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """A disc; warps before the first affine map leave one about the origin in place."""
-        row = GEOMETRIES.get(geometry)
-        if row is None or not row.inner or not all(isinstance(step, Affine) for step in steps[-1:]):
-            return None
-        if any(isinstance(step, Affine) for step in steps[:-1]):
-            return None
-        return row.inner, inverted(composed(steps))
+    def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
+        return self.box(geometry, steps, level)[:4]
 
 
 def flattened(rows: Rows) -> Rows:
@@ -549,18 +502,6 @@ def _grown(box: tuple[float, float, float, float]) -> Box:
     grown = (left - more, bottom - more, right + more, top + more, 0.0, 0.0)
     # NaN compares false: what overflowed may be anywhere.
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
-
-
-def _straight(corners: tuple[Corner, ...], rows: Rows, reach: float) -> tuple[float, float, float, float]:
-    a, b, x = rows[0], rows[1], rows[3]
-    c, d, y = rows[4], rows[5], rows[7]
-    wide, high = reach * hypot(a, b), reach * hypot(c, d)
-    if not corners:
-        wide, high = wide + hypot(a, b), high + hypot(c, d)
-        return x - wide, y - high, x + wide, y + high
-    across = [a * p + b * q for p, q in corners]
-    along = [c * p + d * q for p, q in corners]
-    return x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high
 
 
 @dataclass(slots=True)
@@ -639,4 +580,4 @@ def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, 
 
 
 PLANE: Final = Plane()
-SPACES: Final[dict[int, Space]] = {2: PLANE, 3: Solid()}
+SPACES: Final[dict[int, Space]] = {2: PLANE, 3: Space()}

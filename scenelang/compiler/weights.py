@@ -37,7 +37,7 @@ class Codes:
 
     Args:
         geometry: leaf name to code, 4 numbers; of a learned lifting the whole vector.
-        material: material name to code, 12 numbers; likewise.
+        material: material name to code, 12 numbers, or 2 in space; likewise.
         digest: SHA-256 of the weights file, hex.
         lifting: the encoders of a learned lifting.
     """
@@ -46,21 +46,6 @@ class Codes:
     material: dict[str, tuple[float, ...]]
     digest: str
     lifting: Lifting | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Facts about a weights file.
-
-    Args:
-        digest: SHA-256 of the file, hex.
-        training: its header: config, seed, iterations, seconds, device, revision.
-    """
-
-    digest: str
-    bytes: int
-    parameters: int
-    training: dict[str, Any]
 
 
 def replaced(digest: str) -> str:
@@ -121,17 +106,18 @@ def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tu
             raise ModelError(f"damaged weights: tensor `{name}` {held}, where {wanted}")
 
 
-def read_facts(name: str) -> Facts:
-    """Facts about the weights file of a shipped model.
+def read_facts(name: str) -> dict[str, Any]:
+    """Facts about a shipped model's weights: SHA-256, bytes, parameters and the header of their training.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
         ModelError: it is damaged.
     """
     data = read_regular(weights_path(name), MOST_BYTES)
     header, arrays = open_weights(data)
     parameters = sum(array.size for array in arrays.values())
-    return Facts(hashlib.sha256(data).hexdigest(), len(data), parameters, header)
+    digest = hashlib.sha256(data).hexdigest()
+    return {"digest": digest, "bytes": len(data), "parameters": parameters, "training": header}
 
 
 @lru_cache(maxsize=8)

@@ -30,9 +30,7 @@ class Options(Care, total=False):
 
 
 class How(NamedTuple):
-    """A way to draw pictures, alike for stills, films, sweeps and what is watched.
-
-    The command line has an option for each field, with the line of `HELP`.
+    """A way to draw pictures, alike for stills, films, sweeps and what is watched; `HELP` has its options.
 
     Args:
         backend: ``"neural"`` draws with the trained network, ``"exact"`` with formulas of the shapes in its

@@ -146,10 +146,7 @@ def given(
     size: tuple[int, int] | None,
     backend: Backend,
 ) -> tuple[Program | Scene, Spans | None]:
-    """Input of a backend: a Scene for the reference, a Program for the others; raises as `render`.
-
-    With a Scene of a file comes where its nodes were written.
-    """
+    """Input of a backend: a Scene, and where it was written, for the reference, else a Program."""
     from scenelang.compiler.program import Program
 
     result = program_or_scene
@@ -341,9 +338,10 @@ def _check(wanted: Sequence[Output], flat: bool) -> None:
 def _sources(
     numbers: Sequence[int], names: Sequence[str], places: Sequence[Place | None]
 ) -> dict[int, Source]:
-    rows = zip(numbers, names, places, strict=True)
-    return {n: {"geometry": name, **_written(place)} for n, name, place in rows}
-
-
-def _written(place: Place | None) -> Source:
-    return {} if place is None else {"file": place.file, "line": place.line, "column": place.column}
+    return {
+        n: {
+            "geometry": name,
+            **({} if at is None else {"file": at.file, "line": at.line, "column": at.column}),
+        }
+        for n, name, at in zip(numbers, names, places, strict=True)
+    }

@@ -17,9 +17,8 @@ from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError, replaced
 from scenelang.drawing.how import RenderError, keep_memory, threads_for
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.neural.load import Model, Network, load_model, place_of
+from scenelang.drawing.neural.load import Framed, Model, Network, Solids, load_model, place_of
 from scenelang.drawing.neural.paper import draw_whole
-from scenelang.drawing.neural.torch_networks import Framed, Solids
 
 try:
     import torch
@@ -80,8 +79,7 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
 def _one_torch_thread() -> Iterator[None]:
     """Torch computes each operation on one core meanwhile.
 
-    The setting is partly the process's and partly a thread's, and worker threads take it over when they
-    start; so it is set around the pool, not inside it, and put back.
+    It is set around the pool, not inside it: worker threads take the setting over when they start.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -30,9 +30,8 @@ from scenelang.drawing.arrays_torch import TORCH
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.frames import Affine, Warp, way_back
-from scenelang.drawing.neural.load import load_model
+from scenelang.drawing.neural.load import Framed, load_model
 from scenelang.drawing.neural.network import EMPTY, Cell, FramedArrays
-from scenelang.drawing.neural.torch_networks import Framed
 from scenelang.inverse.search import WHITE, Point, SearchBox
 
 

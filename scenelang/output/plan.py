@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from scenelang.compiler.choose import why_chosen
+from scenelang.compiler.compile import why_chosen
 from scenelang.compiler.graph import Fold, Graph, nodes
 from scenelang.compiler.groups import OPERATOR
 from scenelang.compiler.lower import Spans, lower
@@ -18,13 +18,14 @@ from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.drawing.neural.draw import Drawing
-from scenelang.drawing.neural.load import Model, place_of
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.solid.march import Work
-from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS
+
+if TYPE_CHECKING:
+    from scenelang.drawing.neural.load import Model
 
 REPEATS = 3
 
@@ -121,6 +122,9 @@ def drawing_cost(
         ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
         (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
     """
+    from scenelang.drawing.neural.load import place_of
+    from scenelang.drawing.torch_backend import draw_program
+
     by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
 
     times = []

@@ -148,11 +148,6 @@ def test_networks(name: str) -> None:
         assert str(caught.value)
 
 
-def test_weights_of_an_earlier_version_are_called_that() -> None:
-    with pytest.raises(ModelError, match="earlier framed renderer"):
-        load_network(network(cell_width=16), SHAPES)
-
-
 def test_the_shipped_weights_are_none_of_these() -> None:
     assert codes_of(SHAPES, DATA).geometry.keys() == set(SHAPES.geometries)
     load_network(arrays(), SHAPES)

@@ -128,12 +128,12 @@ def prove(scenes: int, first: int = 0) -> Proof:
     proof = Proof()
     seed = first
     while proof.scenes < scenes:
-        _compare(stages(full_scene(seed)), seed, proof)
+        compare(stages(full_scene(seed)), seed, proof)
         seed += 1
     return proof
 
 
-def _compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
+def compare(found: list[tuple[str, Graph]], seed: int, proof: Proof) -> None:
     graph = found[0][1]
     _, height = graph.canvas
     points = sample_points(graph.canvas, range(height), 2)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from lab.matrices import affine_matrix, leaf_vector, warp_matrix
 from scenelang.compiler.chain import Levels
 from scenelang.compiler.lifting import (
     OTHERS,
@@ -14,11 +15,8 @@ from scenelang.compiler.lifting import (
     WIDTH,
     Layout,
     Parts,
-    affine_matrix,
-    leaf_vector,
     lift_colours,
     lift_many,
-    warp_matrix,
 )
 from scenelang.compiler.steps import Affine, Rows, Step, Warp
 from scenelang.drawing.arrays import NUMPY

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
-import random
 from dataclasses import replace
 from math import pi
 
@@ -145,6 +143,13 @@ def test_names_that_the_model_lacks() -> None:
     assert "did you mean `square`" in (diagnostics.items[1].help or "")
 
 
+def test_sizes_and_backgrounds_that_a_model_does_not_draw() -> None:
+    fixed = replace(SHAPES, sizes=((64, 64),), white=True)
+    assert lowered(manifest=fixed, canvas=(64, 64))[1] == []
+    assert lowered(manifest=fixed, canvas=(64, 32))[1] == ["E0509"]
+    assert lowered(manifest=fixed, canvas=(64, 64), background=None)[1] == ["E0510"]
+
+
 def test_too_many_objects() -> None:
     diagnostics = Diagnostics()
     node = schema.Object(geometry="star")
@@ -181,16 +186,6 @@ def test_colours_in_order_and_clamped() -> None:
         ((grey(amount=5), hue(angle=1)), (1, 1, 1)),
     ):
         assert coloured(colour_steps(ops)) == pytest.approx(rgb)
-
-
-def test_hue_agrees_with_colorsys() -> None:
-    rng = random.Random(9)
-    for _ in range(300):
-        rgb = (rng.random(), rng.random(), rng.choice([0.0, rng.random(), 1.0]))
-        turns = rng.uniform(-3, 3)
-        h, s, v = colorsys.rgb_to_hsv(*rgb)
-        ours = coloured(colour_steps((schema.Color(rgb=rgb), schema.Hue(angle=turns * 2 * pi))))
-        assert ours == pytest.approx(colorsys.hsv_to_rgb((h + turns) % 1, s, v), abs=1e-9)
 
 
 def test_verify_names_the_pass() -> None:

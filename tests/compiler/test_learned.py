@@ -71,18 +71,3 @@ def test_a_merged_warp_has_no_encoder() -> None:
     lifting = read_lifting(tensors(encoders()))
     with pytest.raises(ValueError, match="no encoder"):
         lift_geometry(lifting, [[Warp(0.1, (0.2, 0.0))]], [0])
-
-
-def test_a_fresh_encoder_is_near_the_identity() -> None:
-    torch.manual_seed(0)
-    network = Encoders(LiftingConfig(), 4, 1)
-    with torch.no_grad():
-        made = network.geometry["affine"](torch.randn(10, 16))
-    assert float((made - torch.eye(32)).norm(dim=(1, 2)).max()) < 2.0
-
-
-@pytest.mark.parametrize("size", [1, 2, 4, 8, 16, 32, 64])
-def test_representations_of_every_size_of_table_1(size: int) -> None:
-    network = Encoders(LiftingConfig(size, size, 8), 4, 1)
-    lifting = read_lifting(tensors(network))
-    assert lift_geometry(lifting, [[Affine(steps.rotation(1.0))]], [3]).shape == (1, size)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.lifting import PLANE_LAYOUT, affine_matrix
+from scenelang.compiler.lifting import PLANE_LAYOUT
+from scenelang.compiler.passes import OPTIONAL
 from scenelang.compiler.program import Place, Program, ProgramError
 from scenelang.compiler.weights import load_codes
 from scenelang.language import scene as schema
@@ -47,24 +48,6 @@ def test_a_chain_is_four_rows() -> None:
     assert frame == pytest.approx(np.array([[1.25, 0, 0.25], [0, 1.25, 0]]))
 
 
-def test_a_row_is_the_product_of_its_matrices() -> None:
-    code = load_codes("shapes2d").geometry["square"]
-    rows = (0.5, 0.0, 0.0, 0.1, 0.0, 0.5, 0.0, 0.2, 0.0, 0.0, 1.0, 0.0)
-    bare = compile_scene(schema.Scene(nodes=(schema.Object("square"),)))
-    moved = compile_scene(
-        schema.Scene(
-            nodes=(
-                schema.Object(
-                    "square", transforms=(schema.Scale(x=0.5, y=0.5, z=1), schema.Translate(x=0.1, y=0.2))
-                ),
-            )
-        )
-    )
-    expected = affine_matrix(rows) @ bare.vectors[0]
-    assert moved.vectors[0] == pytest.approx(expected, abs=1e-6)
-    assert tuple(bare.vectors[0, :4]) == pytest.approx(code)
-
-
 def test_an_empty_scene_has_no_rows() -> None:
     program = compile_scene(schema.Scene(background=None, canvas=(10, 20)))
     assert len(program) == 0
@@ -99,13 +82,12 @@ def test_rows_off_the_canvas_are_not_there() -> None:
     assert compiled(f"canvas(2048, 256); {on} {off}")[0].objects == ("star", "square")
 
 
-def test_rows_that_are_drawn_over_are_not_there() -> None:
-    small, big = "star { scale(0.2); }", "square { scale(0.9); }"
-    assert compiled(small + big)[0].objects == ("square",)
-    assert compiled(big + small)[0].objects == ("square", "star")
-    assert compiled(f"chain {{ {big} subtract {small} {big} }}")[0].objects == ("square",)
-    assert compiled(f"chain {{ {small} {big} smooth {small} }}")[0].objects == ("star", "square", "star")
-    assert compiled(f"chain {{ {small} twirl(1); }}" + big)[0].objects == ("square",)
+def test_passes_that_only_save_work_can_be_left_out() -> None:
+    text = "square { scale(2); } star { scale(0.2); } pentagon { translate(5, 0); } square { scale(3); }"
+    assert compiled(text)[0].objects == ("square",)
+    assert compiled(text, without=OPTIONAL)[0].objects == ("square", "star", "pentagon", "square")
+    with pytest.raises(ValueError, match="flatten"):
+        compiled(text, without={"flatten"})
 
 
 def test_the_same_scene_gives_the_same_program() -> None:

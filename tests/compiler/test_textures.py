@@ -17,7 +17,6 @@ from scenelang.compiler.graph import Graph
 from scenelang.compiler.lifting import LAYOUTS
 from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.exact.picture import reference_image
-from scenelang.editors.dumps import dump, graph_data, program_data
 from scenelang.language.diagnostics import Diagnostics
 from tests.assets.shapes import noise
 
@@ -199,21 +198,6 @@ def test_passes_keep_the_exact_picture(geometries: tuple[str, str]) -> None:
     assert len(np.unique(drawn["lower"].reshape(-1, 3).round(3), axis=0)) > 50
     for name, picture in drawn.items():
         np.testing.assert_allclose(picture, drawn["lower"], atol=2e-6, err_msg=name)
-
-
-def test_dumps_tell_of_textures() -> None:
-    ops = (nsg.Flip(), nsg.Grayscale(0.5))
-    program, graphs = compiled(nsg.Material("zoo.bark", ops)), dict[str, Any]()
-    scene = nsg.Scene(elements=ZOO, nodes=nsg.Object("square", (), nsg.Material("zoo.bark", ops)))
-    compile_scene(scene, after=graphs.__setitem__)
-    assert dump(graphs["fold_looks"]).splitlines()[1] == "  square bark [-1 0 0; 0 1 0] grayscale(0.5)"
-    assert graph_data(graphs["lower"])["root"]["links"][0]["node"]["texture"] == {
-        "name": "bark",
-        "digest": BARK.digest,
-        "steps": [("grayscale", 0.5)],
-        "moves": [[[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]],
-    }
-    assert program_data(program)["rows"][0]["texture"]["steps"] == [("grayscale", 0.5)]
 
 
 def test_an_error_says_that_a_scene_is_flat_or_solid() -> None:

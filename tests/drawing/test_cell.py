@@ -5,17 +5,17 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from lab.training.network import Trainee
 from scenelang.drawing.exact.field import fold
 from scenelang.drawing.neural.network import TOKENS, FramedConfig
-from scenelang.drawing.neural.torch_networks import Framed
 from scenelang.language.words import BLEND
 
 STEEP = 1e7
 
 
-def ideal() -> Framed:
+def ideal() -> Trainee:
     """A cell whose lines are written down rather than learned: the fold of the language."""
-    network = Framed(FramedConfig(), 4, 1).double().requires_grad_(False)
+    network = Trainee(FramedConfig(), 4, 1).double().requires_grad_(False)
     k = 1 / (2 * BLEND)
     # rows of d and D; columns of take and of the two lines of paint
     lines = [
@@ -32,7 +32,7 @@ def ideal() -> Framed:
     return network
 
 
-def stream(network: Framed, d: Tensor, colours: Tensor, tokens: Tensor) -> tuple[Tensor, Tensor]:
+def stream(network: Trainee, d: Tensor, colours: Tensor, tokens: Tensor) -> tuple[Tensor, Tensor]:
     """State and register after objects at distances d (N, P) of colours (N, 3)."""
     weights = network.cell_weights()
     state, colour = d[0][None, None], colours[0][:, None].expand(1, 3, d.shape[1])
@@ -60,7 +60,7 @@ def test_lines_express_the_whole_fold() -> None:
 
 def test_a_shut_gate_is_shut_and_asks_for_nothing() -> None:
     """Outside its interval a gate is 0 or 1 exactly, and no gradient comes through it."""
-    network = Framed(FramedConfig(), 4, 1)
+    network = Trainee(FramedConfig(), 4, 1)
     levels = torch.tensor([[[-0.01, 1.01], [-3.0, 0.3], [-0.2, 7.0]]], requires_grad=True)
     state, colour = torch.full((1, 1, 2), 0.25), torch.zeros(1, 3, 2)
     bump, shown = torch.full((1, 1, 1), 0.1), torch.ones(1, 3, 1)
@@ -72,7 +72,7 @@ def test_a_shut_gate_is_shut_and_asks_for_nothing() -> None:
 
 
 def test_a_narrower_gate_blends_less() -> None:
-    network = Framed(FramedConfig(), 4, 1).requires_grad_(False)
+    network = Trainee(FramedConfig(), 4, 1).requires_grad_(False)
     network.bump.fill_(0.5)
     wide = network.cell_weights()[3]
     network.cell_gain.fill_(2.0)
@@ -82,7 +82,7 @@ def test_a_narrower_gate_blends_less() -> None:
 def test_a_given_state_replaces_the_network_s_own() -> None:
     """Given what it answers itself a stream is unchanged; given something else, one step follows from it."""
     torch.manual_seed(1)
-    network, g = Framed(FramedConfig(), 4, 1).requires_grad_(False), torch.Generator().manual_seed(2)
+    network, g = Trainee(FramedConfig(), 4, 1).requires_grad_(False), torch.Generator().manual_seed(2)
     q = torch.randn(2, 4, 2, 30, generator=g)
     scale, code, colours = (
         torch.ones(2, 4),

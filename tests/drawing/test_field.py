@@ -269,7 +269,7 @@ def test_what_reaches_everywhere_is_not_taken_over(network) -> None:
         np.testing.assert_array_equal(drawn(network, p, split=split, kept=kept)[0], alone)
 
 
-@pytest.mark.parametrize("shift", np.linspace(0, 0.2, 9))
+@pytest.mark.parametrize("shift", [0.025, 0.1, 0.2])
 def test_a_tile_is_drawn_again_when_something_comes_near(network, shift: float) -> None:
     """Objects that move in and out of rows by parts of a pixel, past the edges of tiles."""
     kept = Kept()

@@ -21,7 +21,6 @@ from scenelang.compiler.groups import (
     felt,
     read_groups,
     token_fault,
-    token_name,
     widths_of,
 )
 from scenelang.compiler.program import Program, ProgramError, parse_program, program_bytes
@@ -207,10 +206,6 @@ def test_a_program_with_groups_is_format_4_and_comes_back() -> None:
         assert again.extended == (kind == 4)
 
 
-def test_names_of_tokens() -> None:
-    assert [token_name(t) for t in (0, 2 | BEGINS, 3 | 2 << ENDS)] == ["union", "subtract (", "intersect ))"]
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_how_far_rows_matter_is_the_same_for_flat_streams_by_either_way(seed: int) -> None:
     rng, count = RNG(seed), 8
@@ -257,9 +252,8 @@ def test_what_is_cut_out_of_a_rounded_operand_matters_everywhere() -> None:
     assert felt(groups, np.zeros(3)).everywhere.tolist() == [False, True, False]
 
 
-@pytest.mark.parametrize("anchored", [True, False])
 def test_what_is_intersected_is_taken_where_nothing_of_the_group_is_near(
-    anchored: bool, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A group's later rows may hide its first one in a block, and be out of reach in a smaller one."""
     scene = nsg.loads(
@@ -270,13 +264,9 @@ def test_what_is_intersected_is_taken_where_nothing_of_the_group_is_near(
     program = nsg.compile(scene)
     field = Field(NETWORK, program.vectors, program.tokens)
     monkeypatch.setattr("scenelang.drawing.neural.coverage.ENOUGH", 0)
-    if not anchored:
-        field.reach = np.where(
-            np.isinf(field.reach) & (field.tokens == 0) & ~field.groups.first, 1.02, field.reach
-        )
     white = np.ones(3, np.float32)
     pruned, whole = (
         Coverage(field, skip=skip).tile((256, 256), range(256), "four", white).picture
         for skip in (True, False)
     )
-    assert (abs(pruned - whole).max() < 1 / 255) == anchored
+    assert abs(pruned - whole).max() < 1 / 255

@@ -47,7 +47,7 @@ def assert_same(p: Program, **options: str) -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_look_the_same(path: Path) -> None:
     scene = nsg.load(path)
-    assert_same(compile_scene(scene.model_copy(update={"canvas": (101, 75)})))
+    assert_same(compile_scene(scene.model_copy(update={"canvas": (51, 37)})))
 
 
 def test_random_scenes_look_the_same() -> None:

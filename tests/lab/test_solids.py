@@ -13,7 +13,7 @@ from lab.training.config import SolidsConfig, config_data, is_solids, read_solid
 from lab.training.leaves import half_rays
 from lab.training.solids import fit_cell, fit_decoders, polish_decoders, train_solids
 from scenelang.drawing.neural.files import load_arrays, solid_arrays
-from scenelang.drawing.neural.torch_networks import Solids
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid.network import SolidArrays, SolidConfig
 
 TINY = SolidsConfig("solids3d", 3, 4, 4, 20, 4, SolidConfig(width=4, segment=4))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
-from scenelang.compiler.choose import scene_dimension
+from scenelang.compiler.compile import scene_dimension
 from scenelang.compiler.lower import lower
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage, decoded, stage_of

@@ -47,7 +47,7 @@ def _facts(manifest: Manifest) -> dict[str, Any]:
     from scenelang.compiler.weights import ModelError, read_facts
 
     try:
-        weights: dict[str, Any] | None = asdict(read_facts(manifest.name))
+        weights: dict[str, Any] | None = read_facts(manifest.name)
     except (OSError, ModelError):
         weights = None
     return {"manifest": asdict(manifest), "weights": weights}

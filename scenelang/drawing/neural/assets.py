@@ -23,7 +23,6 @@ def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corne
     """Values (…, M) inside cells of a grid, linear along each axis.
 
     Args:
-        xp: the library.
         flat: values at nodes (…, K), the last axis first to change.
         first: the least node (M,) of each cell.
         share: how far into the cell a point lies, d times (M,).
@@ -48,14 +47,7 @@ def _between(a: Array, b: Array, share: Array) -> Array:
 
 
 class Lattice:
-    """Values at nodes of [-1, 1]^d, linear between them.
-
-    Args:
-        xp: the library.
-        flat: values (…, n^d), the last axis first to change.
-        side: n.
-        d: 2 or 3.
-    """
+    """Values (…, n^d), the last axis first to change, at nodes of [-1, 1]^d, linear between them."""
 
     def __init__(self, xp: Arrays, flat: Array, side: int, d: int) -> None:
         self.xp, self.d, self.half = xp, d, (side - 1) / 2
@@ -128,11 +120,7 @@ def _grid(element: Element) -> np.ndarray:
 
 
 def grid_shape(element: Element, xp: Arrays, like: Array) -> GridShape:
-    """The shape of an element, where an array lies.
-
-    Raises:
-        ProgramError: the element is damaged.
-    """
+    """The shape of an element, where an array lies; raises ProgramError where it is damaged."""
     grid = _grid(element)
     return GridShape(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
 
@@ -199,11 +187,7 @@ def _nodes(element: Element, light: bool) -> np.ndarray:
 
 
 def stepped(xp: Arrays, rgb: Array, steps: tuple[ColourStep, ...]) -> Array:
-    """Colours (3, M) behind colour steps, clamped after each.
-
-    Args:
-        steps: of a paint.
-    """
+    """Colours (3, M) behind a paint's colour steps, clamped after each."""
     for name, *numbers in steps:
         if name == "color":
             rgb = rgb * xp.array(np.array(numbers, np.float32)[:, None], rgb)

@@ -19,17 +19,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenelang.compiler.groups import SMOOTH, UNION
-from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.arrays import Array
 from scenelang.drawing.neural.field import NO_TEXTURE, Field, Trace
 from scenelang.drawing.neural.meetings import (
     LEVELS,
     ROUNDING,
+    Closing,
     Index,
     Meetings,
-    Nesting,
     Pairs,
     Raster,
     meetings_of,
+    nesting,
     raster,
 )
 from scenelang.drawing.neural.network import RADIUS
@@ -101,7 +102,7 @@ def add_textures(
         px: side of the pixels for which textures are looked up four times, world units; 0: once.
     """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    shares = trace.shares(meetings, field.nesting(meetings), seen)
+    shares = trace.shares(xp, nesting(meetings, field.groups), seen)
     groups, columns = seen.shape
     offsets = xp.array(QUARTER * np.float32(px), p)[:, :, None] if px else None
     total = xp.full((3, groups * columns), 0.0, p)
@@ -273,19 +274,33 @@ class Coverage:
             side, meetings = self.meetings(grid, tile)
             blocks = grid.blocks(result[..., None], side)
             for columns, part, points in self._pixels(grid, side, meetings):
-                own = np.zeros(points.shape[1:], np.int32)
                 trace = self.field.trace(points.shape[1], len(part.pairs))
                 memory = self.ask(part, points, tile, trace)[2]
                 painted = self.xp.to_numpy(trace.paint) > 0.5
-                if (nest := self.field.nesting(part)) is not None:
-                    own = _owners(self.xp, nest, trace, painted, part.pairs.object)
-                for slot in part.slots() if nest is None else ():
-                    some = own[:, : slot.stop - slot.start]
-                    some[:] = np.where(painted[:, slot], part.pairs.object[slot] + 1, some)
+                own = self._owners(part, trace, painted)
                 covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
                 values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
                 blocks[columns[1] // side, :, columns[0] // side] = values
         return result[: len(rows), : canvas[0]]
+
+    def _owners(self, meetings: Meetings, trace: Trace, painted: np.ndarray) -> np.ndarray:
+        """Numbers (groups, B), from 1, of the objects that paint; 0 for none."""
+        nest, count = nesting(meetings, self.field.groups), len(meetings.columns)
+        own = np.zeros((len(painted), nest.levels * count), np.int32)
+        rounds = iter(trace.joined)
+
+        def close(closings: list[Closing]) -> None:
+            for (columns, _, level), (_, paint, *_) in zip(closings, rounds, strict=False):
+                top, below = level * count + columns, (level - 1) * count + columns
+                own[:, below] = np.where(self.xp.to_numpy(paint) > 0.5, own[:, top], own[:, below])
+                own[:, top] = 0
+
+        for turn in nest.turns:
+            close(turn.before)
+            at, part = nest.places(turn, count), turn.part
+            own[:, at] = np.where(painted[:, part], meetings.pairs.object[part] + 1, own[:, at])
+            close(turn.after)
+        return own[:, :count]
 
     def _pixels(
         self, grid: Raster, side: int, meetings: Meetings
@@ -388,37 +403,10 @@ class Coverage:
         shown = self.field.proved(meetings, middle[source], rise[source])
         low, high = shown.picture
         flat = (high - low).max(0) <= FLAT
-        # back in the order of pairs, where those in front of an open one go
         left, opened = np.empty((2, len(pairs)), bool)
         left[source], opened[source] = ~shown.shut & ~flat[meetings.places()], shown.open
-        if self._flat:  # with groups that is known already
-            later = np.cumsum(opened[::-1])[::-1]  # open pairs from each on
-            ends = np.searchsorted(pairs.block, pairs.block, "right")
-            after = np.where(ends < len(pairs), later[np.minimum(ends, len(pairs) - 1)], 0)
-            left &= later - after - opened == 0
         kept = replace(pairs, open=opened).take(np.flatnonzero(left))
         return kept, meetings.columns[flat], ((low + high) / 2).T[flat]
-
-
-def _owners(xp: Arrays, nest: Nesting, trace: Trace, painted: np.ndarray, objects: Index) -> np.ndarray:
-    """Numbers (groups, B), from 1, of the objects that paint, of a stream with groups; 0 for none."""
-    own = np.zeros((nest.levels, len(painted), len(nest.turns[0].level)), np.int32)
-    rounds = iter(trace.joined)
-
-    def close(count: int) -> None:
-        for (columns, _, level), paint, *_ in (next(rounds) for _ in range(count)):
-            top, here = own[level, :, columns], xp.to_numpy(paint).T > 0.5
-            own[level - 1, :, columns] = np.where(here, top, own[level - 1, :, columns])
-            own[level, :, columns] = 0
-
-    for part, level, _, before, after in nest.turns:
-        close(len(before))
-        columns = np.arange(len(level))
-        mine = objects[part][:, None] + 1
-        own[level, :, columns] = np.where(painted[:, part].T, mine, own[level, :, columns])
-        close(len(after))
-    result: np.ndarray = own[0]
-    return result
 
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:

@@ -29,9 +29,9 @@ from scenelang.drawing.neural.assets import GridShape, Texture
 from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.draw import Drawing, as_image, halved
 from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.load import Framed
 from scenelang.drawing.neural.meetings import LEVELS, Closing, Pairs, Raster, meetings_of, nesting, raster
 from scenelang.drawing.neural.network import RADIUS, Decoder, FramedArrays
-from scenelang.drawing.neural.torch_networks import Framed
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator"
 
@@ -429,8 +429,6 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
     """
     meetings, _ = meetings_of(pairs)
     nest, count = nesting(meetings, field.groups), len(field.tokens)
-    if nest is None:
-        return pairs.block, pairs.object, np.zeros(0, int), 1
     result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
 
     def close(closings: list[Closing]) -> None:

@@ -120,14 +120,11 @@ class Drawing:
 def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
-    """Draw a Program of the plane or of solids, as `draw` does.
+    """Draw a Program of the plane or of solids, as `draw` does, if the network has its dimension.
 
     Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out; all of their
     pixels count as met. There are two further ``samples``: ``"draft"``, one for each 2 x 2 pixels, and
     ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled four times.
-
-    Raises:
-        ProgramError: as `draw`, or the Program and the network are of different dimensions.
     """
     if run.get("samples") == "draft":
         run |= {"samples": "one", "split": None, "kept": None}
@@ -170,7 +167,6 @@ def draw(
     """Draw a Program's objects in stream order.
 
     Args:
-        network: trained parameters; the picture is computed on their device.
         threads: tiles drawn at the same time; by default 1.
         split: tiles are as high as for so many threads; by default ``threads``.
         kept: the picture before this one, of which tiles that show the same are taken over.
@@ -179,8 +175,7 @@ def draw(
         progress: called with the share done, from any thread.
 
     Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or numbers out of all
-            proportion; no compiled scene has such.
+        ProgramError: no compiled scene has such vectors.
     """
     (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
@@ -231,11 +226,7 @@ def as_image(picture: npt.NDArray[np.float32]) -> Image:
 
 
 def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, threads: int = 1) -> Outputs:
-    """All outputs that a Program has, its objects numbered as in the scene.
-
-    Raises:
-        ProgramError: no compiled scene has such numbers.
-    """
+    """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene."""
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads)

@@ -16,7 +16,7 @@ import numpy as np
 from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
-from scenelang.drawing.arrays import Array
+from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
 from scenelang.drawing.neural.frames import FAR, Frames
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
@@ -40,46 +40,31 @@ class Trace:
     Args:
         paint: (groups, P) how far the object's colour came in.
         margin: (groups, P) by how much what was there before is nearer than the object, world units.
-        joined: the same of groups of the stream that ended, round by round, with which these were and their
-            distances.
+        joined: the same of groups of the stream that ended, round by round, with their distances.
     """
 
     paint: Array
     margin: Array
     joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
-    def shares(self, meetings: Meetings, nest: Nesting | None, seen: Array) -> Array:
+    def shares(self, xp: Arrays, nest: Nesting, seen: Array) -> Array:
         """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
-        left, result = 1.0 * seen, 0.0 * self.paint
-        if nest is not None:
-            return self._nested(nest, left, result)
-        for part in reversed(meetings.slots()):
-            rest, paint = left[:, : part.stop - part.start], self.paint[:, part]
-            result[:, part] = rest * paint
-            rest *= 1.0 - paint
-        return result
-
-    def _nested(self, nest: Nesting, seen: Array, result: Array) -> Array:
-        left = [seen, *(0.0 * seen for _ in range(nest.levels - 1))]
+        count, result = seen.shape[1], 0.0 * self.paint
+        left = xp.concat([1.0 * seen, *[0.0 * seen] * (nest.levels - 1)], 1)
         rounds = iter(reversed(self.joined))
 
         def opened(closings: list[Closing]) -> None:
             for (columns, _, level), (_, paint, *_) in zip(reversed(closings), rounds, strict=False):
-                for at in np.unique(level).tolist():
-                    some = np.flatnonzero(level == at)
-                    below = left[at - 1][:, columns[some]]
-                    left[at][:, columns[some]] = below * paint[:, some]
-                    left[at - 1][:, columns[some]] = below * (1.0 - paint[:, some])
+                top, below = level * count + columns, (level - 1) * count + columns
+                rest = left[:, below]
+                left[:, top], left[:, below] = rest * paint, rest * (1.0 - paint)
 
-        for part, level, _, before, after in reversed(nest.turns):
-            opened(after)
-            paint = self.paint[:, part]
-            for at in np.unique(level).tolist():
-                some = np.flatnonzero(level == at)
-                rest = left[at][:, some]
-                result[:, part.start + some] = rest * paint[:, some]
-                left[at][:, some] = rest * (1.0 - paint[:, some])
-            opened(before)
+        for turn in reversed(nest.turns):
+            opened(turn.after)
+            at, paint = nest.places(turn, count), self.paint[:, turn.part]
+            rest = left[:, at]
+            result[:, turn.part], left[:, at] = rest * paint, rest * (1.0 - paint)
+            opened(turn.before)
         return result
 
 
@@ -273,10 +258,6 @@ class Field:
         path, joins = self.groups.path, np.append(self.groups.joins, -1)
         return path, joins[path], np.append(self.group_widths, -1.0)[path]
 
-    def nesting(self, meetings: Meetings) -> Nesting | None:
-        """Find the states that pairs join, None where no column has a group with a state of its own."""
-        return nesting(meetings, self.groups) if self.groups.deepest else None
-
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
         """State and register (groups, S + 3, B) of columns that have met their objects.
 
@@ -285,25 +266,47 @@ class Field:
             trace: where to write down what each object did.
         """
         xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
-        nest = self.nesting(meetings)
-        fresh = pairs.open
-        if nest is not None:
-            fresh = fresh | np.concatenate([turn.fresh for turn in nest.turns])
-        memory = self.empty(features.shape[0], len(meetings.columns), 3 if trace is None else 4)
-        cell = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
+        nest, count = nesting(meetings, self.groups), len(meetings.columns)
+        fresh = pairs.open | np.concatenate([pairs.open[:0], *(turn.fresh for turn in nest.turns)])
+        memory = self.empty(features.shape[0], count, 3 if trace is None else 4)
+        stack = memory if nest.levels == 1 else xp.concat([memory] * nest.levels, 2)
+        lines, bias, candidate, bump = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
         colours = xp.take(self.colours, xp.array(pairs.object, self.like))
         if trace is not None:  # a colour of 1 over a register of 0 shows the gate
             colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
-        if nest is not None:
-            return self._fold_nested(nest, features, memory, cell, colours, trace)[:, : s + 3]
-        for part in meetings.slots():
-            old = memory[..., : part.stop - part.start]
-            lines, bias, candidate, bump = cell
+
+        def put(index: Array, values: Array) -> None:
+            for plane, new in zip(stack, values, strict=True):
+                xp.put(plane, index, new)
+
+        def close(closings: list[Closing]) -> None:
+            """Let groups that end join the states below as objects."""
+            for columns, groups, level in closings:
+                top = xp.array(level * count + columns, self.like)
+                below = xp.array((level - 1) * count + columns, self.like)
+                inner, outer = xp.take(stack, top), xp.take(stack, below)
+                if trace is not None:
+                    inner[:, s + 3] = 1.0
+                given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
+                took = self._took(outer, *given, trace is not None)
+                if trace is not None:
+                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
+                put(below, outer)
+                put(top, xp.take(memory, xp.array(columns, self.like)))
+
+        for turn in nest.turns:
+            close(turn.before)
+            part, at = turn.part, nest.places(turn, count)
+            index = at if isinstance(at, slice) else xp.array(at, self.like)
+            old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
             own = Cell(lines[..., part], bias[:, part], candidate[..., part], bump[:, part])
             took = self._took(old, own, features[..., part], colours[:, part], trace is not None)
+            if not isinstance(at, slice):
+                put(index, old)
             if trace is not None:
                 trace.paint[:, part], trace.margin[:, part] = took
-        return memory[:, : s + 3]
+            close(turn.after)
+        return stack[:, : s + 3, :count]
 
     def _cells_at(self, kinds: np.ndarray) -> Cell:
         index = self.xp.array(kinds, self.like)
@@ -333,43 +336,6 @@ class Field:
         if traced:
             paint = memory[:, s + 3] + 0.0
         return paint, margin
-
-    def _fold_nested(
-        self, nest: Nesting, features: Array, memory: Array, cell: Cell, colours: Array, trace: Trace | None
-    ) -> Array:
-        """`fold` with a stack of memories; a group that ends joins the one below as an object."""
-        xp, s, count = self.xp, self.network.config.state, memory.shape[2]
-        stack = xp.concat([memory] * nest.levels, 2)
-
-        def close(closings: list[Closing]) -> None:
-            for columns, groups, level in closings:
-                top = xp.array(level * count + columns, self.like)
-                below = xp.array((level - 1) * count + columns, self.like)
-                inner, outer = xp.take(stack, top), xp.take(stack, below)
-                if trace is not None:
-                    inner[:, s + 3] = 1.0
-                given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
-                took = self._took(outer, *given, trace is not None)
-                if trace is not None:
-                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
-                put(below, outer)
-                put(top, xp.take(memory, xp.array(columns, self.like)))
-
-        def put(index: Array, values: Array) -> None:
-            for plane, new in zip(stack, values, strict=True):
-                xp.put(plane, index, new)
-
-        for part, level, _, before, after in nest.turns:
-            close(before)
-            index = xp.array(level * count + np.arange(len(level)), self.like)
-            old = xp.take(stack, index)
-            given = Cell(*(each[..., part] for each in cell)), features[..., part], colours[:, part]
-            took = self._took(old, *given, trace is not None)
-            put(index, old)
-            if trace is not None:
-                trace.paint[:, part], trace.margin[:, part] = took
-            close(after)
-        return stack[..., :count]
 
     def trace(self, groups: int, pairs: int) -> Trace:
         """Room for a trace."""
@@ -407,17 +373,15 @@ class Field:
         dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
         colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
         with np.errstate(all="ignore"):
-            nest = self.nesting(meetings)
-            joins = None if nest is None else self.joins()
-            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, joins)
+            nest = nesting(meetings, self.groups)
+            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, self.joins())
 
 
 def rounded(cells: Cell, s: int) -> Cell:
     """Cells with tokens in front, and behind them those of operators whose edges have a width.
 
     A cut that rounds its edge is a smooth union turned inside out: where that takes (D, d) to D', the
-    intersection takes (-D, -d) to -D', and the subtraction (-D, d). So its lines are those that were learned
-    of the union, with their signs turned. Colours are kept: gates of the register stay shut.
+    intersection takes (-D, -d) to -D', and the subtraction (-D, d). Gates of the register stay shut.
     """
     lines, bias, candidate, bump = (part[SMOOTH] for part in cells)
     features = lines.shape[-1] - s

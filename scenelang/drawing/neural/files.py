@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -72,11 +71,7 @@ def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple
 
 
 def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: float) -> Mapping[bytes, Slopes]:
-    """Slopes by the bytes of codes (geometries, C); none where the file is missing or of other weights.
-
-    Raises:
-        ModelError: it is damaged.
-    """
+    """Slopes by the bytes of codes (geometries, C); none where the file is missing or of other weights."""
     header = {"weights": digest, "node": NODE, "steep": STEEP}
     arrays = read_proof(slopes_path(name, digest), header, {"cells": (len(codes), len(RADII), CELLS, CELLS)})
     if arrays is None:
@@ -87,38 +82,47 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
 
 
 MOST_SIZE: Final = 128
-"""Most units of a layer: their square, times the code, is 9 MB."""
+"""Most units of a layer for solids: their square, times the code, is 9 MB."""
+MOST_WIDTH: Final = 1024
+"""Most units of a layer in the plane."""
+Config = TypeVar("Config", FramedConfig, SolidConfig)
+
+
+def _sizes(kind: type[Config], config: Any, most: int) -> Config:
+    sizes = config.get("network") if isinstance(config, dict) else None
+    if not isinstance(sizes, dict):
+        raise ModelError("no network sizes")
+    least = {"segment": 0}
+    if any(type(v) is not int or not least.get(name, 1) <= v <= most for name, v in sizes.items()):
+        raise ModelError("a network size is out of range")
+    try:
+        return kind(**sizes)
+    except TypeError as error:
+        raise ModelError(f"bad network sizes: {error}") from None
 
 
 def solid_config(config: Any) -> SolidConfig:
-    """Sizes of the network in a weights file.
+    """Sizes of a solids' network by its header; raises ModelError where they are none, or out of range."""
+    return _sizes(SolidConfig, config, MOST_SIZE)
 
-    Raises:
-        ModelError: they are missing, unknown or out of range.
-    """
-    try:
-        result = SolidConfig(**config["network"])
-    except (KeyError, TypeError) as error:
-        raise ModelError(f"bad network sizes: {error}") from None
-    *sizes, segment = astuple(result)
-    if any(type(v) is not int or not 1 <= v <= MOST_SIZE for v in (*sizes, segment or 1)):
-        raise ModelError("a network size is out of range")
-    return result
+
+def framed_config(config: Any, size: int) -> FramedConfig:
+    """Sizes of a network of the plane by the header of a file of ``size`` bytes; raises as `solid_config`."""
+    known = _sizes(FramedConfig, config, MOST_WIDTH)
+    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
+    rows = known.state + known.paint_lines
+    cell = (known.features + known.state) * rows + known.features * known.state
+    if 4 * max(decoder, cell) > size:
+        raise ModelError("a network larger than its file")
+    return known
 
 
 def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
-    """The network that a weights file holds, of so many geometries and materials.
-
-    Raises:
-        ModelError: the file does not fit the model or itself, or holds numbers that are not finite.
-    """
+    """The network in a weights file, if it has so many geometries and materials; else raises ModelError."""
     header, arrays = open_weights(data)
     config = solid_config(header.get("config"))
     check_shapes(arrays, solid_shapes(config, geometries, materials))
     return SolidArrays(config, arrays)
-
-
-MOST_WIDTH = 1024
 
 
 class ArrayModel(NamedTuple):
@@ -128,37 +132,8 @@ class ArrayModel(NamedTuple):
     digest: str
 
 
-def framed_config(config: dict[str, Any], size: int) -> FramedConfig:
-    """Sizes of the network in a weights file of ``size`` bytes.
-
-    Raises:
-        ModelError: they are missing, unknown, out of range, or larger than the file.
-    """
-    sizes = config.get("network") if isinstance(config, dict) else None
-    if not isinstance(sizes, dict):
-        raise ModelError("no network sizes")
-    if "cell_width" in sizes:
-        raise ModelError("weights of an earlier framed renderer, whose cell was another; train them again")
-    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
-        raise ModelError("a network size is out of range")
-    try:
-        known = FramedConfig(**sizes)
-    except TypeError as error:
-        raise ModelError(f"bad network sizes: {error}") from None
-    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
-    rows = known.state + known.paint_lines
-    cell = (known.features + known.state) * rows + known.features * known.state
-    if 4 * max(decoder, cell) > size:
-        raise ModelError("a network larger than its file")
-    return known
-
-
 def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
-    """The network that a weights file holds.
-
-    Raises:
-        ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
-    """
+    """The network that a weights file holds; raises ModelError where it does not fit the manifest."""
     header, arrays = open_weights(data)
     config = framed_config(header.get("config", {}), len(data))
     check_shapes(arrays, parameter_shapes(config, len(manifest.geometries), len(manifest.materials)))

@@ -1,15 +1,15 @@
-"""A model ready to draw: manifest, trained network, digest of its weights."""
+"""Models in torch: the networks' parameters, read from weights files, ready to draw or to be trained."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from scenelang.compiler.lifting import WIDTH
 from scenelang.compiler.manifest import Manifest, load_manifest
@@ -22,12 +22,67 @@ from scenelang.compiler.weights import (
     open_weights,
     shipped_weights,
 )
+from scenelang.drawing.arrays_torch import TORCH
 from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_slopes, solid_config
+from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
-from scenelang.drawing.neural.torch_networks import Framed, Solids
+from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
 
 RENDERER = "renderer."
 """In front of the names of a renderer's tensors, where a file holds it beside a lifting's."""
+
+
+class _Parameters(nn.Module):
+    """Parameters of shapes by name, at random; ``name.0`` and so on are a list."""
+
+    codes: nn.Parameter
+    cell_lines: nn.Parameter
+    cell_gain: nn.Parameter
+    cell_bias: nn.Parameter
+    candidate: nn.Parameter
+    bump: nn.Parameter
+
+    def __init__(self, code: int, shapes: Mapping[str, tuple[int, ...]]) -> None:
+        super().__init__()
+        stacks: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
+        for name, shape in shapes.items():
+            group, _, index = name.partition(".")
+            fan = (code + 1) * (shape[1] if index in ("1", "2") else 1)
+            value = torch.randn(shape)
+            if index:
+                scale = fan**-0.5 if group.endswith("w") else 0.3
+                stacks.setdefault(group, []).append(nn.Parameter(value * scale))
+            else:
+                setattr(self, name, nn.Parameter(value))
+        for name, layers in stacks.items():
+            setattr(self, name, nn.ParameterList(layers))
+        with torch.no_grad():  # gates begin in their linear range
+            self.cell_lines.mul_(0.3)
+            self.cell_gain.zero_()
+            self.cell_bias.fill_(0.5)
+            self.bump.zero_()
+            self.candidate.mul_(0.3)
+
+
+class Framed(_Parameters, FramedNetwork):
+    """The framed renderer of so many geometry and material codes, in torch."""
+
+    xp = TORCH
+
+    def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
+        super().__init__(config.code, parameter_shapes(config, geometries, materials))
+        self.config = config
+
+
+class Solids(_Parameters, SolidNetwork):
+    """The solids' renderer of so many geometry and material codes, in torch."""
+
+    xp = TORCH
+
+    def __init__(self, config: SolidConfig, geometries: int, materials: int) -> None:
+        super().__init__(config.code, solid_shapes(config, geometries, materials))
+        self.config = config
+
 
 Network = Framed | Solids | Streaming | Reading
 
@@ -91,14 +146,6 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
     return network.requires_grad_(False).eval().to(device)
 
 
-def _framed(config: dict[str, Any], manifest: Manifest, size: int) -> Framed:
-    return Framed(framed_config(config, size), len(manifest.geometries), len(manifest.materials))
-
-
-def _solid(config: dict[str, Any], manifest: Manifest, size: int) -> Solids:
-    return Solids(solid_config(config), len(manifest.geometries), len(manifest.materials))
-
-
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
     sizes = config["student"]["streaming"]
     known = StreamingConfig(**{**sizes, "vector": WIDTH})
@@ -121,7 +168,14 @@ def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
 
 
 _Make = Callable[[dict[str, Any], Manifest, int], Network]
-_MAKERS: dict[str, _Make] = {"framed": _framed, "solid": _solid, "streaming": _streaming, "reading": _reading}
+_MAKERS: dict[str, _Make] = {
+    "framed": lambda config, m, size: Framed(
+        framed_config(config, size), len(m.geometries), len(m.materials)
+    ),
+    "solid": lambda config, m, size: Solids(solid_config(config), len(m.geometries), len(m.materials)),
+    "streaming": _streaming,
+    "reading": _reading,
+}
 
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:

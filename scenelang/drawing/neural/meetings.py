@@ -122,13 +122,7 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
 
 
 class Closing(NamedTuple):
-    """Groups that end, one in each of some columns.
-
-    Args:
-        columns: (n,) in ascending order.
-        groups: (n,) their numbers.
-        level: (n,) of the states that go into the ones below them.
-    """
+    """Groups (n,) that end, one in each of some ascending columns, and the levels of their states."""
 
     columns: Index
     groups: Index
@@ -153,15 +147,20 @@ class Turn(NamedTuple):
 
 
 class Nesting(NamedTuple):
-    """Meetings of a stream with groups.
+    """Nested meetings.
 
     Args:
         turns: slot by slot.
-        levels: how many states are needed.
+        levels: how many states are needed; 1 where all pairs join the stream's own.
     """
 
     turns: list[Turn]
     levels: int
+
+    def places(self, turn: Turn, blocks: int) -> Index | slice:
+        """States that a turn's pairs join: level l of column i is state ``l * blocks + i``."""
+        count = len(turn.level)
+        return slice(count) if self.levels == 1 else turn.level * blocks + np.arange(count)
 
     def fold(
         self,
@@ -169,12 +168,12 @@ class Nesting(NamedTuple):
         shut: Mask,
         opened: Mask,
         pair: Callable[[Turn, Index | slice], tuple[Mask, Mask]],
-        group: Callable[[Index | slice, Index | slice, Index], tuple[Mask, Mask]],
+        group: Callable[[Index, Index, Index], tuple[Mask, Mask]],
     ) -> None:
         """Fold pairs and groups; fill in which pairs change nothing or are hidden, and which hide the rest.
 
         Args:
-            blocks: columns of the meetings; level l of column i is state ``l * blocks + i``.
+            blocks: columns of the meetings.
             shut, opened: (P,) of the pairs, filled in.
             pair: takes a turn's pairs into states (n,); returns whether each changes nothing, and whether
                 nothing else is left.
@@ -182,23 +181,15 @@ class Nesting(NamedTuple):
                 the same.
         """
         done = []  # of groups that ended, round by round: where they join, and what came of it
-        every = np.arange(blocks)
-
-        def places(columns: Index, level: Index) -> Index | slice:
-            first, last = (columns[0], columns[-1]) if len(columns) else (0, -1)
-            if last - first + 1 == len(columns) and (level == level[:1]).all():  # numpy is faster with slices
-                start = int(first + blocks * level[0]) if len(level) else 0
-                return slice(start, start + len(columns))
-            return level * blocks + columns
 
         def close(closings: list[Closing]) -> None:
             for columns, ended, level in closings:
-                top, below = places(columns, level), places(columns, level - 1)
+                top, below = level * blocks + columns, (level - 1) * blocks + columns
                 done.append((top, below, group(top, below, ended)))
 
         for turn in self.turns:
             close(turn.before)
-            shut[turn.part], opened[turn.part] = pair(turn, places(every[: len(turn.level)], turn.level))
+            shut[turn.part], opened[turn.part] = pair(turn, self.places(turn, blocks))
             close(turn.after)
         hidden = np.zeros(self.levels * blocks, bool)
 
@@ -208,26 +199,28 @@ class Nesting(NamedTuple):
                 hidden[top] = hidden[below] | closed
                 hidden[below] |= wide
 
-        for part, level, _, before, after in reversed(self.turns):
-            reopen(after)
-            at = places(every[: len(level)], level)
-            shut[part] |= hidden[at]
-            hidden[at] |= opened[part]
-            reopen(before)
+        for turn in reversed(self.turns):
+            reopen(turn.after)
+            at = self.places(turn, blocks)
+            shut[turn.part] |= hidden[at]
+            hidden[at] |= opened[turn.part]
+            reopen(turn.before)
 
 
 def flat_nesting(meetings: Meetings) -> Nesting:
-    """Return the nesting of a stream without groups: all pairs join the stream's own state."""
+    """The nesting of a stream without groups: all pairs join the stream's own state."""
     sizes = [(part, part.stop - part.start) for part in meetings.slots()]
     return Nesting([Turn(p, np.zeros(n, np.intp), np.zeros(n, bool), [], []) for p, n in sizes], 1)
 
 
-def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
-    """Find which states the pairs of each column join, None where all join the stream's own.
+def nesting(meetings: Meetings, groups: Groups) -> Nesting:
+    """Find which states the pairs of each column join.
 
     Of a group's rows a column may meet some or none. A group that draws goes on in the state around it where
     that is still empty, so that only those that meet something take a state of their own.
     """
+    if not groups.deepest:
+        return flat_nesting(meetings)
     slots, count = meetings.slots(), len(meetings.columns)
     paths = groups.path[meetings.pairs.object]
     same = np.zeros(paths.shape, bool)  # which groups were open at the pair before, too
@@ -241,7 +234,7 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting | None:
     own[: slots[0].stop if slots else 0] = False  # nothing stands before the first pairs
     own |= begins & (groups.joins > SMOOTH)[paths]
     if not own.any():
-        return None
+        return flat_nesting(meetings)
     fresh = own.any(1) & (groups.tokens[meetings.pairs.object] <= SMOOTH)
     last_path = np.full((count, groups.deepest), -1)
     real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
@@ -316,8 +309,7 @@ class Shown:
 
     Args:
         picture: premultiplied colour and coverage (4, B).
-        shut: (P,) objects that change nothing in their block.
-        open: (P,) objects behind which nothing matters that came before.
+        shut, open: (P,) objects that change nothing in their block, and ones that hide all before them.
     """
 
     picture: Interval
@@ -332,8 +324,8 @@ def shown(
     colours: Interval,
     empty: float,
     slope: float,
-    nest: Nesting | None = None,
-    joins: Cell | None = None,
+    nest: Nesting,
+    joins: Cell,
 ) -> Shown:
     """Fold intervals, of a network whose state is one number and that knows one feature.
 
@@ -343,37 +335,27 @@ def shown(
         colours: of the pairs (3, P).
         empty: the state before the first object.
         slope: of coverage, per world unit.
-        nest: of a stream with groups.
-        joins: cells of these groups, which come last.
+        joins: cells of the groups, which come last.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _Learned.empty(empty, blocks * (1 if nest is None else nest.levels))
+    state = _Learned.empty(empty, blocks * nest.levels)
     shut, wide = np.zeros((2, len(given)), bool)
     operands = State(distance, colours)
-    if nest is None or joins is None:
-        gates = _Gates.of(cell, distance, given)
-        for part in meetings.slots():
-            columns = slice(part.stop - part.start)
-            shut[part], wide[part] = state.join(columns, operands.at(part), gates.some(part))
-        wide |= given
-    else:
-        fresh = np.concatenate([turn.fresh for turn in nest.turns])
-        gates = _Gates.of(cell, distance, given | fresh)
+    fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns)])
+    gates = _Gates.of(cell, distance, given | fresh)
 
-        def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
-            part = turn.part
-            keeps, hides = state.join(places, operands.at(part), gates.some(part))
-            return keeps, hides | given[part]
+    def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
+        part = turn.part
+        keeps, hides = state.join(places, operands.at(part), gates.some(part))
+        return keeps, hides | given[part]
 
-        def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
-            operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
-            joined = state.join(
-                below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool))
-            )
-            state.clear(top, empty)
-            return joined
+    def group(top: Index, below: Index, ended: Index) -> tuple[Mask, Mask]:
+        operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
+        joined = state.join(below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool)))
+        state.clear(top, empty)
+        return joined
 
-        nest.fold(blocks, shut, wide, pair, group)
+    nest.fold(blocks, shut, wide, pair, group)
     low, high = (side[:blocks] for side in state.distance)
     covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
     sides = zip(state.colour, covered, strict=True)

@@ -4,13 +4,11 @@ Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, F
 G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
 coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over contiguous numbers.
 
-For a point and an object the frame gives the point's leaf coordinates exactly (`frames.py`). Two learned
-parts then draw:
+The frame gives a point's leaf coordinates exactly (`frames.py`). Two learned parts then draw:
 
 1. The decoder turns leaf coordinates into F distance-like features. Its weights are a linear function of
-   the object's code, so that shapes live in codes: swap two codes and the shapes swap. It has rectified
-   linear units, which represent straight edges exactly, and its output is multiplied by the object's
-   distance scale.
+   the object's code, so that shapes live in codes. It has rectified linear units, which represent straight
+   edges exactly, and its output is multiplied by the object's distance scale.
 2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
    and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
    under one gate of its own, so that colour is kept, not re-learned.
@@ -23,7 +21,7 @@ in a cell, and q within a radius of p,
     |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s,
 
 where s depends on the cell and the radius. `lab.slopes` proves it for learned leaves, and it is shipped
-beside the weights. For elements it is computed from their nodes. Where nothing is known it is infinite.
+beside the weights; for elements it is computed from their nodes. Where nothing is known it is infinite.
 """
 
 from __future__ import annotations
@@ -147,22 +145,6 @@ class FramedNetwork:
         x = self.xp.perceptron(q * (RADIUS / radius.clip(RADIUS)), decoder.layers)
         return (x + (radius - RADIUS).clip(0.0) * decoder.far) * scale
 
-    def step(
-        self, features: Array, state: Array, colour: Array, object_colour: Array, weights: tuple[Array, ...]
-    ) -> tuple[Array, Array]:
-        """One object: the LSTM cell and the register.
-
-        Args:
-            features: (…, F, M).
-            state: (…, S, M).
-            colour: the register (…, R, M).
-            object_colour: (…, R, 1).
-            weights: the `Cell` of the object's token.
-        """
-        lines, bias, candidate, bump = weights
-        levels = self.xp.dense(self.xp.concat([features, state], -2), lines, bias)  # (…, S + L, M)
-        return self.update(levels, candidate @ features, bump, state, colour, object_colour)
-
     def update(
         self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
     ) -> tuple[Array, Array]:
@@ -172,7 +154,9 @@ class FramedNetwork:
             levels: of the gates before they are clamped (…, S + L, M).
             candidate: what the state becomes where its gate is open (…, S, M).
             bump: as in `Cell`, or (…, S, M).
-            state, colour, object_colour: as `step` takes them.
+            state: (…, S, M).
+            colour: the register (…, R, M).
+            object_colour: (…, R, 1).
         """
         s, xp = self.config.state, self.xp
         take = levels[..., :s, :].clip(0.0, 1.0)
@@ -182,11 +166,7 @@ class FramedNetwork:
 
 
 class FramedArrays(FramedNetwork):
-    """A trained network as numpy arrays.
-
-    Args:
-        arrays: parameters by the names of `parameter_shapes`.
-    """
+    """A trained network as numpy arrays, by the names of `parameter_shapes`."""
 
     xp = NUMPY
 

@@ -1,7 +1,6 @@
-"""Parameters of the networks in torch, for training and for drawing on devices.
+"""The plane's network in training: where it starts, its loss's trace, and the parameters of its parts.
 
-The formulas, and the letters, are those of `scenelang.drawing.neural.network` and of
-`scenelang.drawing.solid.network`. P is M in training.
+Letters are those of `scenelang.drawing.neural.network`; P is M here.
 """
 
 from __future__ import annotations
@@ -13,19 +12,37 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.network import EMPTY, TOKENS, FramedConfig, FramedNetwork
-from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
+from scenelang.drawing.arrays import Array
+from scenelang.drawing.neural.load import Framed
+from scenelang.drawing.neural.network import EMPTY, TOKENS, FramedConfig
 
 
-class Framed(nn.Module, FramedNetwork):
-    """Parameters of the framed renderer."""
+@dataclass(slots=True)
+class Trace:
+    """Distances, states and colours after each object, from `Trainee.trace`.
 
-    xp = TORCH
+    Args:
+        distance: first feature of each object, world units (B, N, P).
+        alone: the same as a logit against the object alone covering the point.
+        depth: first entry of the state after each object, world units (B, N, P).
+        margin: the same as a logit against coverage after each object.
+        colour: register after each object (B, N, P, 3).
+    """
+
+    distance: Tensor
+    alone: Tensor
+    depth: Tensor
+    margin: Tensor
+    colour: Tensor
+
+
+class Trainee(Framed):
+    """The framed renderer with parameters to begin training with."""
 
     def __init__(self, config: FramedConfig, geometries: int, materials: int) -> None:
-        super().__init__()
-        self.config = c = config
+        with torch.random.fork_rng(devices=[]):
+            super().__init__(config, geometries, materials)
+        c = config
         self.codes = nn.Parameter(torch.randn(geometries, c.code))
         self.material_codes = nn.Parameter(torch.randn(materials, c.material_code))
         # albedo from the material code; one constant value a material
@@ -58,6 +75,22 @@ class Framed(nn.Module, FramedNetwork):
         decoder = [self.codes, self.far, *self.decoder_w, *self.decoder_b]
         known = {id(p) for p in decoder}
         return decoder, [p for p in self.parameters() if id(p) not in known]
+
+    def step(
+        self, features: Array, state: Array, colour: Array, object_colour: Array, weights: tuple[Array, ...]
+    ) -> tuple[Array, Array]:
+        """One object: the LSTM cell and the register.
+
+        Args:
+            features: (…, F, M).
+            state: (…, S, M).
+            colour: the register (…, R, M).
+            object_colour: (…, R, 1).
+            weights: the `Cell` of the object's token.
+        """
+        lines, bias, candidate, bump = weights
+        levels = self.xp.dense(self.xp.concat([features, state], -2), lines, bias)  # (…, S + L, M)
+        return self.update(levels, candidate @ features, bump, state, colour, object_colour)
 
     def trace(
         self,
@@ -107,56 +140,3 @@ class Framed(nn.Module, FramedNetwork):
             margin=torch.stack(depth, 1) * self.read_slope.exp(),
             colour=torch.stack(shown, 1),
         )
-
-
-@dataclass(slots=True)
-class Trace:
-    """Distances, states and colours after each object, from `Framed.trace`.
-
-    Args:
-        distance: first feature of each object, world units (B, N, P).
-        alone: the same as a logit against the object alone covering the point.
-        depth: first entry of the state after each object, world units (B, N, P).
-        margin: the same as a logit against coverage after each object.
-        colour: register after each object (B, N, P, 3).
-    """
-
-    distance: Tensor
-    alone: Tensor
-    depth: Tensor
-    margin: Tensor
-    colour: Tensor
-
-
-class Solids(nn.Module, SolidNetwork):
-    """Parameters of the solids' renderer.
-
-    Args:
-        config: sizes.
-        geometries: number of geometry codes.
-        materials: number of material codes.
-    """
-
-    xp = TORCH
-
-    def __init__(self, config: SolidConfig, geometries: int, materials: int) -> None:
-        super().__init__()
-        self.config = config
-        stacks: dict[str, list[nn.Parameter]] = {"segment_w": [], "segment_b": []}
-        for name, shape in solid_shapes(config, geometries, materials).items():
-            group, _, index = name.partition(".")
-            fan = (config.code + 1) * (shape[1] if index in ("1", "2") else 1)
-            value = torch.randn(shape)
-            if index:
-                scale = fan**-0.5 if group.endswith("w") else 0.3
-                stacks.setdefault(group, []).append(nn.Parameter(value * scale))
-            else:
-                setattr(self, name, nn.Parameter(value))
-        for name, layers in stacks.items():
-            setattr(self, name, nn.ParameterList(layers))
-        with torch.no_grad():  # gates begin in their linear range
-            self.cell_lines.mul_(0.3)
-            self.cell_gain.zero_()
-            self.cell_bias.fill_(0.5)
-            self.bump.zero_()
-            self.candidate.mul_(0.3)

@@ -1,0 +1,275 @@
+"""The paper's renderers against loops in float64, their shapes against its Table 3, and what they draw."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.neural.paper import (
+    FILTERS,
+    ConvLSTM,
+    Reading,
+    ReadingConfig,
+    Streaming,
+    StreamingConfig,
+    draw_whole,
+)
+from tests.drawing.copies import Asked
+
+
+def sigmoid(x: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-x))
+
+
+def gru(
+    x: np.ndarray, h: np.ndarray, wi: np.ndarray, wh: np.ndarray, bi: np.ndarray, bh: np.ndarray
+) -> np.ndarray:
+    """Cho et al. 2014 with a reset of the recurrent part, gates in the order reset, keep, candidate."""
+    n = len(h)
+    a, b = wi @ x + bi, wh @ h + bh
+    reset, keep = sigmoid(a[:n] + b[:n]), sigmoid(a[n : 2 * n] + b[n : 2 * n])
+    candidate = np.tanh(a[2 * n :] + reset * b[2 * n :])
+    return (1 - keep) * candidate + keep * h
+
+
+def test_it_reads_as_the_paper_says() -> None:
+    torch.manual_seed(5)
+    config = ReadingConfig(vector=6, hidden=5, reads=3, octaves=2)
+    network = Reading(config).double()
+    with torch.no_grad():
+        network.start.normal_()
+    vectors, tokens = torch.randn(2, 3, 6).double(), torch.randint(0, 4, (2, 3))
+    points, count = torch.randn(2, 4, 2).double(), torch.tensor([3, 2])
+    with torch.no_grad():
+        found = network(vectors, tokens, points, count).numpy()
+    weights = {k: v.detach().numpy() for k, v in network.state_dict().items()}
+    for b in range(2):
+        for p in range(4):
+            x, y = points[b, p].tolist()
+            angles = [np.pi * x, 2 * np.pi * x, np.pi * y, 2 * np.pi * y]
+            place = np.array([x, y, *np.sin(angles), *np.cos(angles)])
+            state = weights["start"]
+            for _ in range(3):
+                answers = []
+                for i in range(int(count[b])):
+                    seen = np.concatenate([vectors[b, i].numpy(), np.eye(4)[int(tokens[b, i])], [i / 4]])
+                    both = np.concatenate([place, seen])
+                    matrix = np.concatenate([weights["look_place.weight"], weights["look_object.weight"]], 1)
+                    bias = weights["look_place.bias"]
+                    answers.append(
+                        gru(
+                            both,
+                            state,
+                            matrix,
+                            weights["look_state.weight"],
+                            bias,
+                            weights["look_state.bias"],
+                        )
+                    )
+                pooled = np.max(answers, 0)
+                state = gru(
+                    pooled,
+                    state,
+                    weights["next.weight_ih"],
+                    weights["next.weight_hh"],
+                    weights["next.bias_ih"],
+                    weights["next.bias_hh"],
+                )
+            expected = weights["head.weight"] @ state + weights["head.bias"]
+            np.testing.assert_allclose(found[b, p], expected, atol=1e-12)
+
+
+def test_a_union_of_equal_places_ignores_order() -> None:
+    """Pooling forgets the order; only the token and the place in the stream tell it."""
+    torch.manual_seed(1)
+    network = Reading(ReadingConfig(vector=6, hidden=8, reads=2, octaves=2))
+    with torch.no_grad():
+        network.look_object.weight[:, -1] = 0.0  # blind to the place in the stream
+        vectors, points = torch.randn(1, 3, 6), torch.randn(1, 5, 2)
+        tokens = torch.zeros(1, 3, dtype=torch.int64)
+        first, second = network(vectors, tokens, points), network(vectors[:, [2, 0, 1]], tokens, points)
+    torch.testing.assert_close(first, second)
+
+
+def convolve(x: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """A 5 x 5 convolution (C, H, W) -> (O, H, W), stride 1, padding 2, by loops."""
+    _, h, w = x.shape
+    out = np.zeros((len(weight), h, w))
+    for o in range(len(weight)):
+        for i in range(h):
+            for j in range(w):
+                total = bias[o]
+                for di in range(-2, 3):
+                    for dj in range(-2, 3):
+                        if 0 <= i + di < h and 0 <= j + dj < w:
+                            total += float(weight[o, :, di + 2, dj + 2] @ x[:, i + di, j + dj])
+                out[o, i, j] = total
+    return out
+
+
+def test_the_cell_is_a_convolutional_lstm() -> None:
+    torch.manual_seed(3)
+    cell = ConvLSTM(3, 2).double()
+    x, hidden, state = torch.randn(3, 5, 4).double(), *torch.randn(2, 2, 5, 4).double()
+    with torch.no_grad():
+        new_hidden, new_state = cell(x[None], (hidden[None], state[None]))
+    assert cell.gates.bias is not None
+    gates = convolve(
+        torch.cat([x, hidden]).numpy(), cell.gates.weight.detach().numpy(), cell.gates.bias.detach().numpy()
+    )
+    i, f, o, g = gates[0:2], gates[2:4], gates[4:6], gates[6:8]
+    expected = sigmoid(f) * state.numpy() + sigmoid(i) * np.tanh(g)
+    np.testing.assert_allclose(new_state[0].numpy(), expected, atol=1e-12)
+    np.testing.assert_allclose(new_hidden[0].numpy(), sigmoid(o) * np.tanh(expected), atol=1e-12)
+
+
+@pytest.mark.parametrize("resolution", [4, 32, 64, 128, 256, 512])
+def test_layers_have_the_shapes_of_table_3(resolution: int) -> None:
+    with torch.device("meta"):
+        network = Streaming(StreamingConfig(resolution=resolution))
+    sizes = [2 ** (i + 1) for i in range(int(math.log2(resolution)))]
+    before = 64
+    assert len(network.deconvolutions) == len(sizes)
+    for size, layer in zip(sizes, network.deconvolutions, strict=True):
+        assert isinstance(layer, nn.ConvTranspose2d)
+        expected = {4: 256, 8: 256, 16: 256, 32: 256, 64: 128, 128: 64, 256: 32, 512: 32}.get(size, 256)
+        assert (layer.kernel_size, layer.stride, layer.padding) == ((4, 4), (2, 2), (1, 1))
+        assert (layer.in_channels, layer.out_channels) == (before, expected)
+        before = expected
+    (level,) = network.stages.values()
+    gates, pixels = level.cell.gates, level.pixels  # type: ignore[union-attr]
+    assert isinstance(gates, nn.Conv2d)
+    assert (gates.kernel_size, gates.stride, gates.padding) == ((5, 5), (1, 1), (2, 2))
+    assert gates.in_channels == 2 * before + 4  # map, state and the token
+    assert gates.out_channels == 4 * before
+    assert isinstance(pixels, nn.Sequential)
+    ones = [m for m in pixels if isinstance(m, nn.Conv2d)]
+    assert [(m.kernel_size, m.in_channels, m.out_channels) for m in ones] == [
+        ((1, 1), before, before),
+        ((1, 1), before, before),
+        ((1, 1), before, 3),
+    ]
+    assert [type(m) for m in pixels] == [nn.Conv2d, nn.ReLU, nn.Conv2d, nn.ReLU, nn.Conv2d]
+
+
+def test_growing_has_a_cell_and_pixels_for_every_level() -> None:
+    network = Streaming(StreamingConfig(resolution=32, width=1 / 16), grown=True)
+    assert list(network.stages) == ["4", "8", "16", "32"]
+
+
+def test_an_object_less_is_a_shorter_stream() -> None:
+    torch.manual_seed(0)
+    network = Streaming(StreamingConfig(resolution=8, width=1 / 32))
+    vectors, tokens = torch.randn(2, 4, 64), torch.randint(0, 4, (2, 4))
+    with torch.no_grad():
+        padded = network(vectors, tokens, torch.tensor([2, 4]))
+        torch.testing.assert_close(padded[:1], network(vectors[:1, :2], tokens[:1, :2]))
+        torch.testing.assert_close(padded[1:], network(vectors[1:], tokens[1:]))
+
+
+def test_a_new_level_is_blended_in() -> None:
+    torch.manual_seed(0)
+    network = Streaming(StreamingConfig(resolution=8, width=1 / 32), grown=True)
+    vectors, tokens = torch.randn(1, 2, 64), torch.zeros(1, 2, dtype=torch.int64)
+    with torch.no_grad():
+        old = network(vectors, tokens, resolution=4)
+        new = network(vectors, tokens, resolution=8)
+        half = network(vectors, tokens, resolution=8, blend=0.25)
+    enlarged = old.repeat_interleave(2, 2).repeat_interleave(2, 3)
+    torch.testing.assert_close(half, 0.25 * new + 0.75 * enlarged)
+
+
+def test_sizes_are_checked() -> None:
+    with pytest.raises(ValueError, match="power of two"):
+        StreamingConfig(resolution=48)
+    with pytest.raises(ValueError, match="share"):
+        StreamingConfig(width=2.0)
+    assert StreamingConfig(resolution=512).filters(512) == FILTERS[512]
+
+
+def test_a_cell_on_halves_keeps_its_sums() -> None:
+    torch.manual_seed(1)
+    level = Streaming(StreamingConfig(resolution=8, width=1 / 32)).stages["8"]
+    maps, marks = torch.randn(2, 3, 8, 8, 8), torch.eye(4)[torch.randint(0, 4, (2, 3))]
+    with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+        cell = level.cell((torch.randn(2, 12, 8, 8).bfloat16()), (maps[:, 0].bfloat16(), maps[:, 1]))[1]
+        states = level.states(maps.bfloat16(), marks)  # type: ignore[union-attr,operator]
+    assert cell.dtype == torch.float32
+    assert [state.dtype for state in states] == [torch.bfloat16] * 3
+
+
+Colour = tuple[float, float, float]
+WHITE: Colour = (1.0, 1.0, 1.0)
+
+
+def some(count: int, canvas: tuple[int, int], background: Colour | None = WHITE) -> Program:
+    rng = np.random.default_rng(3)
+    tokens = rng.integers(0, 4, count).astype(np.int8)
+    tokens[:1] = 0
+    return Program(
+        vectors=rng.normal(size=(count, 64)).astype(np.float32),
+        tokens=tokens,
+        bounds=np.zeros((count, 4), np.float32),
+        canvas=canvas,
+        background=background,
+        model="any",
+        weights="0" * 64,
+        objects=("star",) * count,
+        places=(None,) * count,
+    )
+
+
+def reading() -> Reading:
+    torch.manual_seed(2)
+    return Reading(ReadingConfig(hidden=8, reads=2, octaves=3)).eval()
+
+
+def test_a_pixel_is_the_mean_of_its_four_samples() -> None:
+    network, p = reading(), some(3, (6, 4))
+    picture = np.asarray(draw_whole(network, p).image)
+    assert picture.shape == (4, 6, 3)
+    v, t = torch.from_numpy(p.vectors.copy())[None], torch.from_numpy(p.tokens.astype(np.int64))[None]
+    for row, column in ((0, 0), (1, 4), (3, 5)):
+        # the shorter side spans [-1, 1]: a pixel is half a unit wide
+        x, y = (column + 0.5 - 3) * 0.5, (2 - 0.5 - row) * 0.5
+        points = [[x + dx, y + dy] for dx in (-0.125, 0.125) for dy in (-0.125, 0.125)]
+        with torch.no_grad():
+            expected = network(v, t, torch.tensor([points]))[0].mean(0).clamp(0, 1).numpy()
+        np.testing.assert_allclose(picture[row, column], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("canvas", [(64, 80), (8, 8)])
+def test_a_picture_waits_for_nothing_on_a_device(canvas: tuple[int, int]) -> None:
+    """Everything is on its way before the first number is asked for, of a device that has none."""
+    streaming = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval()
+    network, share = (streaming if canvas == (8, 8) else reading()).to("meta"), []
+    with Asked() as asked, pytest.raises(NotImplementedError, match="Cannot copy out of meta"):
+        draw_whole(network, some(3, canvas), progress=share.append)
+    assert share[-1] == 1.0
+    assert asked.seen["upload"] <= 4
+
+
+def test_streaming_draws_its_own_size_alone() -> None:
+    torch.manual_seed(2)
+    network, p = Streaming(StreamingConfig(resolution=8, width=1 / 32)).eval(), some(2, (8, 8))
+    picture = np.asarray(draw_whole(network, p).image)
+    with torch.no_grad():
+        image = network(
+            torch.from_numpy(p.vectors.copy())[None], torch.from_numpy(p.tokens.astype(np.int64))[None]
+        )[0]
+    np.testing.assert_allclose(picture, image.clamp(0, 1).permute(1, 2, 0).numpy(), atol=1e-6)
+    with pytest.raises(ProgramError, match="8 x 8"):
+        draw_whole(network, some(2, (16, 16)))
+
+
+def test_white_only_and_nothing_is_white() -> None:
+    for background in (None, (1.0, 0.9, 1.0)):
+        with pytest.raises(ProgramError, match="white"):
+            draw_whole(reading(), some(1, (4, 4), background))
+    empty = draw_whole(reading(), some(0, (5, 4)))
+    assert np.array_equal(np.asarray(empty.image), np.ones((4, 5, 3), np.float32))
