@@ -44,6 +44,7 @@ FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
 
 # Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
 _SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
+_SPACED = rf"[0-9]*\.?[0-9]++[ \t]++(?:{'|'.join((*UNITS, *UNIT_ALIASES))})(?!\w)"
 _SLIPS = {
     "open_comment": r"/\*",
     "close_comment": r"\*/",
@@ -192,12 +193,11 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     language = tables()
     words = [text for text in language.literals if text[0].isalpha()]
     signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
-    names = ["", *language.patterns, *_SLIPS]
-    slips = [*_SLIPS.values()]
-    groups = [*language.patterns.values(), *slips, "|".join(map(re.escape, signs)), _ILLEGAL]
-    kinds = [-1, *(language.kind(name) for name in language.patterns), *[-1] * (len(slips) + 2)]
-    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups) + r"|\Z)"
-    return re.compile(pattern), kinds, [*names, "sign", "illegal"]
+    groups = {"spaced": _SPACED, **language.patterns, **_SLIPS}
+    groups |= {"sign": "|".join(map(re.escape, signs)), "illegal": _ILLEGAL}
+    kinds = [-1, *(language.kind(name) if name in language.patterns else -1 for name in groups)]
+    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups.values()) + r"|\Z)"
+    return re.compile(pattern), kinds, ["", *groups]
 
 
 def scan(source: SourceFile, report: Report) -> Tokens:
@@ -305,6 +305,15 @@ class _Slips:
                 units = ", ".join(f"`{unit}`" for unit in UNITS)
                 help = f"units are {units}; a product is written with `*`"
         self.report.add("E0116", message, start, end, help=help, fix=fix)
+
+    def _spaced(self, start: int, end: int, text: str) -> None:
+        self._keep("NUMBER", start, end)
+        number, word = text.split()
+        unit = UNIT_ALIASES.get(word, word)
+        place = start + len(number)
+        fix = self.report.change(place, end, unit, f"write `{unit}` right after the number")
+        help = "units are glued to their number"
+        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
         constant = re.fullmatch(
