@@ -114,8 +114,10 @@ _BRACKETS: Final = "vectors stand in brackets"
 _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
 _JOINS: Final = "`<node>` joins no loop"
 _HOLDS: Final = "the loop stands in its block: <node> { square; for (i in 0..3) { star; } }"
-_LISTED: Final = "a loop in a vector begins with `for (…)`"
-_WRITTEN: Final = "write [for (i in 0..<n) i / n]"
+_LISTED: Final = "vectors are not made by loops"
+_WRITTEN: Final = (
+    "write the items out, or draw in a loop: for (i in 0..<n) { s.disc(0.1) { translate(i, 0); } }"
+)
 _COMMAS: Final = "`,` between statements"
 _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
