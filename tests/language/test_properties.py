@@ -15,7 +15,6 @@ from scenelang.language.formatting import format_text
 from scenelang.language.lexer import Report, scan
 from scenelang.language.reports import SceneError
 from scenelang.language.tables import tables
-from tests.language.programs import laid_out
 from tests.language.reading import SCENES, read
 from tests.language.sameness import comments, tree_of
 
@@ -83,21 +82,6 @@ def test_comments_anywhere(seed: int, rate: float) -> None:
     for word in words:
         gaps = generator.choices(COMMENTS, k=generator.choice((1, 1, 2)))
         text += word + " " + (" ".join(gaps) if generator.random() < rate else "")
-    holds(text)
-
-
-@settings(max_examples=60, suppress_health_check=list(HealthCheck))
-@given(laid_out())
-def test_random_programs(text: str) -> None:
-    assert read(text)[1] == []
-    holds(text)
-
-
-@pytest.mark.slow
-@settings(max_examples=1500, suppress_health_check=list(HealthCheck))
-@given(laid_out())
-def test_many_random_programs(text: str) -> None:
-    assert read(text)[1] == []
     holds(text)
 
 

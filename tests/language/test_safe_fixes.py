@@ -143,6 +143,8 @@ def test_fixes_of_slips_bring_the_scene_back_or_leave_an_error(seed: int) -> Non
         if not any(d.fix for d in check(slip) if d.severity == "error"):
             continue
         done = settle({"one": slip}, lambda texts: [("one", d) for d in check(texts["one"])])
+        assert done.stable
+        assert not any(d.fix for _, d in done.left)
         if not any(d.severity == "error" for _, d in done.left):
             assert read(done.texts["one"]) == scene, slip
             mended += 1

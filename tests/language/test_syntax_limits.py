@@ -91,11 +91,6 @@ def test_the_cause_of_many_mistakes_is_not_looked_for_far_away() -> None:
     assert work(10_000) < 10 * first
 
 
-def test_index_chains_are_bounded() -> None:
-    tree, _ = read("let a = b" + "[0]" * MANY + ";")
-    assert depth(tree) <= 3 * MAX_DEPTH + 10
-
-
 GARBAGE = [
     "}",
     ")",
