@@ -18,12 +18,7 @@ from scenelang.assets.records import Record
 
 
 class SourceFile:
-    """One text a scene was read from.
-
-    Args:
-        name: what diagnostics print, usually the path as the user wrote it.
-        text: the whole text, decoded, newlines as they were.
-    """
+    """One text a scene was read from; diagnostics print its ``name``, usually the path as written."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name: Final = name
@@ -315,7 +310,7 @@ def is_slip(name: str, other: str, distance: float) -> bool:
 def instead(
     name: str, words: Mapping[str, str], known: Iterable[str], span: Span
 ) -> tuple[str | None, Fix | None]:
-    """Help and fix for a word of another language whose name here is known; both None for any other."""
+    """Help and fix for a word of another language whose name here is known, or None and None."""
     here = words.get(name.lower())
     if here is None or here not in known:
         return None, None

@@ -414,15 +414,9 @@ def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Toke
 
 
 def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at: int) -> bool:
-    """Report a habit in a statement and read what was meant in its place.
+    """Report a habit in the statement from ``first`` on and put what was meant in its place.
 
-    Args:
-        stack: the parser's states before the statement.
-        first: index of the statement's first token.
-        at: that of the one that does not fit.
-
-    Returns:
-        Whether there was one.
+    ``stack`` are the parser's states before the statement; ``at`` is the token that does not fit.
     """
     if len(report.found) > _MOST:
         return False

@@ -354,16 +354,12 @@ Mend = Callable[[list[int], list[Any], int], int | None]
 
 
 def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
-    """Read tokens to their end and build what they stand for.
+    """Read tokens to their end and build what they stand for; None where ``mend`` gave up.
 
     Args:
         kinds: of each token, the last of them `END`; ``mend`` may change the list.
-        callbacks: what builds the value of each rule, in the order of `Tables.rules`, from the values of its
-            parts; that of a token is its index. None passes the only value on.
-        mend: is asked at a token that does not fit; None gives up.
-
-    Returns:
-        What the last rule's callback made, None where ``mend`` gave up.
+        callbacks: builders of each rule's value from those of its parts, in the order of `Tables.rules`; the
+            value of a token is its index. None passes the only value on.
     """
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
@@ -432,10 +428,7 @@ def fits(stack: list[int], kind: int) -> bool:
 
 
 def reach(stack: list[int], kinds: list[int], start: int, stop: int) -> int:
-    """Index of the first token from ``start`` on that does not fit, at most ``stop``.
-
-    Changes the stack. A text read to its end counts as ``stop``.
-    """
+    """Index of the first token that does not fit, or ``stop``, also at the text's end; changes the stack."""
     for at in range(start, min(stop, len(kinds))):
         if not advance(stack, kinds[at]):
             return at
@@ -457,12 +450,7 @@ def statement_depth(stack: list[int]) -> int:
 
 
 def completion(stack: Sequence[int], goal: int) -> tuple[int, ...] | None:
-    """Kinds of the missing tokens, after which ``goal`` fits; None where no few do.
-
-    Args:
-        stack: states of the parser; they are not changed.
-        goal: kind of the token that should follow: a `;` or a brace.
-    """
+    """Kinds of the few missing tokens after which ``goal``, a `;` or a brace, fits; None where none do."""
     kind = tables().kind
     trial = list(stack)
     missing: list[int] = []

@@ -1,13 +1,11 @@
 """Recovery: braces matched by indentation, and tokens mended where they do not fit.
 
-Where braces do not match, the layout tells the line of the slip: a line that stands no further in than the
-head of an open block comes after its end. Trying the parser out on that line tells which brace is missing
-or too many. A text whose braces match is left alone, however it is laid out.
+Where braces do not match, the layout tells the line of the slip: one that stands no further in than the head
+of an open block comes after its end. Trying the parser out on it tells which brace is missing or too many.
 
-What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
-replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
-Where none helps, the statement is skipped. Braces match before parsing (`balance`), so a skip stays inside
-its block.
+With braces that match, what people bring from other languages is looked up first (`habits`). Then each way to
+insert, delete or replace a token near the mistake is tried out: it is worth how far the parser reads on, less
+what it costs. Where none helps, the statement is skipped up to its end.
 """
 
 from __future__ import annotations
@@ -124,9 +122,9 @@ def _slips(tokens: Tokens) -> list[tuple[int, int]]:
 
 def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
     """Report one brace of a line and mend it."""
-    stop = first + 1
-    while tokens.kinds[stop] != END and not tokens.on_new_line(stop):
-        stop += 1
+    newline = tokens.source.text.find("\n", tokens.starts[first])
+    last = len(tokens.kinds) - 1
+    stop = last if newline < 0 else bisect_left(tokens.starts, newline, first + 1)
     repair = _best(tokens, first, stop, missing)
     names = [tables().kinds[kind] for kind in repair.insert]
     end = tokens.end_before(repair.at)
@@ -296,10 +294,9 @@ class Recovery:
         self.words = {kind for text, kind in literals.items() if text.isalpha()}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
-        """Mend what does not fit at a token; the parser's stacks are cut back to read a statement again.
+        """Mend what does not fit at a token and cut the parser's stacks back to read its statement again.
 
-        Returns:
-            The index to go on at, or None where there are too many mistakes.
+        Returns the index to go on at, or None where there are too many mistakes.
         """
         self.repairs += 1
         if self.report.full or self.repairs > 4 * MAX_MISTAKES:
@@ -350,9 +347,7 @@ class Recovery:
     def _search(self, base: list[int], stack: list[int], first: int, at: int) -> Repair | None:
         """The best repair of a statement from ``first`` on, or None where none helps.
 
-        Args:
-            base: the states before the statement.
-            stack: those at the mistake; used where it is too far from there.
+        ``base`` are the states before the statement, ``stack`` those at the mistake, used if it is too far.
         """
         kinds = self.tokens.kinds
         bound = next((i for i in range(at, at + FOLLOWED) if kinds[i] in self.ends), at + FOLLOWED)

@@ -81,27 +81,17 @@ def _lines(span: Span) -> range:
 
 
 class Reporter(Record, frozen=False):
-    """Mistakes of one evaluation, and the places and names that have been reported.
-
-    Args:
-        calls: the calls that are running.
-        damaged: what syntax mistakes have damaged, by file.
-        reported: the code that was reported at each place.
-        shared: indices of reports that several places share, by what they have in common.
-        effort: what looking for similar names may still cost.
-        words_in: the words of each file.
-    """
+    """Mistakes of one evaluation, and the places and names that have been reported."""
 
     diagnostics: Diagnostics
-    calls: Calls | None = None
+    calls: Calls | None = None  # those that are running
     damaged: dict[SourceFile, Damage] = field(default_factory=dict)
-    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)
-    shared: dict[Hashable, int] = field(default_factory=dict)
+    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)  # the code at each place
+    shared: dict[Hashable, int] = field(default_factory=dict)  # indices of reports that several places share
     effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
     words_in: dict[SourceFile, frozenset[str]] = field(default_factory=dict)
 
     def damage(self, source: SourceFile) -> Damage:
-        """Damage of a file by its syntax mistakes."""
         return self.damaged.get(source, _SOUND)
 
     def words(self, source: SourceFile) -> frozenset[str]:
@@ -130,13 +120,8 @@ class Reporter(Record, frozen=False):
     ) -> int | None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
 
-        One that shows in the library that ships is reported where that is called.
-
-        Returns:
-            The index of the report; None where nothing was added.
-
-        Raises:
-            Halt: there are so many mistakes that no more are kept.
+        One that shows in the library that ships is reported where that is called. Returns the index of the
+        report, None where nothing was added; raises `Halt` where no more mistakes are kept.
         """
         calls = self.calls
         site = calls.outside() if calls is not None and library.holds(span.source) else None
