@@ -44,7 +44,7 @@ FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
 
 # Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
 _SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
-_SPACED = rf"[0-9]*\.?[0-9]++[ \t]++(?:{'|'.join((*UNITS, *UNIT_ALIASES))})(?!\w)"
+_SPACED = rf"(?:[0-9]++(?:\.[0-9]++)?|\.[0-9]++)[ \t]++(?:{'|'.join((*UNITS, *UNIT_ALIASES))})(?!\w)"
 _SLIPS = {
     "open_comment": r"/\*",
     "close_comment": r"\*/",
