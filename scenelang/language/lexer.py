@@ -193,7 +193,7 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     language = tables()
     words = [text for text in language.literals if text[0].isalpha()]
     signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
-    groups = {"spaced": _SPACED, **language.patterns, **_SLIPS}
+    groups = {"NAME": language.patterns["NAME"], "spaced": _SPACED, **language.patterns, **_SLIPS}
     groups |= {"sign": "|".join(map(re.escape, signs)), "illegal": _ILLEGAL}
     kinds = [-1, *(language.kind(name) if name in language.patterns else -1 for name in groups)]
     pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups.values()) + r"|\Z)"
