@@ -44,7 +44,6 @@ FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
 
 # Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
 _SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
-_SPACED = rf"(?:[0-9]++(?:\.[0-9]++)?|\.[0-9]++)[ \t]++(?:{'|'.join((*UNITS, *UNIT_ALIASES))})(?!\w)"
 _SLIPS = {
     "open_comment": r"/\*",
     "close_comment": r"\*/",
@@ -193,7 +192,7 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     language = tables()
     words = [text for text in language.literals if text[0].isalpha()]
     signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
-    groups = {"NAME": language.patterns["NAME"], "spaced": _SPACED, **language.patterns, **_SLIPS}
+    groups = {**language.patterns, **_SLIPS}
     groups |= {"sign": "|".join(map(re.escape, signs)), "illegal": _ILLEGAL}
     kinds = [-1, *(language.kind(name) if name in language.patterns else -1 for name in groups)]
     pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups.values()) + r"|\Z)"
@@ -305,15 +304,6 @@ class _Slips:
                 units = ", ".join(f"`{unit}`" for unit in UNITS)
                 help = f"units are {units}; a product is written with `*`"
         self.report.add("E0116", message, start, end, help=help, fix=fix)
-
-    def _spaced(self, start: int, end: int, text: str) -> None:
-        self._keep("NUMBER", start, end)
-        number, word = text.split()
-        unit = UNIT_ALIASES.get(word, word)
-        place = start + len(number)
-        fix = self.report.change(place, end, unit, f"write `{unit}` right after the number")
-        help = "units are glued to their number"
-        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
 
     def _hash(self, start: int, end: int, text: str) -> None:
         constant = re.fullmatch(

@@ -23,6 +23,7 @@ from scenelang.language.habits import HEADS, MAX_REPLAY, OPERATORS, head, keywor
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
+    UNIT_ALIASES,
     Report,
     Tokens,
     advance,
@@ -32,7 +33,7 @@ from scenelang.language.lexer import (
     statement_depth,
 )
 from scenelang.language.tables import END, tables
-from scenelang.language.words import TRANSFORMS
+from scenelang.language.words import TRANSFORMS, UNITS
 
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
@@ -307,7 +308,7 @@ class Recovery:
         if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
             del states[depth + 1 :], values[depth:]
             return first
-        if first == at and self._start_mistake(at):
+        if self._spaced_unit(at) or (first == at and self._start_mistake(at)):
             return at
         repair = self._search(base, states, first, at)
         if repair is None:
@@ -482,6 +483,21 @@ class Recovery:
             tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if self._is(at + 1, "{") else [])
         else:
             return False
+        return True
+
+    def _spaced_unit(self, at: int) -> bool:
+        """`30 deg`: one number, whose value is unknown."""
+        tokens, number, word = self.tokens, tables().kind("NUMBER"), self.tokens.text(at)
+        unit, gap = UNIT_ALIASES.get(word, word), (tokens.end_before(at), tokens.starts[at])
+        bare = at > 0 and tokens.kinds[at - 1] == number and tokens.text(at - 1)[-1:].isdigit()
+        if not bare or unit not in UNITS or tokens.source.text[slice(*gap)].strip(" "):
+            return False
+        start, end = tokens.place(at - 1, at + 1)
+        fix = self.report.change(gap[0], end, unit, f"write `{unit}` right after the number")
+        help = "units are glued to their number"
+        self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
+        tokens.splice(at - 1, at + 1, [(number, start, end)])
+        tokens.reported.add(start)
         return True
 
     def _skip(self, first: int, at: int) -> int | None:

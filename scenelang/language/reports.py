@@ -242,7 +242,7 @@ def _block(diagnostic: Diagnostic, width: int, color: bool) -> str:
     severity, fix = diagnostic.severity, diagnostic.fix
     head = paint(severity, f"{severity}[{diagnostic.code}]", color)
     lines = [head + paint("bold", f": {printable(diagnostic.message)}", color)]
-    notes = [(diagnostic.span, "", severity)] if diagnostic.span is not None else []
+    notes: list[Note] = [(diagnostic.span, "", severity)] if diagnostic.span is not None else []
     notes += [(label.span, label.message, "frame") for label in diagnostic.labels]
     numbers = [1, *(span.locate()[1][0] for span, _, _ in notes)]
     edits = fix.edits if fix else ()
