@@ -59,17 +59,19 @@ def balance(tokens: Tokens, report: Report) -> None:
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
 
 
-def _unmatched(tokens: Tokens, stop: int) -> tuple[list[int], list[int]]:
-    """Indices of the braces that are open before ``stop``, and of those that close nothing."""
-    opening, closing = (tables().literals[sign] for sign in "{}")
+def _unmatched(tokens: Tokens, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
+    """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
+    signs = [tables().literals[sign] for sign in pairs]
+    opening, closing = signs[::2], signs[1::2]
     open_: list[int] = []
     stray: list[int] = []
-    for index, kind in enumerate(tokens.kinds[:stop]):
-        if kind == opening:
+    for index in range(first, stop):
+        kind = tokens.kinds[index]
+        if kind in opening:
             open_.append(index)
-        elif kind == closing and open_:
+        elif kind in closing and open_:
             open_.pop()
-        elif kind == closing:
+        elif kind in closing:
             stray.append(index)
     return open_, stray
 
@@ -314,7 +316,7 @@ class Recovery:
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)
-        report_repair(self.tokens, self.report, repair, self._open(first, repair.at))
+        report_repair(self.tokens, self.report, repair, _unmatched(self.tokens, repair.at, first, "()[]")[0])
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if at - first > MAX_REPLAY:
             return at
@@ -331,17 +333,6 @@ class Recovery:
             return value
         span: Span = value[1] if isinstance(value, tuple) else value.span
         return bisect_left(self.tokens.starts, span.start)
-
-    def _open(self, first: int, at: int) -> list[int]:
-        """Indices of the brackets of a statement that are open before a token."""
-        open_: list[int] = []
-        for index in range(first, at):
-            kind = self.tokens.kinds[index]
-            if kind in self.closing_of:
-                open_.append(index)
-            elif kind in self.closing_of.values() and open_:
-                open_.pop()
-        return open_
 
     # ------------------------------------------------------------ the best repair
 
@@ -405,7 +396,7 @@ class Recovery:
         tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
         kind, new_line = kinds[at], tokens.on_new_line(at)
         after = kinds[at + 1] if kind != END else END
-        open_ = self._open(first, at)
+        open_ = _unmatched(tokens, at, first, "()[]")[0]
         if open_:
             dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
             closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
