@@ -208,7 +208,7 @@ def _mends(
 
 FOLLOWED: Final = 80
 """Number of tokens for which the likeliest repairs are followed, to choose between them."""
-_WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
+_WINDOW: Final = 8  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 
 # What may be missing, and what that costs; tokens that only make sense together count as one.
@@ -362,34 +362,29 @@ class Recovery:
                 if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
                     attempts.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
 
-        def settle() -> tuple[float, Repair | None]:
+        def settle() -> Repair | None:
             best: tuple[float, Repair | None] = (-inf, None)
             for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
                 end = repair.at + repair.delete
                 score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
                 best = max(best, (score, repair), key=lambda one: one[0])
-            return best
+            return best[1]
 
         if at - first > MAX_REPLAY:
             attempt(stack, at, self._candidates(stack, first, at))
-            return settle()[1]
+            return settle()
         prefixes, prefix = [], base.copy()
         for place in range(first, at):  # replayed: the parser may have applied rules for the bad token
             prefixes.append((place, prefix.copy()))
             advance(prefix, kinds[place])
         attempt(prefix, at, self._candidates(prefix, first, at))
-        for place, stack in {index: prefixes[index] for index in (0, -1) if prefixes}.values():
+        for place, stack in prefixes[:1]:
             attempt(stack, place, self._misspelt(first, place))
-        prefixes = prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else []
-        for place, stack in prefixes:  # a line that may be a statement of its own
+        for place, stack in prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else prefixes[-1:]:
             if self.tokens.on_new_line(place) and kinds[place] in (self.name, *self.words):
                 attempt(stack, place, self._broken_off(stack, place, 0.7 - 0.1 * (at - place)))
-        score, best = settle()
-        if best is None or score < worth(at + FOLLOWED) - 2:
-            for place, stack in prefixes:
-                attempt(stack, place, self._candidates(stack, first, place))
-            best = settle()[1]
-        return best
+            attempt(stack, place, self._candidates(stack, first, place))
+        return settle()
 
     def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
         """All repairs at one token."""
