@@ -18,12 +18,7 @@ from scenelang.assets.records import Record
 
 
 class SourceFile:
-    """One text a scene was read from.
-
-    Args:
-        name: what diagnostics print, usually the path as the user wrote it.
-        text: the whole text, decoded, newlines as they were.
-    """
+    """One text a scene was read from; diagnostics print its ``name``, usually the path as written."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name: Final = name
@@ -282,17 +277,6 @@ def _slips(a: str, b: str, limit: int) -> float:
     return row[-1]
 
 
-class Suggestion(str):
-    """A help text that suggests one name, with the name."""
-
-    name: str
-
-    def __new__(cls, name: str) -> Suggestion:
-        suggestion = super().__new__(cls, f"did you mean `{name}`?")
-        suggestion.name = name
-        return suggestion
-
-
 def did_you_mean(
     name: str, known: Iterable[str], span: Span, *, slips: int | None = None, effort: Effort | None = None
 ) -> tuple[str | None, Fix | None]:
@@ -309,7 +293,7 @@ def did_you_mean(
         shown = [f"`{candidate}`" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
     fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
-    return Suggestion(near[0]), fix
+    return f"did you mean `{near[0]}`?", fix
 
 
 def is_slip(name: str, other: str, distance: float) -> bool:
@@ -326,7 +310,7 @@ def is_slip(name: str, other: str, distance: float) -> bool:
 def instead(
     name: str, words: Mapping[str, str], known: Iterable[str], span: Span
 ) -> tuple[str | None, Fix | None]:
-    """Help and fix for a word of another language whose name here is known; both None for any other."""
+    """Help and fix for a word of another language whose name here is known, or None and None."""
     here = words.get(name.lower())
     if here is None or here not in known:
         return None, None

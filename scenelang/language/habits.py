@@ -11,6 +11,7 @@ A habit is a pattern and its replacement, as texts with holes: ``for (<i> = [<A>
 ``<VALUES>``            as ``<A>``, where it begins with a number, a colour or a vector
 ``<LINE>``              the rest of the line, or of the statement on it
 ``<BODY>``              the same, or all lines below that stand further in
+``<STMT>``              one statement with its ``;`` or block
 ``<BLOCK>``             a block with its braces
 ``<PARAMS>``            parameters; the replacement has them without their types
 ``…?`` before ``>``     may be missing
@@ -22,6 +23,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from functools import cache, lru_cache, partial
+from math import inf
 from typing import Final
 
 from scenelang.assets.records import Record
@@ -46,6 +48,7 @@ MAX_REPLAY: Final = 400
 
 _FOLLOWED: Final = 80  # tokens behind a habit that are read to see whether it was one
 _LONGEST: Final = 1000  # letters of a habit, without its block
+_BEHIND: Final = ("BODY", "BLOCK", "STMT")  # holes at the end of a pattern, which tokens tell
 _MOST: Final = 100  # mistakes of a file among which habits are looked for
 
 _TYPES: Final = ("float", "int", "bool", "double", "number", "string", *(f"vec{n}" for n in "234"), "color")
@@ -66,6 +69,7 @@ _WORDS: Final[dict[str, tuple[str, ...]]] = {
     "next": _MOVES,
     "block": (*NODES, "for", "if"),
     "control": ("for", "if"),
+    "color": ("color", "colour"),
     "library": ("math", "numpy", "random", "sys", "os", "Math"),
 }
 """Words that a hole of this name takes."""
@@ -96,7 +100,9 @@ _LOOP: Final = "`for` takes a range or a vector"
 _PASSES: Final = "write for (<i> in 0..<n) { … }"
 _BRACES: Final = "blocks stand in braces"
 _FUNCTION: Final = "a function is `fn` and one expression"
+_UNNAMED_FN: Final = "missing `fn` before `<f>`"
 _SQUARE: Final = "write fn <f>(x) = x ^ 2;"
+_PIECE_OF: Final = "write module <f>() { … }"
 _PARENTHESES: Final = "missing parentheses"
 _UNTYPED: Final = "names have no types"
 _RANGE: Final = "ranges are written with `..`"
@@ -117,7 +123,6 @@ _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _METHOD: Final = "transforms stand in the block of what they move"
-_DRAWN: Final = "objects are drawn where they stand"
 _VALUE: Final = "objects are not values"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
 _BEFORE: Final = "transforms stand behind what they apply to"
@@ -130,6 +135,7 @@ _UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric
 _PATH: Final = "files are imported by their path"
 _IMPORTED: Final = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
 _IMPORT: Final = "functions are there without an import"
+_MANDATORY: Final = "braces are mandatory here"
 
 HABITS: Final = (
     # loops and conditions
@@ -146,26 +152,27 @@ HABITS: Final = (
     Habit("<elif> <E> {", "<elif> (<E>) {", _PARENTHESES, "it is `else if (…) { … }` here", "E0107"),
     Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
     _unsafe("for (<i>, <v> in <E>)", "for (<i> in <E>)", "a loop has one name", _PASSES),
+    Habit("<control> (<E>) <STMT>", "<control> (<E>) { <STMT> }", "missing braces", _MANDATORY, "E0106"),
+    Habit("else <STMT>", "else { <STMT> }", "missing braces", _MANDATORY, "E0106"),
     _unsafe("<node> <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
     _unsafe("<node>(<P>) <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
     _unsafe("let (<P>) <LINE?>", "BAD_HEAD", "`let` has no parentheses", "write let x = 1; before its use"),
     # functions and modules
     Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
-    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, "write module <f>() { … }"),
+    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, _PIECE_OF),
     Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    _unsafe("<fn> <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
-    _unsafe("<fn> <f>(<P?>) = <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
-    _unsafe("void <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, "write module <f>() { … }"),
+    _unsafe("<fn> <f>(<P?>) <=?> <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
+    _unsafe("void <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, _PIECE_OF),
     Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
     Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
-    Habit("<let> <f> = function(<P?>) { return <E> <;?> } <;?>", "fn <f>(<P>) = <E>;", _FUNCTION),
-    Habit("<let> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
+    Habit(
+        "<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"
+    ),
     Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
     Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNTYPED),
     Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _UNTYPED),
-    Habit("<f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"),
     Habit("fn <f> <P> = <E>;", "fn <f>(<P>) = <E>;", _PARENTHESES, code="E0107"),
     Habit("module <f> <P> {", "module <f>(<P>) {", _PARENTHESES, code="E0107"),
     # names
@@ -179,20 +186,17 @@ HABITS: Final = (
     Habit("<n>: <E>;", "<n>(<E>);", "`<n>` is called, not set"),
     Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", _BOUND, code="E0126"),
     _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
-    _unsafe("<n>++;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
-    _unsafe("<n>--;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
+    _unsafe("<n><++|-->;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
     _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
     # objects and their blocks
     Habit("<move>(<P>) <o>;", "<o> { <move>(<P>); }", _BEFORE, _INSIDE),
     Habit("<move>(<P>) <o>(<Q?>);", "<o>(<Q>) { <move>(<P>); }", _BEFORE, _INSIDE),
-    Habit("<move>(<P>) <turn>(<Q>) <o>;", "<o> { <turn>(<Q>); <move>(<P>); }", _BEFORE, _INSIDE),
     Habit("color(<E>) <o>;", "<o> { material <material> { color(<E>); } }", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <next>(<Q>) <o>", "<o>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <o>", "<o>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <next>(<Q>) <block>", "<block>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <node>()", "<node>", _BEFORE, _INSIDE),
     _unsafe("<before>(<P>) <block>", "<block>", _BEFORE, _INSIDE),
-    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
     _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
@@ -208,7 +212,6 @@ HABITS: Final = (
     _unsafe("<n>, <LINE> }", "BAD_STATEMENT }", _COMMAS, "every statement ends with `;`"),
     Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
     Habit("<node>(<A>, <B>);", "<node> { <A>; <B>; }", _ARGUED, _STANDS),
-    Habit("<node>(<A>, <B>, <C>);", "<node> { <A>; <B>; <C>; }", _ARGUED, _STANDS),
     _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
     Habit("<node>()", "<node>", "`<node>` takes no arguments"),
     _unsafe(
@@ -217,15 +220,13 @@ HABITS: Final = (
         "`<node>` takes no arguments",
         "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }",
     ),
-    _unsafe("< <A>, <B>, <C> > <LINE?> <BLOCK>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
-    _unsafe("< <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
+    _unsafe("<n?> < <A>, <B>, <C> > <LINE?> <BLOCK?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe(
         "< <n> <LINE>",
         "BAD_STATEMENT",
         "this is SVG or HTML",
         "a drawing becomes a shape: scenelang learn drawing.svg -o zoo.safetensors",
     ),
-    _unsafe("<n> < <A>, <B>, <C> > <LINE?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     _unsafe("<location|look_at|angle> [<A>] <LINE?> <;?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
     Habit("<call> <rgb|srgb> < <A>, <B>, <C> ><;?>", "<call>([<A>, <B>, <C>]);", _BRACKETS),
     # materials
@@ -234,17 +235,13 @@ HABITS: Final = (
     Habit("material(<VALUES>);", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
     Habit("material = <n>;", "material <n>;", "`material` is not set"),
     Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
-    Habit("material <n>();", "material <n>;", _ARGUMENTS),
-    Habit("material <n>(color = <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
-    _unsafe("material <n>(<A>, <P>);", "material <n>;", _ARGUMENTS, _COLOUR),
-    Habit("material <n>(<E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <n>()", "material <n>", _ARGUMENTS),
+    _unsafe("material <n>(<A>, <P>)", "material <n>", _ARGUMENTS, _COLOUR),
+    Habit("material <n>(<color?> <=?> <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
+    Habit("material <n>(<color?> <=?> <E>)", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
     Habit("material <m> = <n> <BLOCK>", "let <m> = material <n> <BLOCK>;", "a material is named by `let`"),
     Habit("material <n> <VALUES>;", "material <n> { color(<VALUES>); }", _OPERATIONS),
     Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
-    Habit("<let> <m> = material <n>();", "let <m> = material <n>;", _ARGUMENTS),
-    Habit("<let> <m> = material <n>(color = <E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS),
-    _unsafe("<let> <m> = material <n>(<A>, <P>);", "let <m> = material <n>;", _ARGUMENTS, _COLOUR),
-    Habit("<let> <m> = material <n>(<E>);", "let <m> = material <n> { color(<E>); };", _ARGUMENTS, _COLOUR),
     # expressions
     _unsafe("[for <E>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
     _unsafe("[<E> for <F>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
@@ -252,8 +249,7 @@ HABITS: Final = (
     Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
     Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
     Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
-    Habit("<rgb|srgb> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
-    Habit("< <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
+    Habit("<rgb|srgb?> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
     Habit("<A>%", "<A> / 100", "`%` is the rest of a division", "a share is a number: 50 % is 0.5"),
     # settings and imports
     Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
@@ -261,7 +257,6 @@ HABITS: Final = (
     Habit("from <library> import <LINE> <;?>", "", _IMPORT),
     Habit("import <n> from <A>;", "import <A> as <n>;", "the path comes first"),
     _unsafe("import <A> as <n>;", "BAD_STATEMENT", "a path stands in quotes", _IMPORTED, "E0126"),
-    _unsafe("import <n>.<m> <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("import <n> <LINE?> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
     _unsafe("<use> < <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
@@ -294,7 +289,7 @@ def _balanced(besides: str = "", word: str = "", depth: int = 4) -> str:
 def _expression(pattern: str) -> re.Pattern[str]:
     """The expression of a pattern, with a group for each hole; a block or body at its end is left out."""
     keywords = "|".join(word for word in tables().literals if word.isalpha() and word not in ("step", "as"))
-    pieces = [match for match in _PIECE.finditer(pattern) if match["hole"] not in ("BODY", "BLOCK")]
+    pieces = [match for match in _PIECE.finditer(pattern) if match["hole"] not in _BEHIND]
     parts, seen = [], set()
     for number, piece in enumerate(pieces):
         hole, text = piece["hole"], piece["text"]
@@ -322,33 +317,18 @@ def _expression(pattern: str) -> re.Pattern[str]:
     return re.compile("".join(parts))
 
 
-class _Match(Record):
-    """Places of a pattern's holes: indices of tokens, first and past the last."""
+_Match = dict[str, tuple[int, int]]
+"""Indices of the first token and past the last one of each hole, and of the whole at ``""``."""
 
-    tokens: Tokens
-    start: int
-    stop: int
-    holes: dict[str, tuple[int, int]]
 
-    @property
-    def whole(self) -> str:
-        return self.tokens.source.text[self.tokens.starts[self.start] : self.tokens.ends[self.stop - 1]]
-
-    def text(self, hole: str) -> str:
-        start, stop = self.holes[hole]
-        return self.tokens.source.text[self.tokens.starts[start] : self.tokens.ends[stop - 1]]
-
-    def filled(self, words: str) -> str:
-        """Words for a report, with the names that it has in its holes."""
-        for hole in filter(str.islower, self.holes):
-            words = words.replace(f"<{hole}>", self.text(hole))
-        return words
+def _text(tokens: Tokens, place: tuple[int, int]) -> str:
+    return tokens.source.text[slice(*tokens.place(*place))]
 
 
 def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
     """The tokens from ``at`` on that a pattern describes; None where they are others."""
-    text, begin = tokens.source.text, tokens.starts[at]
-    matched = _expression(pattern).match(text, begin, begin + _LONGEST)
+    begin = tokens.starts[at]
+    matched = _expression(pattern).match(tokens.source.text, begin, begin + _LONGEST)
     if matched is None:
         return None
 
@@ -358,79 +338,73 @@ def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
     holes, stop = {}, index(matched.end())
     for piece in _PIECE.finditer(pattern):
         hole = piece["hole"]
-        if hole in ("BODY", "BLOCK"):
-            end = _body(tokens, stop, at) if hole == "BODY" else _block(tokens, stop)
-            if end == stop:
+        if hole in _BEHIND:
+            end = _extent(tokens, hole, stop, at)
+            if end > stop:
+                holes[hole], stop = (stop, end), end
+                stop += hole == "BLOCK" and tokens.text(stop) == ";"
+            elif not piece["optional"]:
                 return None
-            holes[hole], stop = (stop, end), end
-            stop += hole == "BLOCK" and tokens.text(stop) == ";"
         elif hole:
             start, end = matched.span(re.sub(r"\W", "_", f"g_{hole}"))
             if start < end:
                 holes[hole] = (index(start), index(end))
     if stop <= at or any(first >= last for first, last in holes.values()):
         return None
-    return _Match(tokens, at, stop, holes)
+    return {**holes, "": (at, stop)}
 
 
-def _block(tokens: Tokens, at: int) -> int:
-    """Index after the block that begins at a token; ``at`` where none does."""
-    depth, (opening, closing) = 0, (tables().literals[sign] for sign in "{}")
-    for index in range(at, min(at + 4000, len(tokens.kinds) - 1)):
-        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == closing)
-        if depth <= 0:
-            return index + (index > at)
-    return at
-
-
-def _body(tokens: Tokens, at: int, head: int) -> int:
-    """Index after the rest of a line, or after the lines that stand further in than a head's."""
+def _extent(tokens: Tokens, hole: str, at: int, head: int) -> int:
+    """Index after what a hole of `_BEHIND` takes from ``at`` on, behind a head."""
 
     def column(index: int) -> int:
         return tokens.starts[index] - tokens.source.text.rfind("\n", 0, tokens.starts[index])
 
-    level = column(head) if tokens.on_new_line(at) else None
-    depth, (opening, closing) = 0, (tables().literals[sign] for sign in "{}")
-    for index in range(at, min(at + 4000, len(tokens.kinds) - 1)):
-        depth += (tokens.kinds[index] == opening) - (tokens.kinds[index] == closing)
-        if depth < 0 or (tokens.on_new_line(index) and (level is None or column(index) <= level)):
+    level = column(head) if tokens.on_new_line(at) else inf
+    depth, last = 0, min(at + 4000, len(tokens.kinds) - 1)
+    for index in range(at, last):
+        sign = tables().kinds[tokens.kinds[index]]
+        ended = depth == 0 and tokens.on_new_line(index) and column(index) <= level
+        if (hole == "BODY" and ended) or (hole == "BLOCK" and index == at and sign != "{"):
             return index
-    return min(at + 4000, len(tokens.kinds) - 1)
+        depth += (sign in ("(", "[", "{")) - (sign in (")", "]", "}"))
+        if depth < 0:
+            return index
+        if hole != "BODY" and depth == 0 and (sign == "}" or (sign == ";" and hole == "STMT")):
+            return index + 1
+    return last
 
 
-def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
+def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Token]]:
     """Text and tokens of a replacement: holes keep their places, all else is empty.
 
     A `BAD_` token takes the text behind the last hole before it. Holes that change their order are left out
     of the tokens: nothing is known of them.
     """
-    tokens, language = match.tokens, tables()
-    text, new, at = "", [], tokens.starts[match.start]
+    language = tables()
+    text, new, (at, close) = "", [], tokens.place(*match[""])
     for piece in _PIECE.finditer(meant):
         hole, word = piece["hole"], piece["text"]
-        if hole and hole not in match.holes and hole != "material":
+        if hole and hole not in match and hole != "material":
             continue  # what may be missing
         text += " " * bool(piece["gap"] and text)
-        if hole in match.holes:
-            first, last = match.holes[hole]
-            begin, written = tokens.starts[first], match.text(hole)
+        if hole in match:
+            begin, written = tokens.starts[match[hole][0]], _text(tokens, match[hole])
             types = [t.span() for t in _TYPED.finditer(written)] if hole == "PARAMS" else []
             text += _TYPED.sub("", written) if types else written
             if begin >= at:
-                part = tokens.part(first, last)
+                part = tokens.part(*match[hole])
                 new += [one for one in part if not any(i <= one[1] - begin < j for i, j in types)]
-                at = tokens.ends[last - 1]
+                at = part[-1][2]
             else:
-                kind = "BAD_EXPRESSION" if hole.isupper() else "NAME"
-                new.append((language.kind(kind), at, at))
+                new.append((language.kind("BAD_EXPRESSION" if hole.isupper() else "NAME"), at, at))
         elif word and word.startswith("BAD_"):
-            begin, at = at, tokens.ends[match.stop - 1]  # behind the holes before it, so that spans nest
-            new.append((language.kind(word), begin, at))
+            new.append((language.kind(word), at, close))  # behind the holes before it, so that spans nest
+            at = close
         else:
             if hole:
-                whole = tokens.source.text
-                solid = _SOLID.search(whole)
-                word = "…" if bool(solid) == bool(_FLAT.search(whole)) else "diffuse" if solid else "flat"
+                solid, flat = (shapes.search(tokens.source.text) for shapes in (_SOLID, _FLAT))
+                word = "…" if bool(solid) == bool(flat) else "diffuse" if solid else "flat"
             text += word
             new.append((language.literals.get(word, language.kind("NAME")), at, at))
     return text, new
@@ -440,15 +414,9 @@ def _replaced(match: _Match, meant: str) -> tuple[str, list[Token]]:
 
 
 def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at: int) -> bool:
-    """Report a habit in a statement and read what was meant in its place.
+    """Report a habit in the statement from ``first`` on and put what was meant in its place.
 
-    Args:
-        stack: the parser's states before the statement.
-        first: index of the statement's first token.
-        at: that of the one that does not fit.
-
-    Returns:
-        Whether there was one.
+    ``stack`` are the parser's states before the statement; ``at`` is the token that does not fit.
     """
     if len(report.found) > _MOST:
         return False
@@ -461,10 +429,12 @@ def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at:
             match = _find(habit.pattern, tokens, start)
             if match is None:
                 continue
-            written, new = _replaced(match, habit.meant)
-            if written != match.whole and _reads_on(tokens, stack, first, at, match, new, habit.meant):
+            written, new = _replaced(tokens, match, habit.meant)
+            if written != _text(tokens, match[""]) and _reads_on(
+                tokens, stack, first, at, match, new, habit.meant
+            ):
                 _tell(tokens, report, habit, match, written)
-                tokens.splice(match.start, match.stop, new)
+                tokens.splice(*match[""], new)
                 return True
     return False
 
@@ -484,6 +454,8 @@ def _anchors(tokens: Tokens, first: int, at: int) -> dict[str, list[int]]:
             operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
             anchors[text] = [] if operand else [index]
             break
+    anchors["material"] = [first, *anchors["A"]]
+    anchors["rgb|srgb"] = [*anchors["word"], at]
     return anchors
 
 
@@ -491,9 +463,10 @@ def _reads_on(
     tokens: Tokens, stack: list[int], first: int, at: int, match: _Match, new: list[Token], meant: str
 ) -> bool:
     """Test whether a replacement lets the rest of the statement read, or the head of one with a block."""
-    if match.start > at:
+    start, stop = match[""]
+    if start > at:
         return False
-    before, after = tokens.part(first, match.start), tokens.part(match.stop, match.stop + _FOLLOWED)
+    before, after = tokens.part(first, start), tokens.part(stop, stop + _FOLLOWED)
 
     def left(middle: list[Token]) -> int:
         """Number of tokens behind the first that does not fit; words for operators are mended later."""
@@ -509,26 +482,33 @@ def _reads_on(
         end += 1
         whole = after[end - 1][0] in ends
     head = "BODY" in meant or meant[:3] == "for"
-    further = rest < left(tokens.part(match.start, match.stop))
-    return further and read >= max(meant[:3] != "for", at - match.stop + 1) and (read >= end or head)
+    further = rest < left(tokens.part(start, stop))
+    if "STMT" in meant:  # what is wrong in the statement itself is reported later
+        return further
+    return further and read >= max(meant[:3] != "for", at - stop + 1) and (read >= end or head)
 
 
 def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str) -> None:
-    start, end = tokens.starts[match.start], tokens.ends[match.stop - 1]
+    def filled(words: str) -> str:
+        """Words with the names that were found in the holes."""
+        return re.sub("<([a-z]+)>", lambda hole: _text(tokens, match[hole[1]]), words)
+
+    start, end = tokens.place(*match[""])
     if start in tokens.reported:
         return
     text = tokens.source.text
     old = text[start:end]
-    code, message, help = habit.code, match.filled(habit.message), habit.help and match.filled(habit.help)
+    code, message, help = habit.code, filled(habit.message), habit.help and filled(habit.help)
     safe = habit.safe and "…" not in new and "//" not in old and "/*" not in old
     if habit.message == _BOUND:
-        name = match.text("n")
-        if re.search(rf"\b{name}\b", text[:start]):
-            code, message, help, safe = "E0133", match.filled(_ONCE), _NEW_NAME, False
+        if re.search(rf"\b{_text(tokens, match['n'])}\b", text[:start]):
+            code, message, help, safe = "E0133", filled(_ONCE), _NEW_NAME, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
             help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
-    elif habit.message == _BEFORE and match.start and head(tokens, match.start - 1) in _MOVES:
+    elif habit.message == _BEFORE and match[""][0] and head(tokens, match[""][0] - 1) in _MOVES:
         safe = False  # it may lack its `;`, and what follows be a material
+    elif "STMT" in match and tokens.on_new_line(match["STMT"][0]):
+        safe = False  # more of the lines below may be meant
     # What both have at their ends is not shown.
     lead = _alike(old, new)
     tail = _alike(old[lead:][::-1], new[lead:][::-1])

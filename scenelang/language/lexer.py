@@ -192,12 +192,11 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     language = tables()
     words = [text for text in language.literals if text[0].isalpha()]
     signs = sorted((text for text in language.literals if text not in words), key=len, reverse=True)
-    names = ["", *language.patterns, *_SLIPS]
-    slips = [*_SLIPS.values()]
-    groups = [*language.patterns.values(), *slips, "|".join(map(re.escape, signs)), _ILLEGAL]
-    kinds = [-1, *(language.kind(name) for name in language.patterns), *[-1] * (len(slips) + 2)]
-    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups) + r"|\Z)"
-    return re.compile(pattern), kinds, [*names, "sign", "illegal"]
+    groups = {**language.patterns, **_SLIPS}
+    groups |= {"sign": "|".join(map(re.escape, signs)), "illegal": _ILLEGAL}
+    kinds = [-1, *(language.kind(name) if name in language.patterns else -1 for name in groups)]
+    pattern = _SKIP + "(?:" + "|".join(f"({group})" for group in groups.values()) + r"|\Z)"
+    return re.compile(pattern), kinds, ["", *groups]
 
 
 def scan(source: SourceFile, report: Report) -> Tokens:
@@ -345,16 +344,12 @@ Mend = Callable[[list[int], list[Any], int], int | None]
 
 
 def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
-    """Read tokens to their end and build what they stand for.
+    """Read tokens to their end and build what they stand for; None where ``mend`` gave up.
 
     Args:
         kinds: of each token, the last of them `END`; ``mend`` may change the list.
-        callbacks: what builds the value of each rule, in the order of `Tables.rules`, from the values of its
-            parts; that of a token is its index. None passes the only value on.
-        mend: is asked at a token that does not fit; None gives up.
-
-    Returns:
-        What the last rule's callback made, None where ``mend`` gave up.
+        callbacks: builders of each rule's value from those of its parts, in the order of `Tables.rules`; the
+            value of a token is its index. None passes the only value on.
     """
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
@@ -423,10 +418,7 @@ def fits(stack: list[int], kind: int) -> bool:
 
 
 def reach(stack: list[int], kinds: list[int], start: int, stop: int) -> int:
-    """Index of the first token from ``start`` on that does not fit, at most ``stop``.
-
-    Changes the stack. A text read to its end counts as ``stop``.
-    """
+    """Index of the first token that does not fit, or ``stop``, also at the text's end; changes the stack."""
     for at in range(start, min(stop, len(kinds))):
         if not advance(stack, kinds[at]):
             return at
@@ -448,12 +440,7 @@ def statement_depth(stack: list[int]) -> int:
 
 
 def completion(stack: Sequence[int], goal: int) -> tuple[int, ...] | None:
-    """Kinds of the missing tokens, after which ``goal`` fits; None where no few do.
-
-    Args:
-        stack: states of the parser; they are not changed.
-        goal: kind of the token that should follow: a `;` or a brace.
-    """
+    """Kinds of the few missing tokens after which ``goal``, a `;` or a brace, fits; None where none do."""
     kind = tables().kind
     trial = list(stack)
     missing: list[int] = []

@@ -180,13 +180,13 @@ class Builder:
         if start == end or start in self.tokens.reported:
             return tree.BadExpr(span)
         text = self.text[start:end]
-        # No digit or exponent ends in one of these letters; spaces stand before a unit that was not glued.
+        # No digit or exponent ends in one of these letters.
         digits = text.rstrip("adegmnrstu")
         value = float(digits)
         if isinf(value):
             self.report.add("E0125", "number too large", start, end, help="the largest number is 1.8e308")
             return tree.BadExpr(span)
-        return tree.Number(span, value, text[len(digits) :], digits.strip().isdigit())
+        return tree.Number(span, value, text[len(digits) :], digits.isdigit())
 
     def string(self, token: int) -> tree.String:
         start, end = self.starts[token], self.ends[token]

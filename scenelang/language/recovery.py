@@ -1,13 +1,11 @@
 """Recovery: braces matched by indentation, and tokens mended where they do not fit.
 
-Where braces do not match, the layout tells the line of the slip: a line that stands no further in than the
-head of an open block comes after its end. Trying the parser out on that line tells which brace is missing
-or too many. A text whose braces match is left alone, however it is laid out.
+Where braces do not match, the layout tells the line of the slip: one that stands no further in than the head
+of an open block comes after its end. Trying the parser out on it tells which brace is missing or too many.
 
-What people bring from other languages is looked up first (`habits`). Then each way to insert, delete or
-replace a token near the mistake is tried out: it is worth how far the parser reads on, less what it costs.
-Where none helps, the statement is skipped. Braces match before parsing (`balance`), so a skip stays inside
-its block.
+With braces that match, what people bring from other languages is looked up first (`habits`). Then each way to
+insert, delete or replace a token near the mistake is tried out: it is worth how far the parser reads on, less
+what it costs. Where none helps, the statement is skipped up to its end.
 """
 
 from __future__ import annotations
@@ -17,10 +15,10 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from functools import cache
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from scenelang.assets.records import Record
-from scenelang.language.diagnostics import Edit, Fix, Label, Span
+from scenelang.language.diagnostics import Label, Span
 from scenelang.language.habits import HEADS, MAX_REPLAY, OPERATORS, head, keywords_near, mend_habit
 from scenelang.language.lexer import (
     LOOKAHEAD,
@@ -44,46 +42,36 @@ _INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "i
 """Tokens that a brace may be written for, likely ones first."""
 
 
-class _Slip(NamedTuple):
-    """A line with a brace too few or too many: its tokens, and the brace that it lacks."""
-
-    first: int
-    stop: int
-    missing: int
-
-
 def balance(tokens: Tokens, report: Report) -> None:
     """Report braces that do not match and mend the token list."""
     if not tokens.cut:  # an open comment would have swallowed the rest of the layout
-        line, grown = -1, 0  # the line that is mended, and by how many tokens it grew
-        for slip in reversed(_slips(tokens)):  # from the last on, so that indices hold
-            same = slip.first == line
-            line, grown = slip.first, grown if same else 0
-            size = len(tokens.kinds)
-            _mend(tokens, report, slip._replace(stop=slip.stop + grown))
-            grown += len(tokens.kinds) - size
-    stray = _unmatched(tokens)[1]
+        for first, missing in reversed(_slips(tokens)):  # from the last on, so that indices hold
+            _mend(tokens, report, first, missing)
+    last = len(tokens.kinds) - 1
+    stray = _unmatched(tokens, last)[1]
     for at in stray:
         report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
     tokens.drop(stray)
-    open_ = _unmatched(tokens)[0]
-    last = len(tokens.kinds) - 1
+    last -= len(stray)
+    open_ = _unmatched(tokens, last)[0]
     if open_ and not tokens.cut:
         _report_unclosed(tokens, report, last, open_[-3:], len(open_))
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
 
 
-def _unmatched(tokens: Tokens) -> tuple[list[int], list[int]]:
-    """Indices of the braces that are open at the end, and of those that close nothing."""
-    opening, closing = (tables().literals[sign] for sign in "{}")
+def _unmatched(tokens: Tokens, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
+    """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
+    signs = [tables().literals[sign] for sign in pairs]
+    opening, closing = signs[::2], signs[1::2]
     open_: list[int] = []
     stray: list[int] = []
-    for index, kind in enumerate(tokens.kinds):
-        if kind == opening:
+    for index in range(first, stop):
+        kind = tokens.kinds[index]
+        if kind in opening:
             open_.append(index)
-        elif kind == closing and open_:
+        elif kind in closing and open_:
             open_.pop()
-        elif kind == closing:
+        elif kind in closing:
             stray.append(index)
     return open_, stray
 
@@ -95,11 +83,8 @@ def _report_unclosed(tokens: Tokens, report: Report, at: int, open_: list[int], 
     report.add("E0104", message, end, end, labels=labels)
 
 
-# ---------------------------------------------------------------- the lines of the slips
-
-
-def _slips(tokens: Tokens) -> list[_Slip]:
-    """Lines whose braces do not go with the layout, as many as braces are missing at most."""
+def _slips(tokens: Tokens) -> list[tuple[int, int]]:
+    """First tokens of lines whose braces do not go with the layout, each with the brace that it lacks."""
     kinds, starts, text = tokens.kinds, tokens.starts, tokens.source.text
     opening, closing = (tables().literals[sign] for sign in "{}")
     surplus = kinds.count(opening) - kinds.count(closing)
@@ -107,88 +92,70 @@ def _slips(tokens: Tokens) -> list[_Slip]:
     heads = [at for at in range(last) if tokens.on_new_line(at)]
     columns = [starts[at] - text.rfind("\n", 0, starts[at]) for at in heads]
     open_: list[tuple[int, int]] = []  # column and line of the heads of open blocks
-    slips: list[_Slip] = []
-    doubled: set[int] = set()  # lines that leave two blocks open
+    slips: list[tuple[int, int]] = []
+    doubled: set[int] = set()  # lines that leave two blocks open, one of them too many
     at_column: dict[int, int] = {}  # the last line that begins at a column
     for line, first in enumerate(heads):
         stop = heads[line + 1] if line + 1 < len(heads) else last
         column, closes = columns[line], kinds[first] == closing
         while open_ and (open_[-1][0] > column or (open_[-1][0] == column and not closes)):
             head = open_.pop()[1]
-            if head not in doubled:  # else one of its two is too many
-                head = line - 1
-            slips.append(_Slip(heads[head], heads[head + 1], closing))
+            slips.append((heads[head if head in doubled else line - 1], closing))
         for at in range(first, stop):
             if kinds[at] == opening:
-                deeper = line + 1 == len(heads) or columns[line + 1] > column
-                inside = deeper or at + 1 < stop
+                inside = line + 1 == len(heads) or columns[line + 1] > column or at + 1 < stop
                 open_.append((column if inside else 0, line))
             elif kinds[at] == closing:
                 if open_ and (open_[-1][1] == line or (closes and open_[-1][0] in (0, column))):
                     open_.pop()
                     continue
                 head = at_column.get(column, line) if at == first else line
-                if head < line and columns[head + 1] > column:  # its block was not opened there
-                    slips.append(_Slip(heads[head], heads[head + 1], opening))
-                else:
-                    slips.append(_Slip(first, stop, opening))
+                opened = head == line or columns[head + 1] <= column
+                slips.append((first if opened else heads[head], opening))  # else its block was not opened
         at_column[column] = line
         if sum(head == line for _, head in open_[-2:]) == 2:
             doubled.add(line)
     if open_ and open_[-1][1] == len(heads) - 1:
-        slips.append(_Slip(heads[-1], last, closing))
-    if sum(1 if slip.missing == closing else -1 for slip in slips) != surplus:  # an odd layout
+        slips.append((heads[-1], closing))
+    if sum(1 if missing == closing else -1 for _, missing in slips) != surplus:  # an odd layout
         wanted = closing if surplus > 0 else opening
-        slips = [slip for slip in slips if slip.missing == wanted][: abs(surplus)]
+        slips = [slip for slip in slips if slip[1] == wanted][: abs(surplus)]
     return sorted(slips)[:_MOST]
 
 
-# ---------------------------------------------------------------- mending a line
-
-
-def _mend(tokens: Tokens, report: Report, slip: _Slip) -> None:
+def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
     """Report one brace of a line and mend it."""
-    opening, closing = (tables().literals[sign] for sign in "{}")
-    repair = _best(tokens, slip)
+    newline = tokens.source.text.find("\n", tokens.starts[first])
+    last = len(tokens.kinds) - 1
+    stop = last if newline < 0 else bisect_left(tokens.starts, newline, first + 1)
+    repair = _best(tokens, first, stop, missing)
     names = [tables().kinds[kind] for kind in repair.insert]
     end = tokens.end_before(repair.at)
     if names == ["{"] and not repair.delete:
         report.add("E0106", "missing `{`", end, end, fix=" {")
     elif names == ["}"] and not repair.delete:
-        open_: list[int] = []
-        for index in range(repair.at):
-            if tokens.kinds[index] == opening:
-                open_.append(index)
-            elif tokens.kinds[index] == closing and open_:
-                open_.pop()
-        _report_unclosed(tokens, report, repair.at, open_[-1:])
+        _report_unclosed(tokens, report, repair.at, _unmatched(tokens, repair.at)[0][-1:])
     else:
         report_repair(tokens, report, repair, [])
     tokens.replace(repair.at, repair.delete, repair.insert)
 
 
-def _best(tokens: Tokens, slip: _Slip) -> Repair:
-    """The change after which most of the line, and what follows it, reads."""
+def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
+    """The change of a line after which most of it, and what follows, reads."""
     kinds, (opening, closing) = tokens.kinds, (tables().literals[sign] for sign in "{}")
-    first, stop = slip.first, slip.stop
     limit = stop  # the layout cannot tell a brace at the end of a line from one at the start of the next
     while kinds[limit] in (opening, closing):
         limit += 1
     end = min(limit + _BEHIND, len(kinds) - 1)
-    ends = {opening, closing, tables().literals[";"]}
-    before = range(first, max(0, first - _LONGEST), -1)
-    head = next((at for at in before if kinds[at - 1] in ends), first)
-    if reach(_inside(kinds, head), kinds, head, end) > reach(_inside(kinds, first), kinds, first, end):
-        first = head  # the line goes on with a statement
     stack = _inside(kinds, first)
     misfit = min(reach(stack.copy(), kinds, first, end), limit)
     places = range(max(first, misfit - _LONGEST), misfit + 1)
     reach(stack, kinds, first, places.start)
     depth = sum((kind == opening) - (kind == closing) for kind in kinds[first : places.start])
-    best, highest = Repair(stop, 0, (slip.missing,)), (-1, 0.0, -1)
+    best, highest = Repair(stop, 0, (missing,)), (-1, 0.0, -1)
     for at in places:
-        for mend in _mends(tokens, stack, at, stop, limit, slip.missing):
-            if slip.missing in mend.insert and slip.missing == closing and at < stop and depth < 1:
+        for mend in _mends(tokens, stack, at, stop, limit, missing):
+            if missing in mend.insert and missing == closing and at < stop and depth < 1:
                 continue  # it would close what the layout leaves open
             trial = stack.copy()
             if all(advance(trial, kind) for kind in mend.insert):
@@ -205,15 +172,12 @@ def _best(tokens: Tokens, slip: _Slip) -> Repair:
 
 def _inside(kinds: list[int], first: int) -> list[int]:
     """The states deep inside blocks: all that a line can close fits there."""
-    literals, name = tables().literals, tables().kind("NAME")
-    head = [name, literals["{"]]
-    if literals["else"] in kinds[first : first + 2]:
-        head = [literals["if"], literals["("], name, literals[")"], literals["{"]]
+    words = "if ( NAME ) {" if tables().literals["else"] in kinds[first : first + 2] else "NAME {"
     stack = [tables().start]
-    for kind in head * 40:
+    for kind in _kinds(words) * 40:
         advance(stack, kind)
-    if kinds[first] == literals["else"]:
-        advance(stack, literals["}"])
+    if kinds[first] == tables().literals["else"]:
+        advance(stack, tables().literals["}"])
     return stack
 
 
@@ -223,17 +187,15 @@ def _mends(
     """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
     literals, kind = tables().literals, tokens.kinds[at]
     closes = missing == literals["}"]
-    surplus = literals["{"] if closes else literals["}"]
+    surplus = literals["{" if closes else "}"]
     if at <= stop:
         yield Repair(at, 0, (missing,), -0.3)
     if at == stop and not fits(stack, literals["}"]):  # the line breaks off
-        rest = completion(stack, literals[";"] if closes else literals["{"])
+        rest = completion(stack, literals[";" if closes else "{"])
         if rest is not None and (closes or rest):
             yield Repair(at, 0, (*rest, *((literals[";"],) if closes else ()), missing), -0.6)
     elif at == stop and closes:
         yield Repair(at, 0, (missing, literals[";"]), -0.25)
-    if at == stop and closes and kind != missing:
-        yield Repair(at, 1, (missing,), -0.1)
     if at >= limit:
         return
     if kind == surplus:
@@ -246,9 +208,8 @@ def _mends(
 
 FOLLOWED: Final = 80
 """Number of tokens for which the likeliest repairs are followed, to choose between them."""
-_WINDOW: Final = 24  # tokens before the mistake among which its cause is looked for
+_WINDOW: Final = 8  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
-_FAR: Final = 1000  # tokens that the statement of a loop without braces may have
 
 # What may be missing, and what that costs; tokens that only make sense together count as one.
 _INSERTIONS: Final = {
@@ -336,10 +297,9 @@ class Recovery:
         self.words = {kind for text, kind in literals.items() if text.isalpha()}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
-        """Mend what does not fit at a token; the parser's stacks are cut back to read a statement again.
+        """Mend what does not fit at a token and cut the parser's stacks back to read its statement again.
 
-        Returns:
-            The index to go on at, or None where there are too many mistakes.
+        Returns the index to go on at, or None where there are too many mistakes.
         """
         self.repairs += 1
         if self.report.full or self.repairs > 4 * MAX_MISTAKES:
@@ -350,15 +310,13 @@ class Recovery:
         if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
             del states[depth + 1 :], values[depth:]
             return first
-        if self._start_mistake(states, at) if first == at else self._bare_body(states, first, at):
-            return at
-        if self._spaced_unit(at):
+        if self._spaced_unit(at) or (first == at and self._start_mistake(at)):
             return at
         repair = self._search(base, states, first, at)
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)
-        report_repair(self.tokens, self.report, repair, self._open(first, repair.at))
+        report_repair(self.tokens, self.report, repair, _unmatched(self.tokens, repair.at, first, "()[]")[0])
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if at - first > MAX_REPLAY:
             return at
@@ -376,25 +334,12 @@ class Recovery:
         span: Span = value[1] if isinstance(value, tuple) else value.span
         return bisect_left(self.tokens.starts, span.start)
 
-    def _open(self, first: int, at: int) -> list[int]:
-        """Indices of the brackets of a statement that are open before a token."""
-        open_: list[int] = []
-        for index in range(first, at):
-            kind = self.tokens.kinds[index]
-            if kind in self.closing_of:
-                open_.append(index)
-            elif kind in self.closing_of.values() and open_:
-                open_.pop()
-        return open_
-
     # ------------------------------------------------------------ the best repair
 
     def _search(self, base: list[int], stack: list[int], first: int, at: int) -> Repair | None:
         """The best repair of a statement from ``first`` on, or None where none helps.
 
-        Args:
-            base: the states before the statement.
-            stack: those at the mistake; used where it is too far from there.
+        ``base`` are the states before the statement, ``stack`` those at the mistake, used if it is too far.
         """
         kinds = self.tokens.kinds
         bound = next((i for i in range(at, at + FOLLOWED) if kinds[i] in self.ends), at + FOLLOWED)
@@ -417,41 +362,36 @@ class Recovery:
                 if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
                     attempts.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
 
-        def settle() -> tuple[float, Repair | None]:
+        def settle() -> Repair | None:
             best: tuple[float, Repair | None] = (-inf, None)
             for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
                 end = repair.at + repair.delete
                 score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
                 best = max(best, (score, repair), key=lambda one: one[0])
-            return best
+            return best[1]
 
         if at - first > MAX_REPLAY:
             attempt(stack, at, self._candidates(stack, first, at))
-            return settle()[1]
+            return settle()
         prefixes, prefix = [], base.copy()
         for place in range(first, at):  # replayed: the parser may have applied rules for the bad token
             prefixes.append((place, prefix.copy()))
             advance(prefix, kinds[place])
         attempt(prefix, at, self._candidates(prefix, first, at))
-        for place, stack in {index: prefixes[index] for index in (0, -1) if prefixes}.values():
+        for place, stack in prefixes[:1]:
             attempt(stack, place, self._misspelt(first, place))
-        prefixes = prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else []
-        for place, stack in prefixes:
-            if self._begins_statement(first, place):
+        for place, stack in prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else prefixes[-1:]:
+            if self.tokens.on_new_line(place) and kinds[place] in (self.name, *self.words):
                 attempt(stack, place, self._broken_off(stack, place, 0.7 - 0.1 * (at - place)))
-        score, best = settle()
-        if best is None or score < worth(at + FOLLOWED) - 2:
-            for place, stack in prefixes:
-                attempt(stack, place, self._candidates(stack, first, place))
-            best = settle()[1]
-        return best
+            attempt(stack, place, self._candidates(stack, first, place))
+        return settle()
 
     def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
         """All repairs at one token."""
         tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
         kind, new_line = kinds[at], tokens.on_new_line(at)
         after = kinds[at + 1] if kind != END else END
-        open_ = self._open(first, at)
+        open_ = _unmatched(tokens, at, first, "()[]")[0]
         if open_:
             dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
             closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
@@ -508,24 +448,9 @@ class Recovery:
             if missing or (missing is not None and goal == ";"):
                 yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
 
-    def _begins_statement(self, first: int, at: int) -> bool:
-        """Test whether a line in open brackets, or behind half a head, reads like a statement of its own."""
-        kinds = self.tokens.kinds
-        if not self.tokens.on_new_line(at) or kinds[at] not in (self.name, *self.words):
-            return False
-        half = self._is(at - 1, "let", "param", "fn", "module") or self._is(at - 2, "material")
-        depth = 0
-        for kind in kinds[at : at + 300] if half or self._open(first, at) else ():
-            if kind in self.fixed or kind == self.literals[";"]:
-                return not self._is(at, "material", "step", "as")
-            depth += (kind in self.closing_of) - (kind in self.closing_of.values())
-            if depth < 0:
-                return False
-        return False
-
     # ------------------------------------------------------------ mistakes with words of their own
 
-    def _start_mistake(self, states: list[int], at: int) -> bool:
+    def _start_mistake(self, at: int) -> bool:
         """A token that no statement begins with."""
         tokens, place = self.tokens, self.tokens.place(at)
         if self._is(at, ";") and not self._is(at + 1, "{"):
@@ -546,57 +471,19 @@ class Recovery:
             return False
         return True
 
-    def _bare_body(self, states: list[int], first: int, at: int) -> bool:
-        """`for`, `if` or `else` and a statement without braces."""
-        wants_block = fits(states, self.literals["{"]) and not fits(states, self.literals[";"])
-        heads = self._is(first, "for", "if", "module") and self._is(at - 1, ")", "else")
-        if not (wants_block and heads) or self._is(at, ";", "}", ")") or self.tokens.kinds[at] == END:
-            return False
-        stop = self._end_of_statement(at)
-        few = [self.literals["{"], *self.tokens.kinds[at : min(stop, at + 4)]]
-        if not stop or reach(states.copy(), few, 0, len(few)) < len(few):
-            return False
-        tokens, bodies = self.tokens, [(at, stop)]
-        if self._is(stop, "else") and not self._is(stop + 1, "{", "if"):
-            bodies.append((stop + 1, self._end_of_statement(stop + 1) or stop + 2))
-        place = tokens.end_before(at) if tokens.on_new_line(at) else tokens.starts[at]
-        ends = [(tokens.starts[i], "{ ") for i, _ in bodies] + [(tokens.ends[j - 1], " }") for _, j in bodies]
-        edits = tuple(Edit(Span(tokens.source, end, end), brace) for end, brace in ends)
-        fix = None if tokens.on_new_line(at) else Fix("put braces around it", edits)
-        self.report.add("E0106", "missing braces", place, place, help="braces are mandatory here", fix=fix)
-        for begin, end in reversed(bodies):
-            tokens.replace(end, 0, [self.literals["}"]])
-            tokens.replace(begin, 0, [self.literals["{"]])
-        return True
-
-    def _end_of_statement(self, at: int) -> int:
-        """Index after the statement at a token, its `;` or its block; 0 where that is far."""
-        depth, last = 0, len(self.tokens.kinds) - 1
-        for index in range(at, min(at + _FAR, last)):
-            if self._is(index, "}"):
-                if depth <= 1:
-                    return index + depth
-                depth -= 1
-            elif self._is(index, "{"):
-                depth += 1
-            elif depth == 0 and self._is(index, ";"):
-                return index + 1
-        return last if last <= at + _FAR else 0
-
     def _spaced_unit(self, at: int) -> bool:
-        """`30 deg`: mend the number, drop the unit."""
-        tokens, kind = self.tokens, tables().kind
-        if not at or tokens.kinds[at] != self.name or tokens.kinds[at - 1] != kind("NUMBER"):
+        """`30 deg`: one number, whose value is unknown."""
+        tokens, number, word = self.tokens, tables().kind("NUMBER"), self.tokens.text(at)
+        unit, gap = UNIT_ALIASES.get(word, word), (tokens.end_before(at), tokens.starts[at])
+        bare = at > 0 and tokens.kinds[at - 1] == number and tokens.text(at - 1)[-1:].isdigit()
+        if not bare or unit not in UNITS or tokens.source.text[slice(*gap)].strip(" "):
             return False
-        word, before = tokens.text(at), tokens.ends[at - 1]
-        gap = tokens.source.text[before : tokens.starts[at]]
-        if word not in (*UNITS, *UNIT_ALIASES) or gap.strip(" ") or not tokens.text(at - 1)[-1:].isdigit():
-            return False
-        unit, (start, end) = UNIT_ALIASES.get(word, word), tokens.place(at - 1, at + 1)
-        fix = self.report.change(before, end, unit, f"write `{unit}` right after the number")
+        start, end = tokens.place(at - 1, at + 1)
+        fix = self.report.change(gap[0], end, unit, f"write `{unit}` right after the number")
         help = "units are glued to their number"
         self.report.add("E0117", "space between a number and its unit", start, end, help=help, fix=fix)
-        tokens.splice(at - 1, at + 1, [(kind("BAD_EXPRESSION"), start, end)])
+        tokens.splice(at - 1, at + 1, [(number, start, end)])
+        tokens.reported.add(start)
         return True
 
     def _skip(self, first: int, at: int) -> int | None:

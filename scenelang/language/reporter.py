@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
 from collections.abc import Hashable, Iterable
 from dataclasses import field, replace
 from itertools import islice
@@ -21,27 +20,23 @@ Advice = tuple[str | None, Fix | None]
 
 _SHOWN: Final = 3  # further places of one report
 _WORD: Final = re.compile(r"[A-Za-z_]\w*")
-_NAMELESS: Final = re.compile(r"\b(?:let|param|fn|module|import)\b(?![ \t]+[\"A-Za-z_])")
 _NAMES: Final = frozenset(("E0201", "E0203", "E0204", "E0206", "E0207", "E0208", "E0212", "E0213"))
 _PLACES: Final = frozenset(("E0202", "E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
+_LOST: Final = frozenset(("E0104", "E0105", "E0106", "E0109", "E0129"))
+"""Mistakes after which nobody knows what is defined where: of braces, and in the place of a name."""
 _CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 """Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
 
 
 class Damage(Record):
-    """Names and places of a file that its syntax mistakes leave unknown.
+    """Lines of a file that its syntax mistakes leave unknown, and their words, which may have been defined.
 
-    Args:
-        lines: lines of statements that were mended or skipped, by guess.
-        words: words there, which a definition may have been among.
-        nameless: some definition there does not say what it defines.
-        unmatched: braces did not match, so nobody knows what stands where.
+    ``lost`` says that nobody knows what is defined where: braces did not match, or a name is missing.
     """
 
     lines: frozenset[int] = frozenset()
     words: frozenset[str] = frozenset()
-    nameless: bool = False
-    unmatched: bool = False
+    lost: bool = False
 
     def holds(self, span: Span) -> bool:
         """Test whether a place lies in text that was mended or skipped."""
@@ -51,8 +46,8 @@ class Damage(Record):
         """Test whether a diagnostic may follow from a syntax mistake."""
         if not self.lines:
             return False
-        lost = self.nameless or self.unmatched or span.text.partition(".")[0] in self.words
-        return self.holds(span) or (code in _NAMES and lost) or (code in _PLACES and self.unmatched)
+        lost = self.lost or span.text.partition(".")[0] in self.words
+        return self.holds(span) or (code in _NAMES and lost) or (code in _PLACES and self.lost)
 
 
 _SOUND: Final = Damage()
@@ -62,56 +57,41 @@ def find_damage(file: tree.File, found: Iterable[Diagnostic]) -> Damage:
     """The damage that a file's syntax mistakes, those among ``found``, have done."""
     source = file.span.source
     marks = [
-        (d.span.start, d.span.end, d.code)
+        (d.code, d.span)
         for d in found
         if d.code.startswith("E01") and d.span is not None and d.span.source is source
         if d.fix is None or d.code not in _CERTAIN
     ]
-    if not marks:
-        return _SOUND
-    ends = sorted(end for _, end, _ in marks)
-    starts = dict(sorted(((end, start) for start, end, _ in marks), reverse=True))
-    parts = [Span(source, start, end) for start, end, _ in marks]
-    for node in tree.walk(file):
+    marked = {line for _, span in marks for line in _lines(span)}
+    lines = set(marked)
+    for node in tree.walk(file) if marks else ():
         if isinstance(node, tree.Stmt):
             blocks = [child.span.start for child in tree.children(node) if isinstance(child, tree.Block)]
-            part = Span(source, node.span.start, min([node.span.end, *blocks]))
-            at = bisect_left(ends, part.start)
-            if isinstance(node, tree.BadStmt) or (at < len(ends) and starts[ends[at]] <= part.end):
-                parts.append(part)
-    lines = {line for part in parts for line in range(part.locate()[0][0], part.locate()[1][0] + 1)}
-    texts = [source.line(line) for line in lines]
-    braces = {"E0104", "E0105", "E0106", "E0129"}
-    return Damage(
-        frozenset(lines),
-        frozenset(word for text in texts for word in _WORD.findall(text)),
-        any(_NAMELESS.search(text) for text in texts),
-        any(code in braces or re.search("[{}]", source.text[start:end]) for start, end, code in marks),
-    )
+            own = _lines(Span(source, node.span.start, min([node.span.end, *blocks])))
+            if isinstance(node, tree.BadStmt) or not marked.isdisjoint(own):
+                lines.update(own)
+    words = frozenset(word for line in lines for word in _WORD.findall(source.line(line)))
+    lost = any(code in _LOST or not {"{", "}"}.isdisjoint(span.text) for code, span in marks)
+    return Damage(frozenset(lines), words, lost)
+
+
+def _lines(span: Span) -> range:
+    (first, _), (last, _) = span.locate()
+    return range(first, last + 1)
 
 
 class Reporter(Record, frozen=False):
-    """Mistakes of one evaluation, and the places and names that have been reported.
-
-    Args:
-        calls: the calls that are running.
-        damaged: what syntax mistakes have damaged, by file.
-        reported: the code that was reported at each place.
-        shared: indices of reports that several places share, by what they have in common.
-        effort: what looking for similar names may still cost.
-        words_in: the words of each file.
-    """
+    """Mistakes of one evaluation, and the places and names that have been reported."""
 
     diagnostics: Diagnostics
-    calls: Calls | None = None
+    calls: Calls | None = None  # those that are running
     damaged: dict[SourceFile, Damage] = field(default_factory=dict)
-    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)
-    shared: dict[Hashable, int] = field(default_factory=dict)
+    reported: dict[tuple[SourceFile, Span], str] = field(default_factory=dict)  # the code at each place
+    shared: dict[Hashable, int] = field(default_factory=dict)  # indices of reports that several places share
     effort: Effort = field(default_factory=lambda: Effort(MAX_COMPARED))
     words_in: dict[SourceFile, frozenset[str]] = field(default_factory=dict)
 
     def damage(self, source: SourceFile) -> Damage:
-        """Damage of a file by its syntax mistakes."""
         return self.damaged.get(source, _SOUND)
 
     def words(self, source: SourceFile) -> frozenset[str]:
@@ -140,13 +120,8 @@ class Reporter(Record, frozen=False):
     ) -> int | None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
 
-        One that shows in the library that ships is reported where that is called.
-
-        Returns:
-            The index of the report; None where nothing was added.
-
-        Raises:
-            Halt: there are so many mistakes that no more are kept.
+        One that shows in the library that ships is reported where that is called. Returns the index of the
+        report, None where nothing was added; raises `Halt` where no more mistakes are kept.
         """
         calls = self.calls
         site = calls.outside() if calls is not None and library.holds(span.source) else None

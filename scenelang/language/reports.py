@@ -17,20 +17,16 @@ marks stay under what they mark.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from itertools import groupby
 from unicodedata import category, east_asian_width
 
-from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Diagnostic, Edit, Fix, SourceFile, Span, plural
 
-TAB = 4
-LONGEST = 4000
-"""Code points of a line that are laid out at most, near the part that is shown.
-
-A file of one line may have 10 MB and 200 mistakes.
-"""
-_BEFORE = 500
+_TAB = 4
+_LONGEST = 4000
+"""Code points of a line that are laid out at most: a file of one line may have 10 MB and 200 mistakes."""
+_BEFORE = 500  # of these so many, about, before what is shown
+_LEAST_WIDTH = 30
 
 STYLES = {
     "error": "\x1b[1;31m",
@@ -55,130 +51,89 @@ def paint(style: str, text: str, color: bool) -> str:
     return f"{STYLES[style]}{text}{STYLES['off']}" if color and style and text else text
 
 
-class Line(Record):
-    """One source line in cells."""
+class _Row:
+    """One source line in the cells of a screen, cut to ``width`` around the columns ``first`` to ``last``.
 
-    cells: Sequence[str]  # what stands in each; empty behind a wide character
-    starts: Sequence[int]  # the cell of each code point, and after the last one where the line ends
+    Columns count from 0. ``words`` more cells behind them are shown where there is room.
+    """
+
+    def __init__(self, text: str, first: int, last: int, width: int, words: int = 0) -> None:
+        self._cut = max(0, first - _BEFORE) // _BEFORE * _BEFORE if len(text) > _LONGEST else 0
+        self._moved = 0
+        text = text[self._cut : self._cut + _LONGEST]
+        cells: Sequence[str]  # what stands in each; empty behind a wide character
+        self._starts: Sequence[int]  # the cell of each code point, and after the last where the line ends
+        if text.isascii() and text.isprintable():
+            cells, self._starts = text, range(len(text) + 1)
+        else:
+            cells, self._starts = _cells(text)
+        left, right = self.cell(first), self.cell(last)
+        right += words if right + words - left < width else 0
+        if len(cells) > width:
+            start = 0
+            if right >= width:
+                spare = width - 2 - (right - left)
+                start = left - 1 - (spare // 2 if spare > 0 else 4)
+                start = max(0, min(start, max(len(cells), right + 1) - width))
+            end = min(len(cells), start + width)
+            shown = list(cells[start:end])
+            # A cut may go through a wide character; the half that is left becomes a space.
+            if start:
+                shown[:2] = ["…", *(cell or " " for cell in shown[1:2])]
+            if end < len(cells):
+                shown[-2:] = [*(shown[-2:-1] if shown[-1] else " "), "…"]
+            cells, self._moved = shown, start
+        self.size = len(cells)
+        self.text = "".join(cells).rstrip()
 
     def cell(self, column: int) -> int:
-        """The cell of a column from 1; past the end the line goes on in single cells."""
-        index = column - 1
-        if index < len(self.starts):
-            return self.starts[index]
-        return self.starts[-1] + index - len(self.starts) + 1
+        """The cell of a column; past the end the line goes on in single cells."""
+        index = max(column - self._cut, 0)
+        beyond = max(index - len(self._starts) + 1, 0)
+        return self._starts[index - beyond] + beyond - self._moved
 
 
-@lru_cache(maxsize=64)  # diagnostics that follow each other often share lines
-def in_cells(text: str) -> Line:
-    """Lay a line out in cells."""
-    if text.isascii() and text.isprintable():
-        return Line(text, range(len(text) + 1))
+def _cells(text: str) -> tuple[list[str], list[int]]:
     cells: list[str] = []
     starts = []
     for char in text:
         starts.append(len(cells))
         if char == "\t":
-            cells += [" "] * TAB
+            cells += [" "] * _TAB
         elif category(char) in ("Mn", "Me") and char.isprintable():
-            if cells:
-                cells[-1] += char
+            cells[-1:] = [cells[-1] + char] if cells else []
         else:
-            cells.append(printable(char))
-            if east_asian_width(char) in "WF":
-                cells.append("")
-    starts.append(len(cells))
-    return Line(cells, starts)
+            cells += [printable(char), ""] if east_asian_width(char) in "WF" else [printable(char)]
+    return cells, [*starts, len(cells)]
 
 
-def left_out(text: str, at: int) -> int:
-    """Number of code points before offset ``at`` that are not laid out: none but in a very long line."""
-    return max(0, at - _BEFORE) // _BEFORE * _BEFORE if len(text) > LONGEST else 0
+Mark = tuple[int, int, str, str]
+"""Cells from and to which something is underlined, the sign and the style."""
 
 
-def window(line: Line, first: int, last: int, width: int) -> tuple[Sequence[str], int]:
-    """The part of a line that is shown in ``width`` cells, and how far to the left it moves.
-
-    The cells from ``first`` to ``last`` should be seen; where not all fit, the first of them are.
-    """
-    cells = line.cells
-    if len(cells) <= width:
-        return cells, 0
-    start = 0
-    if last >= width:
-        spare = width - 2 - (last - first)
-        start = first - 1 - (spare // 2 if spare > 0 else 4)
-        start = max(0, min(start, max(len(cells), last + 1) - width))
-    end = min(len(cells), start + width)
-    shown = list(cells[start:end])
-    # A cut may go through a wide character; the half that is left becomes a space.
-    if start:
-        shown[0] = "…"
-        if shown[1:2] == [""]:
-            shown[1] = " "
-    if end < len(cells):
-        if shown[-1] == "":
-            shown[-2] = " "
-        shown[-1] = "…"
-    return shown, start
+def _underlines(marks: Iterable[Mark], color: bool) -> str:
+    """One row of underlines, later ones over earlier ones."""
+    row: list[tuple[str, str]] = []
+    for start, stop, sign, style in marks:
+        row += [(" ", "")] * (stop - len(row))
+        row[start:stop] = [(sign, style)] * (stop - start)
+    runs = groupby(row, key=lambda cell: cell[1])
+    return "".join(paint(style, "".join(sign for sign, _ in run), color) for style, run in runs)
 
 
-class Canvas:
-    """Rows of cells with styles, written to at any place."""
-
-    def __init__(self) -> None:
-        self.rows: list[list[tuple[str, str]]] = []
-
-    def put(self, row: int, cell: int, text: Sequence[str], style: str = "") -> None:
-        """Write over what is there; a string takes its cells by `in_cells`."""
-        while len(self.rows) <= row:
-            self.rows.append([])
-        line = self.rows[row]
-        cells = in_cells(text).cells if isinstance(text, str) else text
-        line.extend([(" ", "")] * (cell + len(cells) - len(line)))
-        for at, content in enumerate(cells, cell):
-            line[at] = (content, style)
-
-    def lines(self, color: bool) -> list[str]:
-        """The rows as text, without white space at their ends."""
-        result = []
-        for row in self.rows:
-            while row and not row[-1][0].strip() and (row[-1][0] or row[-2][0].isspace()):
-                row.pop()
-            runs = groupby(row, key=lambda cell: cell[1])
-            result.append("".join(paint(style, "".join(c for c, _ in run), color) for style, run in runs))
-        return result
+Note = tuple[Span, str, str]
+"""A place in a text, what is said there, and the style: `frame` for all but the place of the mistake."""
 
 
-_LEAST_WIDTH = 30
-
-
-class Mark(Record):
-    """A place in a text, and what is said there; the primary one is that of the mistake itself."""
-
-    span: Span
-    words: str = ""
-    primary: bool = False
-
-
-def draw(marks: Iterable[Mark], severity: str, gutter: int, width: int, color: bool) -> list[str]:
-    """The marks of one diagnostic, the primary one first, file by file.
-
-    Args:
-        marks: at least one.
-        severity: the style of the primary mark.
-        gutter: digits of the largest line number.
-        width: cells of the screen.
-        color: with ANSI colours.
-    """
-    files: dict[SourceFile, dict[int, list[Mark]]] = {}
-    for mark in marks:
-        line = mark.span.locate()[0][0]
-        files.setdefault(mark.span.source, {}).setdefault(line, []).append(mark)
+def _draw(notes: Sequence[Note], gutter: int, width: int, color: bool) -> list[str]:
+    """The notes of one diagnostic, that of the mistake first, file by file."""
+    files: dict[SourceFile, dict[int, list[Note]]] = {}
+    for note in notes:
+        files.setdefault(note[0].source, {}).setdefault(note[0].locate()[0][0], []).append(note)
     bare = paint("frame", " " * gutter + " |", color)
     rows = []
     for index, (source, lines) in enumerate(files.items()):
-        line, column = next(iter(lines.values()))[0].span.locate()[0]
+        line, column = next(iter(lines.values()))[0][0].locate()[0]
         arrow = paint("frame", " " * gutter + (":::" if index else "-->"), color)
         rows += [bare] if index else []
         rows += [f"{arrow} {printable(source.name)}:{line}:{column}", bare]
@@ -188,52 +143,38 @@ def draw(marks: Iterable[Mark], severity: str, gutter: int, width: int, color: b
                 rows.append(paint("frame", "...", color))
             before = number
             head = paint("frame", f"{number:>{gutter}} |", color)
-            room = max(width - gutter - 3, _LEAST_WIDTH)
-            for row, text in enumerate(_line(source, number, lines.get(number, []), severity, room, color)):
-                rows.append(f"{bare if row else head} {text}".rstrip(" ") if text else bare if row else head)
+            for text in _line(source.line(number), number, lines.get(number, []), width, color):
+                rows.append(f"{head} {text}" if text else head)
+                head = bare
     return rows
 
 
-def _line(
-    source: SourceFile, number: int, marks: Sequence[Mark], severity: str, width: int, color: bool
-) -> list[str]:
+def _line(text: str, number: int, notes: Sequence[Note], width: int, color: bool) -> list[str]:
     """One source line, its underlines, and words beside and below them."""
-    text = source.line(number)
-    columns = [mark.span.locate()[0][1] for mark in marks]
-    cut = left_out(text, min(columns, default=1) - 1)
-    line = in_cells(text[cut : cut + LONGEST])
-    notes = []
-    for mark, column in zip(marks, columns, strict=True):
-        bottom, last = mark.span.locate()[1]
-        left = line.cell(max(1, column - cut))
-        right = line.cell(max(1, (last if bottom == number else len(text) + 1) - cut))
-        notes.append((left, max(right, left + 1), mark))
-    notes.sort(key=lambda note: note[:2])
-    first, last = min((n[0] for n in notes), default=0), max((n[1] for n in notes), default=0)
-    words = len(notes[-1][2].words) + 1 if notes else 0
-    cells, moved = window(line, first, last + words if last + words - first < width else last, width)
-    canvas = Canvas()
-    canvas.put(0, 0, cells)
-    row, limit = 1, len(cells)
-    placed = []
-    for left, right, mark in notes:
-        start = min(max(left - moved, 0), limit)
-        placed.append((start, max(min(right - moved, limit), start + 1), mark))
-    for start, stop, mark in sorted(placed, key=lambda note: (note[2].primary, note[0] - note[1])):
-        style = severity if mark.primary else "frame"
-        canvas.put(1, start, ("^" if mark.primary else "-") * (stop - start), style)
-    ends = max((stop for _, stop, _ in placed), default=0)
-    beside = next((n for n in reversed(placed) if n[2].words and n[1] == ends), None)
-    for start, stop, mark in reversed(placed):
-        if not mark.words:
-            continue
-        style = severity if mark.primary else "frame"
-        if mark is (beside and beside[2]):
-            canvas.put(1, stop + 1, printable(mark.words), style)
-            continue
-        row += 1
-        canvas.put(row, start, printable(mark.words), style)
-    return canvas.lines(color)
+    places = []
+    for note in notes:
+        (_, first), (bottom, last) = note[0].locate()
+        stop = last - 1 if bottom == number else len(text)
+        places.append((first - 1, max(stop, first), note))
+    places.sort(key=lambda place: place[:2])
+    ends = max((stop for _, stop, _ in places), default=0)
+    words = len(places[-1][2][1]) + 1 if places else 0
+    row = _Row(text, min((start for start, _, _ in places), default=0), ends, width, words)
+    marks = []
+    for first, last, (_, said, style) in places:
+        start = min(max(row.cell(first), 0), row.size)
+        marks.append((start, max(min(row.cell(last), row.size), start + 1), said, style))
+    order = sorted(marks, key=lambda mark: (mark[3] != "frame", mark[0] - mark[1]))
+    under = _underlines([(a, b, "-" if style == "frame" else "^", style) for a, b, _, style in order], color)
+    ends = max((stop for _, stop, _, _ in marks), default=0)
+    below = []
+    beside = ""
+    for start, stop, said, style in reversed(marks):
+        if said and stop == ends and not beside:
+            beside = f" {paint(style, printable(said), color)}"
+        elif said:
+            below.append(" " * start + paint(style, printable(said), color))
+    return [row.text, *([under + beside] if marks else []), *below]
 
 
 WIDTH = 140
@@ -298,34 +239,27 @@ def _count(found: Sequence[Diagnostic], fixer: str, fixable: int, color: bool) -
 
 
 def _block(diagnostic: Diagnostic, width: int, color: bool) -> str:
-    severity = diagnostic.severity
+    severity, fix = diagnostic.severity, diagnostic.fix
     head = paint(severity, f"{severity}[{diagnostic.code}]", color)
     lines = [head + paint("bold", f": {printable(diagnostic.message)}", color)]
-    marks = [] if diagnostic.span is None else [Mark(diagnostic.span, "", True)]
-    marks += [Mark(label.span, label.message) for label in diagnostic.labels]
-    numbers = [mark.span.locate()[1][0] for mark in marks]
-    fix = diagnostic.fix
-    gutter = len(str(max([1, *numbers, _largest_line(fix) if fix else 1])))
-    lines += draw(marks, severity, gutter, width, color)
+    notes: list[Note] = [(diagnostic.span, "", severity)] if diagnostic.span is not None else []
+    notes += [(label.span, label.message, "frame") for label in diagnostic.labels]
+    numbers = [1, *(span.locate()[1][0] for span, _, _ in notes)]
+    edits = fix.edits if fix else ()
+    numbers += [
+        e.span.locate()[0][0] + max(e.span.text.count("\n"), e.replacement.count("\n")) for e in edits
+    ]
+    gutter = len(str(max(numbers)))
+    room = max(width - gutter - 3, _LEAST_WIDTH)
+    lines += _draw(notes, gutter, room, color)
     said = (("help", diagnostic.help), ("fix", fix.message if fix else None))
-    notes = [f"{paint('bold', word, color)}: {printable(text)}" for word, text in said if text is not None]
-    if notes and marks:
+    advice = [f"{paint('bold', word, color)}: {printable(text)}" for word, text in said if text is not None]
+    if advice and notes:
         lines.append(paint("frame", " " * gutter + " |", color))
-    lines += [paint("frame", " " * gutter + " =", color) + f" {note}" for note in notes]
+    lines += [paint("frame", " " * gutter + " =", color) + f" {text}" for text in advice]
     if fix is not None:
-        lines += _preview(fix, gutter, width, color)
+        lines += _preview(fix, gutter, room, color)
     return "\n".join(lines)
-
-
-# ---------------------------------------------------------------- what a fix does
-
-
-def _largest_line(fix: Fix) -> int:
-    """The largest line number that a preview may show."""
-    return max(
-        (e.span.locate()[0][0] + max(e.span.text.count("\n"), e.replacement.count("\n")) for e in fix.edits),
-        default=0,
-    )
 
 
 def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
@@ -333,21 +267,48 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
     edits = sorted(fix.edits, key=lambda edit: (edit.span.start, edit.span.end))
     if not edits or any(edit.span.source is not edits[0].span.source for edit in edits):
         return []
-    source = edits[0].span.source
-    rows = [paint("frame", " " * gutter + " |", color)]
+    bare = paint("frame", " " * gutter + " |", color)
+    rows = [bare]
     before = 0
-    for first, last, own in _places(source, edits):
+    for first, last, own in _places(edits):
         if before and first > before + 1:
             rows.append(paint("frame", "...", color))
         before = last
+        source, start = own[0].span.source, own[0].span.start - own[0].span.locate()[0][1] + 1
+        stop = start
+        for _ in range(first, last + 1):
+            stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
+        old = source.text[start:stop].removesuffix("\n")
+        new, at = "", 0
+        marks: list[tuple[int, int]] = []  # columns of what is inserted, without spaces at its ends
+        for edit in own:
+            new += old[at : edit.span.start - start]
+            text = edit.replacement
+            marks.append((len(new) + len(text) - len(text.lstrip()), len(new) + len(text.rstrip())))
+            new += text
+            at = edit.span.end - start
+        new += old[at:]
         if all(edit.span.start == edit.span.end and "\n" not in edit.replacement for edit in own):
-            rows += _inserted(source, first, own, gutter, width, color)
-        else:
-            rows += _changed(source, first, last, own, gutter, width, color)
+            row = _Row(new, marks[0][0], marks[-1][1], width)
+            places = [(max(row.cell(a), 0), min(row.cell(b), row.size), "+", "added") for a, b in marks]
+            under = _underlines([place for place in places if place[0] < place[1]], color)
+            rows += [
+                f"{paint('frame', f'{first:>{gutter}} |', color)} {row.text}",
+                f"{bare} {under}".rstrip(),
+            ]
+            continue
+        for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
+            lines = text.split("\n") if text.strip() or sign == "-" else []
+            for offset, line in enumerate(lines[:_MOST_LINES]):
+                near = 0 if offset else own[0].span.start - start
+                row = _Row(line.rstrip("\r"), near, near, width)
+                shown = paint(style, f"{sign} {row.text}".rstrip(), color)
+                rows.append(f"{paint('frame', f'{first + offset:>{gutter}}', color)} {shown}")
+            rows += [paint("frame", "...", color)] * (len(lines) > _MOST_LINES)
     return rows
 
 
-def _places(source: SourceFile, edits: list[Edit]) -> list[tuple[int, int, list[Edit]]]:
+def _places(edits: list[Edit]) -> list[tuple[int, int, list[Edit]]]:
     """Edits together with those on the same lines: first line, last line, edits."""
     places: list[tuple[int, int, list[Edit]]] = []
     for edit in edits:
@@ -355,78 +316,10 @@ def _places(source: SourceFile, edits: list[Edit]) -> list[tuple[int, int, list[
         if last > first and column == 1 and (not edit.replacement or edit.replacement.endswith("\n")):
             last -= 1  # it takes whole lines
         if places and places[-1][1] >= first:
-            places[-1] = (places[-1][0], max(last, places[-1][1]), places[-1][2])
-            places[-1][2].append(edit)
+            places[-1] = (places[-1][0], max(last, places[-1][1]), [*places[-1][2], edit])
         else:
             places.append((first, last, [edit]))
     return places
-
-
-def _inserted(
-    source: SourceFile, number: int, edits: list[Edit], gutter: int, width: int, color: bool
-) -> list[str]:
-    old, at = source.line(number), 0
-    start = edits[0].span.start - edits[0].span.locate()[0][1] + 1
-    skipped = left_out(old, edits[0].span.start - start)
-    start, old = start + skipped, old[skipped : skipped + LONGEST]
-    new = ""
-    marks: list[tuple[int, int]] = []
-    for edit in edits:
-        cut = edit.span.start - start
-        if cut > len(old) and marks:
-            break
-        new += old[at:cut]
-        marks.append((len(new) + 1, len(new) + len(edit.replacement) + 1))
-        new += edit.replacement
-        at = min(cut, len(old))
-    new += old[at:]
-    line = in_cells(new)
-    places = [(line.cell(left), line.cell(right)) for left, right in marks]
-    room = max(width - gutter - 3, 30)
-    cells, moved = window(line, places[0][0], places[-1][1], room)
-    canvas = Canvas()
-    canvas.put(0, 0, cells)
-    for (left, right), (first, stop) in zip(places, marks, strict=True):
-        text = new[first - 1 : stop - 1]
-        lead = len(in_cells(text[: len(text) - len(text.lstrip())]).cells)
-        tail = len(in_cells(text[len(text.rstrip()) :]).cells)
-        if left - moved + lead < len(cells):
-            canvas.put(1, max(left - moved + lead, 0), "+" * (right - left - lead - tail), "added")
-    shown, under = (*canvas.lines(color), "")[:2]
-    head, bare = (paint("frame", f"{n:>{gutter}} |", color) for n in (number, ""))
-    return [f"{head} {shown}", f"{bare} {under}".rstrip()]
-
-
-def _changed(
-    source: SourceFile, first: int, last: int, edits: list[Edit], gutter: int, width: int, color: bool
-) -> list[str]:
-    start = edits[0].span.start - edits[0].span.locate()[0][1] + 1
-    stop = start
-    for _ in range(first, last + 1):
-        stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
-    old = source.text[start:stop]
-    new, at = "", 0
-    for edit in edits:
-        new += old[at : edit.span.start - start] + edit.replacement
-        at = edit.span.end - start
-    rows = []
-    for sign, text, style in (("-", old, "removed"), ("+", new + old[at:], "added")):
-        lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []
-        for offset, line in enumerate(lines[:_MOST_LINES]):
-            near = 0 if offset else edits[0].span.start - start
-            shown = "".join(_shown(line.rstrip("\r"), near, max(width - gutter - 3, 30)))
-            head = paint("frame", f"{first + offset:>{gutter}}", color)
-            rows.append(f"{head} {paint(style, f'{sign} {shown}'.rstrip(), color)}")
-        rows += [paint("frame", "...", color)] * (len(lines) > _MOST_LINES)
-    return rows
-
-
-def _shown(text: str, at: int, width: int) -> Sequence[str]:
-    """The beginning of a line, or of a very long one what is near offset ``at``."""
-    cut = left_out(text, at)
-    line = in_cells(text[cut : cut + LONGEST])
-    near = line.cell(at - cut + 1) if cut else 0
-    return window(line, near, near, width)[0]
 
 
 class SceneError(Exception):

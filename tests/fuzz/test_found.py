@@ -21,7 +21,7 @@ from scenelang.language.evaluation import loads
 from scenelang.language.formatting import format_text
 from scenelang.language.machine import render_sarif
 from scenelang.language.parser import parse
-from scenelang.language.reports import SceneError, in_cells, render_text
+from scenelang.language.reports import SceneError, render_text
 from scenelang.language.scene import Scene
 from scenelang.language.tables import tables
 from scenelang.language.words import RESERVED
@@ -41,7 +41,6 @@ def test_snippets_of_a_very_long_line_lay_out_only_what_is_near_their_marks() ->
 
     def work(around: int) -> int:
         found = illegal(5, around)
-        in_cells.cache_clear()
         return lines_run(lambda: render_text(found))
 
     assert work(100_000) < 1.1 * work(10_000)

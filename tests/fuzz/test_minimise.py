@@ -57,11 +57,6 @@ def test_the_command_minimises(tmp_path: Path) -> None:
     assert main(["parse", "--minimise", str(path)]) == 2  # it does not fail
 
 
-def test_properties_are_run_until_the_time_is_over(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["properties", "--minutes", "0.01"]) == 0
-    assert "no mistakes up to turn" in capsys.readouterr().out
-
-
 def test_unknown_targets_are_refused() -> None:
     with pytest.raises(KeyError):
         load_target("os")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from scenelang.language.diagnostics import nearest
 from scenelang.language.pages import CODES
 from tests.language.cases import HERE, Outcome, mismatch, run_text
 from tests.language.reading import apply
@@ -56,47 +55,6 @@ def apply_fix(text: str) -> str:
     return apply(text, fix)
 
 
-@pytest.mark.parametrize(
-    ("bad", "good"),
-    [
-        ("square { rotate(45); }", "square { rotate(45deg); }"),
-        ("square { rotate(-45); }", "square { rotate(-45deg); }"),
-        ("square { rotate(1.5); }", "square { rotate(1.5rad); }"),
-        ("square { rotate((45)); }", "square { rotate((45deg)); }"),
-        ("square { material flat { hue(0.1); } }", "square { material flat { hue(0.1turn); } }"),
-        ("square { material flat { hue(200); } }", "square { material flat { hue(200deg); } }"),
-        ("squar { scale(2); }", "square { scale(2); }"),
-        ("square { rotat(45deg); }", "square { rotate(45deg); }"),
-        ("let size = 1; square { scale(sise); }", "let size = 1; square { scale(size); }"),
-        ("square { material falt; }", "square { material flat; }"),
-        ("square { rotate(angel = 45deg); }", "square { rotate(angle = 45deg); }"),
-        ("chain { smooth square {} star {} }", "chain { square {} star {} }"),
-        ("let m = material flat; square { material m; }", "let m = material flat; square { m; }"),
-    ],
-)
-def test_fixes_mend(bad: str, good: str) -> None:
-    mended = apply_fix(bad)
-    assert mended.replace("  ", " ") == good
-    run_text(mended).good()
-
-
-def test_suggestions() -> None:
-    known = ["square", "star", "translate", "size", "Y", "f"]
-    for name, found in {
-        "squar": "square",
-        "sqaure": "square",
-        "Square": "square",
-        "tranlsate": "translate",
-        "sise": "size",
-        "circle": None,
-        "y": None,
-        "zz": None,
-        "stair": "star",
-        "": None,
-    }.items():
-        assert nearest(name, known) == found, name
-
-
 def test_labels_show_both_places() -> None:
     label = run_text("let a = 1;\nlet a = 2;").only().labels[0]
     assert (label.span.locate()[0], label.message) == ((1, 5), "first defined here")
@@ -124,13 +82,6 @@ def test_labels_show_both_places() -> None:
 def test_labels_show_what_else_takes_part(text: str, labels: list[tuple[str, str]]) -> None:
     found = run_text(text).only()
     assert [(label.span.text, label.message) for label in found.labels] == labels
-
-
-def test_diagnostics_of_what_recovery_skipped_stay_single() -> None:
-    """A definition lost to a syntax error is not a second mistake where it is used."""
-    outcome = run_text("let size 5;\nsquare { scale(size); }")
-    assert outcome.scene is None
-    assert [code[:3] for code in outcome.codes] == ["E01"]
 
 
 def test_a_late_version_moves_to_the_top() -> None:

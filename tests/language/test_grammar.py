@@ -9,13 +9,11 @@ from typing import Any
 
 import pytest
 from lark import Lark
-from lark.exceptions import LarkError
 
 from scenelang.language import generate as maker
 from scenelang.language import tables
 from scenelang.language.generate import generate
 from scenelang.language.parser import PLAIN, Builder
-from tests.language.reading import SCENES, read
 
 GRAMMAR = tables.grammar_path().read_text(encoding="utf-8")
 
@@ -79,17 +77,3 @@ def test_grammar_has_no_conflicts(caplog: pytest.LogCaptureFixture) -> None:
 def test_every_rule_has_a_callback() -> None:
     names = {name for _, _, name in tables.tables().rules if name}
     assert not [name for name in names if name not in PLAIN and not callable(getattr(Builder, name, None))]
-
-
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_lark_reads_the_scenes_too(path: Path) -> None:
-    Lark(GRAMMAR, parser="lalr", lexer="basic").parse(path.read_text(encoding="utf-8"))
-
-
-@pytest.mark.parametrize(
-    "text", ["let a = 1", "square { scale(2) }", "let a = 30 deg;", "star { };", "for (i in 0..3) star;", "@"]
-)
-def test_both_refuse(text: str) -> None:
-    with pytest.raises(LarkError):
-        Lark(GRAMMAR, parser="lalr", lexer="basic").parse(text)
-    assert read(text)[1]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import scenelang
+from lab.docs.make_errors import index
 from scenelang.compiler import lower
 from scenelang.compiler.check import check_compiles, check_frames
 from scenelang.language import lexer, limits, parser, session, statements, values
@@ -17,14 +18,14 @@ from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.language.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.language.parser import parse
-from scenelang.language.reports import SceneError
+from scenelang.language.reports import SceneError, render_text
 from scenelang.language.resolve import find_unused
 from scenelang.language.scene import Scene
 from scenelang.language.session import Defines
 from scenelang.language.tables import tables
 
 PAGES = Path(scenelang.__file__).parent / "language/pages"
-ROOT = Path(__file__).parents[2]
+INDEX = (Path(__file__).parents[2] / "docs/errors.md").read_text("utf-8")
 
 
 def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
@@ -137,3 +138,17 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
         "E0405": f"{lower.MAX_DEPTH:,} levels",
     }.items():
         assert number in prose(code), code
+
+
+def test_the_index_is_made_from_the_pages() -> None:
+    """`python -m lab docs errors` writes it anew."""
+    assert index() == INDEX
+    assert set(re.findall(r"^\| \[([EW]\d{4})\]", INDEX, re.MULTILINE)) == set(CODES)
+
+
+def test_the_sample_is_what_is_printed() -> None:
+    sample = re.search(r"```text\n(.*?)```", INDEX, re.DOTALL)
+    assert sample is not None
+    found = Diagnostics()
+    Source(text=SourceFile("scene.nsg", "square { rotate(45); }\n")).scene(found)
+    assert render_text(found, summary=False) == sample[1]

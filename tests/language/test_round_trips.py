@@ -75,13 +75,6 @@ def test_repr_shows_what_was_said() -> None:
     assert repr(nsg.Flip()) == "Flip()"
 
 
-def test_colours_by_their_digits() -> None:
-    assert nsg.Color.hex("#d33") == nsg.Color.hex("#DD3333") == nsg.Color(rgb=(0xDD / 255, 0.2, 0.2))
-    for wrong in ("d33", "#d3", "#dd33333", "#xyz", ""):
-        with pytest.raises(ValueError, match="is not a colour"):
-            nsg.Color.hex(wrong)
-
-
 TREE = """nsg 1;
 square {}
 subtract(k = 0.1) {

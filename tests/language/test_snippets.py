@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import unicodedata
+from itertools import product
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -139,19 +139,16 @@ def test_labels_without_a_primary_place() -> None:
 # ---------------------------------------------------------------- long lines
 
 
-@pytest.mark.parametrize("width", [40, 60, 100])
-@pytest.mark.parametrize("before", [0, 30, 97, 500])
-@pytest.mark.parametrize("after", [0, 30, 97, 500])
-@pytest.mark.parametrize("wide", [False, True])
-def test_long_lines_are_cut_around_the_mark(width: int, before: int, after: int, wide: bool) -> None:
-    fill = "日" if wide else "x"
-    source = SourceFile("a.nsg", fill * before + "here" + fill * after)
-    _, shown, marks = rows(at("here", source=source), width=width)
-    assert cells(shown) <= width
-    assert "here" in shown
-    assert cells(marks[: marks.index("^")]) == cells(shown[: shown.index("here")])
-    whole = 4 + len("here") + (before + after) * (2 if wide else 1) <= width
-    assert ("…" in shown) != whole
+def test_long_lines_are_cut_around_the_mark() -> None:
+    lengths = (0, 30, 97, 500)
+    for width, before, after, fill in product((40, 60, 100), lengths, lengths, "日x"):
+        source = SourceFile("a.nsg", fill * before + "here" + fill * after)
+        _, shown, marks = rows(at("here", source=source), width=width)
+        assert cells(shown) <= width
+        assert "here" in shown
+        assert cells(marks[: marks.index("^")]) == cells(shown[: shown.index("here")])
+        whole = 4 + len("here") + (before + after) * cells(fill) <= width
+        assert ("…" in shown) != whole
 
 
 def test_a_mark_wider_than_the_screen_shows_its_beginning() -> None:
