@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from scenelang.drawing.neural.load import Solids
 
 from scenelang.compiler import steps as affine
 from scenelang.compiler.graph import Fold, Leaf, Link, Look, Move, Node
@@ -20,6 +19,7 @@ from scenelang.compiler.spaces import Stage, Triple
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed
 from scenelang.compiler.weights import shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
+from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import SolidArrays, SolidNetwork, Wanted
 from scenelang.drawing.solid.passes import END, INF, OBJECT, SLOT, WAY, Passes
