@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from lab.sets.plane import Rng, any_tree
 from scenelang.language.scene import (
     Bend,
+    Brought,
     Camera,
     Chain,
     Color,
@@ -31,8 +32,8 @@ from scenelang.language.scene import (
     Translate,
     Twirl,
     Twist,
+    load_elements,
 )
-from scenelang.language.scene_data import Brought, load_elements
 from scenelang.language.words import COMBINE
 
 Triple = tuple[float, float, float]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from scenelang.language.scene import Chain, Object, Scene, SceneNode
-from scenelang.language.scene_data import Brought
+from scenelang.language.scene import Brought, Chain, Object, Scene, SceneNode
 from scenelang.language.words import STAGE, dimension_of
 
 

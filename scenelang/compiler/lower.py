@@ -38,7 +38,7 @@ from scenelang.compiler.steps import (
 )
 from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
-from scenelang.language.scene_data import Brought
+from scenelang.language.scene import Brought
 from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
 
 

@@ -23,8 +23,7 @@ from scenelang.language.expressions import (
 from scenelang.language.library import SpanMap, Written
 from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
 from scenelang.language.nodes import blend_width
-from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
-from scenelang.language.scene_data import objects_of
+from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object, objects_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
 from scenelang.language.values import POISON, Problem, RangeValue, Vec, number, show, unexpected
 from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS

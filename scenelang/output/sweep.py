@@ -24,7 +24,6 @@ from scenelang.drawing.image import Output, image_format, output_file
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Evaluation, ParamError, Source, param_named
 from scenelang.language.reports import SceneError
-from scenelang.language.scene_text import to_nsg
 from scenelang.output.animate import Progress, RenderResult, make
 from scenelang.output.frames import Store, Target, TargetError, find_target, is_pattern
 from scenelang.output.painting import Drawable, Painter
@@ -120,7 +119,7 @@ class SweepTable:
         self._note(frame.number, Line(line.picture, line.values, frame.key))
         result = {}
         if "scene" in self.texts:
-            result[TEXTS["scene"]] = to_nsg(frame.shot.scene).encode()
+            result[TEXTS["scene"]] = frame.shot.scene.to_nsg().encode()
         if "program" in self.texts:
             if frame.program is None:
                 raise RenderError("the reference has no programs to write")

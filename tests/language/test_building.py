@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
-from scenelang.language.scene_text import to_nsg
 
 ROOT = Path(__file__).parents[2]
 STAR = nsg.Object("star")
@@ -132,7 +131,7 @@ def test_widths_of_cuts() -> None:
         assert again == scene
         (node,) = again.nodes
         assert node.k == (kept if kept is None else pytest.approx(kept, rel=1e-15))
-        assert (f"{op}(k = {kept}" in to_nsg(scene)) == (kept is not None)
+        assert (f"{op}(k = {kept}" in scene.to_nsg()) == (kept is not None)
     old = '{"nodes": [{"kind": "boolean", "op": "subtract", "children": [], "k": 0.15}]}'
     assert nsg.Scene.from_json(old).nodes[0].k is None  # type: ignore[union-attr]
     with pytest.raises(ValueError, match="`union` has no k"):

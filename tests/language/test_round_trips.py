@@ -11,7 +11,7 @@ from hypothesis import given, settings
 import scenelang as nsg
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.program import program_bytes
-from scenelang.language.scene_json import to_readable_json
+from scenelang.language.scene import to_readable_json
 from tests.strategies import scenes
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))
