@@ -40,8 +40,6 @@ Run = Callable[[Env], Any]
 VARIES: Final = object()
 """Marks an expression whose value is known only when it runs."""
 _FOLDED_NUMBERS: Final = 64
-_ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
-"""Words whose first argument is an angle, and its name."""
 
 
 class Code(NamedTuple):
@@ -82,7 +80,8 @@ def prepare(expr: tree.Expr, place: Place) -> Code:
 
 def prepare_arguments(args: Iterable[tree.Argument] | None, place: Place, name: str = "") -> list[Given]:
     """Prepare the arguments of a call; ``name`` is that of one of the language's own words."""
-    angle, given = _ANGLES.get(name, ""), []
+    word, given = words.word_for_call(name, False), []
+    angle = word.params[0] if word and word.kinds[:1] in (("angle",), ("hue",)) else None
     for index, arg in enumerate(args or ()):
         is_angle = angle and (arg.name.text == angle if arg.name else index == 0)
         given.append(Given(arg, (_prepare_angle if is_angle else prepare)(arg.value, place)))

@@ -51,11 +51,11 @@ from scenelang.language.diagnostics import (
 from scenelang.language.expressions import VARIES, bind, lookup, prepare, prepare_arguments, wrong_kind
 from scenelang.language.library import Written
 from scenelang.language.limits import MAX_BYTES
-from scenelang.language.modifiers import color, prepare_move, prepare_value_use, vector
+from scenelang.language.modifiers import LEFT_OUT, Spec, prepare_move, prepare_value_use, spread
 from scenelang.language.nodes import MOST, camera_fault, light_fault
 from scenelang.language.parser import parse
 from scenelang.language.reporter import Advice, Reporter, find_damage
-from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Ground, Light
+from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Light
 from scenelang.language.session import Binding, Defines, Env, Session
 from scenelang.language.values import (
     POISON,
@@ -65,13 +65,9 @@ from scenelang.language.values import (
     RangeValue,
     Time,
     Vec,
-    angle,
     describe,
     equal,
-    number,
     same_unit,
-    show,
-    unexpected,
     unpack,
 )
 from scenelang.language.words import (
@@ -88,9 +84,6 @@ from scenelang.language.words import (
     STAGE,
     TRANSFORMS,
 )
-
-MAX_SIDE_PX: Final = 8192
-LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
@@ -152,18 +145,17 @@ def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
         return None
-    word, apply = SETTINGS[name], _APPLY[name]
-    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=name == "canvas")
+    spec = _SETTINGS[name]
+    word, where = spec.word, Written(span, stmt.span)
+    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=spec.spread)
     getters = [None if one is None else one.code.run for one in bound or ()]
     operands = tuple([None if one is None else one.arg.value for one in bound or ()])
-
-    where = Written(span, stmt.span)
 
     def action(env: Env, out: Builder) -> None:
         values = [LEFT_OUT if get is None else get(env) for get in getters]
         try:
             if bound is not None and POISON not in values:
-                apply(session, where, *values)
+                _apply(spec, values, session, where)
                 return
         except Problem as problem:
             report_problem(session.report, problem, span, operands)
@@ -173,112 +165,55 @@ def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
     return action
 
 
-def _canvas(session: Session, where: Written, width: Any, height: Any) -> None:
-    if width.__class__ is Vec and height is LEFT_OUT:
-        if len(width.items) != 2:
-            raise unexpected("a vector of 2 numbers", width, operand=0)
-        width, height = width.items
-    if height is LEFT_OUT:
-        raise Problem("E0308", "`canvas` needs `w` and `h`", "it is called canvas(w, h)")
-    sides = []
-    for operand, value in enumerate((width, height)):
-        side = number(value, operand)
-        if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
-            message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
-            raise Problem("E0311", message, operand=operand)
-        sides.append(int(side))
-    session.settings.canvas = (sides[0], sides[1])
+_SETTINGS: Final = {name: Spec.of(word) for name, word in SETTINGS.items()}
 
 
-def _opaque(value: Any, what: str, operand: int) -> tuple[float, float, float]:
-    """A colour whose components are in 0..1."""
-    rgb = color(value, operand)
-    for component in rgb:
-        if not 0.0 <= component <= 1.0:
-            raise Problem("E0311", f"{what} component {show(component)} is outside 0..1", operand=operand)
-    return rgb
+def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> None:
+    """Set what a statement states; raises Problem."""
+    settings, name = session.settings, spec.word.name
+    if name == "ground" and values[0] is None:
+        if values[1] is not LEFT_OUT:
+            raise Problem("E0308", "`ground(none)` has no colour", operand=1)
+        settings.stage[name] = None
+    elif name in STAGE:
+        settings.stage[name] = node = _stage(spec, values)
+        session.spans.record(node, where)
+    elif name == "animate":
+        _animate(spec.read(values), session)
+    elif name == "canvas":
+        settings.canvas = tuple(spec.read(spread(values, spec.word)).values())
+    else:
+        settings.background = spec.read(values)["c"]
 
 
-def _background(session: Session, where: Written, value: Any) -> None:
-    session.settings.background = None if value is None else _opaque(value, "background", 0)
-
-
-def _state(session: Session, where: Written, cls: type[Camera | Light | Ground], *given: Any) -> None:
-    """Set one value of the stage from its fields in order, with defaults for those left out."""
-    names = list(cls.model_fields)
-    for at, value in enumerate(given):
-        if value is not LEFT_OUT and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST:
-            raise Problem("E0311", f"`{names[at]}` is not within {MOST:,.0f} of 0", operand=at)
-    default = [field.default for field in cls.model_fields.values()]
-    values = [own if value is LEFT_OUT else value for value, own in zip(given, default, strict=True)]
-    node = make(cls, dict(zip(names, values, strict=True)))
+def _stage(spec: Spec, values: list[Any]) -> Any:
+    """The camera, light or ground; raises Problem."""
+    node = spec.build(values)
+    for at, (name, *_) in enumerate(spec.rows):
+        value = getattr(node, name)
+        if (
+            values[at] is not LEFT_OUT
+            and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST
+        ):
+            raise Problem("E0311", f"`{name}` is not within {MOST:,.0f} of 0", operand=at)
     if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
-        at = names.index(fault[0])
-        raise Problem("E0338", fault[1], operand=1 if given[at] is LEFT_OUT else at)
+        at = [*Camera.model_fields].index(fault[0])
+        raise Problem("E0338", fault[1], operand=1 if values[at] is LEFT_OUT else at)
     if isinstance(node, Light) and (dark := light_fault(node.power)):
         raise Problem("E0339", dark, operand=1)
-    session.settings.stage[cls.__name__.lower()] = node
-    session.spans.record(node, where)
+    return node
 
 
-def _given(value: Any, read: Callable[..., Any], *rest: Any) -> Any:
-    return LEFT_OUT if value is LEFT_OUT else read(value, *rest)
-
-
-def _camera(session: Session, where: Written, eye: Any, target: Any, fov: Any) -> None:
-    points = [_given(value, vector, 3, at, "a point") for at, value in enumerate((eye, target))]
-    _state(session, where, Camera, *points, _given(fov, angle, 2))
-
-
-def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any) -> None:
-    place = _given(position, vector, 3, 0, "a point")
-    if power.__class__ is Vec:
-        raise unexpected("a number", power, "the power is second: light([2, 4, 3], 30, #fff)", 1)
-    _state(session, where, Light, place, _given(power, number, 1), _given(rgb, _opaque, "colour", 2))
-
-
-def _ground(session: Session, where: Written, y: Any, rgb: Any) -> None:
-    if y.__class__ is Vec:
-        raise unexpected(
-            "a number", y, "the height comes first: ground(-1, #888), or ground(color = #888)", 0
-        )
-    if y is not None:
-        _state(session, where, Ground, _given(y, number, 0), _given(rgb, _opaque, "colour", 1))
-        return
-    if rgb is not LEFT_OUT:
-        raise Problem("E0308", "`ground(none)` has no colour", operand=1)
-    session.settings.stage["ground"] = None
-
-
-def _animate(session: Session, where: Written, seconds: Any, fps: Any, loop: Any) -> None:
-    length = seconds.size if seconds.__class__ is Time else number(seconds, 0)
-    rate = number(fps, 1)
-    for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
-        if value <= 0.0:
-            raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
-    if loop is not LEFT_OUT and loop.__class__ is not bool:
-        raise unexpected("a boolean", loop, operand=2)
-    rate = session.fps or rate
-    if length * rate > MAX_FRAMES:
+def _animate(fields: dict[str, Any], session: Session) -> None:
+    fields["fps"] = session.fps or fields["fps"]
+    if fields["seconds"] * fields["fps"] > MAX_FRAMES:
         raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)
-    looping = loop is not False
-    animation = make(Animation, {"seconds": length, "fps": rate, "loop": looping})
-    session.settings.animation = animation
+    session.settings.animation = animation = make(Animation, fields)
     frame, frames = session.frame, animation.frames
     if not 0 <= frame < frames:
         raise Problem("E0337", f"frame {frame} is outside 0..{frames - 1}")
-    u = frame / frames if looping else frame / max(1, frames - 1)
-    session.animated[:] = [frame / rate, u, float(frame), float(frames)]
-
-
-_APPLY: Final[dict[str, Callable[..., None]]] = {
-    "canvas": _canvas,
-    "background": _background,
-    "animate": _animate,
-    "camera": _camera,
-    "light": _light,
-    "ground": _ground,
-}
+    u = frame / frames if animation.loop else frame / max(1, frames - 1)
+    session.animated[:] = [frame / animation.fps, u, float(frame), float(frames)]
 
 
 BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version)
