@@ -7,15 +7,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from scenelang.assets.records import Record
-from scenelang.language import nodes, tree
-from scenelang.language.advice import (
-    VALUES,
-    material_advice,
-    report_problem,
-    unknown,
-    unknown_material,
-    unknown_member,
-)
+from scenelang.language import advice, nodes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -48,7 +40,6 @@ from scenelang.language.values import (
     show,
     unexpected,
 )
-from scenelang.language.words import GEOMETRIES, MATERIALS, OPERATIONS, SETTINGS, TEXTURES, TRANSFORMS, Word
 
 LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
 MAX_SIDE_PX: Final = 8192
@@ -158,7 +149,7 @@ _HELP: Final = {
     "rotate": _ONE_AXIS,
     "shear": "name the term, as in shear(xy = 0.5)",
     "color": "it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
-    **{name: f"it is called {TRANSFORMS[name].head}" for name in ("scale", "matrix")},
+    **{name: f"it is called {words.TRANSFORMS[name].head}" for name in ("scale", "matrix")},
 }
 _NO_VECTOR: Final = {
     "rotate": (0, _ONE_AXIS),
@@ -180,7 +171,7 @@ class Spec(Record):
         stated: whether it is a setting.
     """
 
-    word: Word
+    word: words.Word
     help: str | None
     spread: bool
     node: type[Frozen] | None
@@ -188,14 +179,14 @@ class Spec(Record):
     stated: bool
 
     @staticmethod
-    def of(word: Word) -> Spec:
+    def of(word: words.Word) -> Spec:
         """The one for a word of the language."""
         node = getattr(nodes, "Animation" if word.name == "animate" else word.name.capitalize(), None)
         fields = {} if node is None else {n: f for n, f in node.model_fields.items() if n != "kind"}
         defaults = [1.0 if field.is_required() else field.default for field in fields.values()]
         readers = [KINDS[kind] for kind in word.kinds]
         rows = tuple(zip(fields or word.params, readers, defaults or [None] * 2, range(6), strict=False))
-        spread, stated = word.name in ("translate", "scale", "canvas"), word.name in SETTINGS
+        spread, stated = word.name in ("translate", "scale", "canvas"), word.name in words.SETTINGS
         return Spec(word, _HELP.get(word.name), spread, node, rows, stated)
 
     def read(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -226,12 +217,12 @@ def _shear(spec: Spec, terms: Sequence[Any]) -> Shear:
     return make(Shear, {"kind": "shear", "axes": spec.word.params[at], "k": number(terms[at], at)})
 
 
-GEOMETRY: Final = {name: Spec.of(word) for name, word in TRANSFORMS.items()}
-TEXTURE: Final = {name: Spec.of(word) for name, word in OPERATIONS.items()}
-EVEN_SCALE: Final = replace(GEOMETRY["scale"], word=Word("scale", "scale(s)", "", ("s",), 1))
+GEOMETRY: Final = {name: Spec.of(word) for name, word in words.TRANSFORMS.items()}
+TEXTURE: Final = {name: Spec.of(word) for name, word in words.OPERATIONS.items()}
+EVEN_SCALE: Final = replace(GEOMETRY["scale"], word=words.Word("scale", "scale(s)", "", ("s",), 1))
 
 
-def spread(values: Sequence[Any], word: Word) -> Sequence[Any]:
+def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
     """Arguments in full: the items of one vector, or the values as they are.
 
     Raises:
@@ -247,7 +238,7 @@ def spread(values: Sequence[Any], word: Word) -> Sequence[Any]:
         raise Problem("E0308", f"{missing} is missing, or a vector of all components")
     if first.__class__ is not Vec:
         raise unexpected("a vector or its components", first, operand=0)
-    params, required = (TRANSFORMS["scale"].params, 2) if len(params) == 1 else (params, required)
+    params, required = (words.TRANSFORMS["scale"].params, 2) if len(params) == 1 else (params, required)
     if not required <= len(first.items) <= len(params):
         counts = " or ".join(str(count) for count in range(required, len(params) + 1))
         raise unexpected(f"a vector of {counts} numbers", first, operand=0)
@@ -286,7 +277,7 @@ def _spec(stmt: tree.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        help = f"put it into a material's block, as in {material_advice(place, name)}"
+        help = f"put it into a material's block, as in {advice.material_advice(place, name)}"
         if name == "flip":
             help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
         _skim(stmt, place)
@@ -320,7 +311,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         try:
             node = _shear(spec, values) if spec.node is Shear else spec.build(values)
         except Problem as problem:
-            report_problem(session.report, problem, span, operands)
+            advice.report_problem(session.report, problem, span, operands)
             return None
         if node.__class__ is Color or node.__class__ is Grayscale:
             _warn(node, session.report, first.span if first else span)
@@ -423,7 +414,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
-        known = {*MATERIALS, *TEXTURES}
+        known = {*words.MATERIALS, *words.TEXTURES}
         if alias in known:
             return alias
         _unknown(name, place, known)
@@ -434,15 +425,15 @@ def _called(name: tree.Name, place: Place) -> str | None:
     if exported is not None and rest in exported.materials:
         return exported.materials[rest]
     if binding is None:
-        unknown(name, place)
+        advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
         wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
-    elif own is not None and own.kind in VALUES:
+    elif own is not None and own.kind in advice.VALUES:
         _is_value(name, place)
     elif own is not None:
         wrong_kind(name, own, place, "a material")
     else:
-        unknown_member(name, place, exported, "material")
+        advice.unknown_member(name, place, exported, "material")
     return None
 
 
@@ -451,10 +442,10 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     word, name = written.shading, written.name
     if word is None:
         return None
-    if word.text not in MATERIALS:
-        _unknown(word, place, {*MATERIALS})
+    if word.text not in words.MATERIALS:
+        _unknown(word, place, {*words.MATERIALS})
         return ""
-    if name.text in MATERIALS:
+    if name.text in words.MATERIALS:
         help = f"write material {name.text}"
         place.report.error("E0213", f"`{name.text}` is not a texture", name.span, help=help)
         return ""
@@ -481,10 +472,10 @@ def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
     report, span, binding = place.report, name.span, place.scope.find(name.text)
     if binding is not None and binding.kind in ("let", "argument", "loop"):
         _is_value(name, place)
-    elif name.text in GEOMETRIES:
+    elif name.text in words.GEOMETRIES:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        hint, fix = unknown_material(name, place, known)
+        hint, fix = advice.unknown_material(name, place, known)
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
 
@@ -493,7 +484,7 @@ def _is_value(name: tree.Name, place: Place) -> None:
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
         message = f"expected a material, found {describe(binding.value)}"
-        help = f"for a colour write {material_advice(place, 'color', name.text)}"
+        help = f"for a colour write {advice.material_advice(place, 'color', name.text)}"
         place.report.error("E0301", message, span, help=help, labels=binding.labels())
         return
     start = span.source.text.rfind("material", 0, span.start)
@@ -534,7 +525,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            help = f"for a colour write {material_advice(place, 'color', name)}"
+            help = f"for a colour write {advice.material_advice(place, 'color', name)}"
             session.report.error("E0301", message, span, labels=binding.labels(), help=help)
             return
         material = value.material

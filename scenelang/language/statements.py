@@ -12,30 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.zoo import Zoo
-from scenelang.language import blocks, expressions, foreign, library, modifiers, tree
-from scenelang.language.advice import (
-    VALUES,
-    drawn,
-    in_library,
-    material_advice,
-    report_early,
-    report_problem,
-    report_unknown,
-    unknown,
-    unknown_member,
-    visible,
-)
-from scenelang.language.blocks import (
-    HOLDERS,
-    Body,
-    define,
-    misplaced,
-    prepare_block,
-    prepare_element,
-    prepare_inner,
-    prepare_module_call,
-    prepare_object,
-)
+from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, tree, words
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
     Diagnostics,
@@ -70,27 +47,13 @@ from scenelang.language.values import (
     same_unit,
     unpack,
 )
-from scenelang.language.words import (
-    ANIMATED,
-    COMBINE,
-    CONSTANTS,
-    FUNCTIONS,
-    GEOMETRIES,
-    LANGUAGE,
-    MATERIALS,
-    NODES,
-    OPERATIONS,
-    SETTINGS,
-    STAGE,
-    TRANSFORMS,
-)
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
     """Test whether a statement stands at top level, and report it if not."""
     if place.kind == "file" and not place.nested:
         return True
-    misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
+    blocks.misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
     return False
 
 
@@ -158,14 +121,14 @@ def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
                 _apply(spec, values, session, where)
                 return
         except Problem as problem:
-            report_problem(session.report, problem, span, operands)
+            advice.report_problem(session.report, problem, span, operands)
         if name == "animate":  # with a mistake, which is not a further one of what needs its variables
             session.animated[:] = [POISON] * 4
 
     return action
 
 
-_SETTINGS: Final = {name: Spec.of(word) for name, word in SETTINGS.items()}
+_SETTINGS: Final = {name: Spec.of(word) for name, word in words.SETTINGS.items()}
 
 
 def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> None:
@@ -175,7 +138,7 @@ def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> N
         if values[1] is not LEFT_OUT:
             raise Problem("E0308", "`ground(none)` has no colour", operand=1)
         settings.stage[name] = None
-    elif name in STAGE:
+    elif name in words.STAGE:
         settings.stage[name] = node = _stage(spec, values)
         session.spans.record(node, where)
     elif name == "animate":
@@ -222,11 +185,11 @@ BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version
 def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     context, alias = place.file, stmt.alias
     if not at_top_level(place, stmt.span, "an import"):
-        define(alias, Binding("poison", alias.span), place)
+        blocks.define(alias, Binding("poison", alias.span), place)
         return None
     loader = context.loader
     binding = Binding("import", alias.span)
-    good = define(alias, binding, place)
+    good = blocks.define(alias, binding, place)
     loaded = loader.load(stmt, context.path, context.session)
     if loaded is None or not good:
         return None
@@ -283,7 +246,7 @@ def _elements(path: Path, zoo: Zoo, stmt: tree.Import, context: FileContext) -> 
     return brought
 
 
-def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> Body:
+def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> blocks.Body:
     """Prepare a file's statements; of an imported one only what it brings."""
     report = context.session.report
     damage = find_damage(file, report.diagnostics)
@@ -293,12 +256,12 @@ def prepare_file(context: FileContext, file: tree.File, *, imported: bool = Fals
     if imported:
         own = {s.name.text for s in file.statements if isinstance(s, tree.Module)}
         for stmt in file.statements:
-            if isinstance(stmt, tree.Call) and stmt.name.text in STAGE and stmt.name.text not in own:
+            if isinstance(stmt, tree.Call) and stmt.name.text in words.STAGE and stmt.name.text not in own:
                 help = "it belongs to the scene: put it into the file that is drawn"
                 fact = f"`{stmt.name.text}` in an imported file"
                 report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
     statements = [s for s in file.statements if not imported or isinstance(s, BROUGHT)]
-    return prepare_block(statements, Place(context, context.scope, "file"), file.span)
+    return blocks.prepare_block(statements, Place(context, context.scope, "file"), file.span)
 
 
 def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
@@ -307,9 +270,9 @@ def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
     bounds = prepare(stmt.range, place) if stmt.range is not None else None
     slot = slots.add()
     if not at_top_level(place, name.span, "a param"):
-        define(name, Binding("poison", name.span), place)
+        blocks.define(name, Binding("poison", name.span), place)
         return None
-    if not define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
+    if not blocks.define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
         return None
     full = file.prefix + name.text
     file.has_params = True
@@ -350,7 +313,7 @@ def _checked_default(value: Any, allowed: Any, stmt: tree.Param, session: Sessio
             advice, fix = _range_meant(value, allowed, stmt.range)
             session.report.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
     except Problem as problem:
-        report_problem(session.report, problem, stmt.range.span, (stmt.default,))
+        advice.report_problem(session.report, problem, stmt.range.span, (stmt.default,))
     return value
 
 
@@ -477,24 +440,24 @@ def _is_literal(expr: tree.Expr) -> bool:
 
 def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     name = stmt.name.text
-    binding = None if name in LANGUAGE else lookup(stmt.name, place)
-    if name in SETTINGS and not hides(binding, stmt):
+    binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
+    if name in words.SETTINGS and not hides(binding, stmt):
         return prepare_setting(stmt, place)
-    if name in LANGUAGE:
+    if name in words.LANGUAGE:
         return prepare_move(stmt, place)
     if binding is None:
-        if name in GEOMETRIES:
-            return prepare_object(stmt, place)
+        if name in words.GEOMETRIES:
+            return blocks.prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
             if _boolean(stmt) is None:
                 _skim(stmt, place)
             _unknown(stmt, place)
         return None
     if binding.kind == "module":
-        return prepare_module_call(stmt, binding.value, place)
+        return blocks.prepare_module_call(stmt, binding.value, place)
     if binding.kind == "element":
-        return prepare_element(stmt, place, binding.value)
-    if binding.kind in VALUES:
+        return blocks.prepare_element(stmt, place, binding.value)
+    if binding.kind in advice.VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)
     if binding.kind != "poison":
@@ -505,20 +468,20 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
 def hides(binding: Binding | None, stmt: tree.Call) -> bool:
     """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
     return binding is not None and (
-        binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
+        binding.kind in ("module", "poison") or (binding.kind in advice.VALUES and stmt.args is None)
     )
 
 
 def _boolean(stmt: tree.Call) -> str | None:
     """The boolean word that a call with objects as arguments stands for."""
     here = foreign.WORDS.get(stmt.name.text.lower())
-    return here if here in COMBINE and stmt.args and stmt.body is None else None
+    return here if here in words.COMBINE and stmt.args and stmt.body is None else None
 
 
 def _skim(stmt: tree.Call, place: Place) -> None:
     """Look for mistakes in the arguments and the block of something that will not run."""
     prepare_arguments(stmt.args, place)
-    prepare_inner(stmt.body, place.inner("unknown"))
+    blocks.prepare_inner(stmt.body, place.inner("unknown"))
 
 
 def _lacks_module(stmt: tree.Call, place: Place) -> bool:
@@ -530,15 +493,15 @@ def _lacks_module(stmt: tree.Call, place: Place) -> bool:
     params = [arg.name for arg in stmt.args if arg.name] + values
     if len(params) < len(stmt.args) or not values:
         return False
-    if any(place.scope.find(p.text) or p.text in CONSTANTS or p.text in ANIMATED for p in values):
+    if any(place.scope.find(p.text) or p.text in words.CONSTANTS or p.text in words.ANIMATED for p in values):
         return False
     body = place.inner("unknown")
     body.scope.names.update({param.text: Binding("poison", param.span) for param in params})
-    prepare_inner(stmt.body, body)
+    blocks.prepare_inner(stmt.body, body)
     written = ", ".join(arg.span.text for arg in stmt.args)
     help = f"to define it write module {name}({written}) {{ … }}"
     message = f"unknown geometry or module `{name}`"
-    report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
+    advice.report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
     return True
 
 
@@ -548,22 +511,22 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
     if "." in text:
         alias = place.scope.find(text.partition(".")[0])
         if alias is None:
-            unknown(name, place)
+            advice.unknown(name, place)
         elif alias.kind == "import":
-            unknown_member(name, place, alias.value, kinds=("module", "element"))
+            advice.unknown_member(name, place, alias.value, kinds=("module", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return
-    if report_early(name, place):
+    if advice.report_early(name, place):
         return
-    if text in FUNCTIONS:
+    if text in words.FUNCTIONS:
         call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
-        written = f"write color({call});" if inside else material_advice(place, "color", call)
+        written = f"write color({call});" if inside else advice.material_advice(place, "color", call)
         message = f"`{text}` is a function, not an object or a module"
         place.report.error("E0213", message, name.span, help=written if text in ("rgb", "hsv") else None)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-    report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
+    advice.report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
 
 
 def _advice(stmt: tree.Call, place: Place) -> Advice:
@@ -573,24 +536,24 @@ def _advice(stmt: tree.Call, place: Place) -> Advice:
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
     if fix is None and text.lower() in foreign.STATEMENTS:
         help = None  # what is known of a word goes before what is only near
-    if place.kind == "object" and text in MATERIALS:
+    if place.kind == "object" and text in words.MATERIALS:
         return _lacks_material(stmt)
-    if help is None and place.kind in HOLDERS:
+    if help is None and place.kind in blocks.HOLDERS:
         if (here := _boolean(stmt)) is not None:
             return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
-        help, fix = in_library(stmt, place), None
+        help, fix = advice.in_library(stmt, place), None
     if fix is None:
         known, fix = instead(text, foreign.WORDS, candidates, name.span)
         help = known or help
-    if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
+    if fix is not None and stmt.body is not None and fix.edits[0].replacement in words.NODES:
         span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign.WORDS.get(text, "")
-    if help is None and place.kind == "object" and meant in OPERATIONS.keys() - TRANSFORMS.keys():
-        help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
+    if help is None and place.kind == "object" and meant in words.OPERATIONS.keys() - words.TRANSFORMS.keys():
+        help = f"it is called `{meant}` here and stands in a material: {advice.material_advice(place, meant)}"
     help = help or foreign.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain"):
-        help = drawn(place)
+        help = advice.drawn(place)
     return help, fix
 
 
@@ -610,19 +573,23 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
     kind = place.kind
     if kind == "material":
-        return {*OPERATIONS}
+        return {*words.OPERATIONS}
     if kind == "object" and stmt.args is not None:
-        return {*TRANSFORMS}
-    names = visible(place, VALUES if kind == "object" else ("module",))
+        return {*words.TRANSFORMS}
+    names = advice.visible(place, advice.VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    known = {*GEOMETRIES, *names}
+    known = {*words.GEOMETRIES, *names}
     if stmt.body is None:
-        return known if stmt.args is None else known | {*(TRANSFORMS if kind != "file" else SETTINGS)}
+        return (
+            known
+            if stmt.args is None
+            else known | {*(words.TRANSFORMS if kind != "file" else words.SETTINGS)}
+        )
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:
-        known = {*known, *NODES, *(["else"] if otherwise else [])}
+        known = {*known, *words.NODES, *(["else"] if otherwise else [])}
     return {*known, "else if"} if stmt.args is not None and otherwise else known
 
 
