@@ -215,11 +215,6 @@ def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Pl
     definition.size = slots.size
 
 
-def skip(stmt: tree.Fn | tree.Module | tree.BadStmt, place: Place) -> Action | None:
-    """Nothing to run: `prepare_block` has declared it, or recovery has reported it."""
-    return None
-
-
 # ---------------------------------------------------------------- control flow
 
 

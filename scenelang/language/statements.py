@@ -595,9 +595,9 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
 
 EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Number: expressions.prepare_number,
-    tree.String: expressions.prepare_literal,
-    tree.Bool: expressions.prepare_literal,
-    tree.Color: expressions.prepare_color,
+    tree.String: lambda expr, place: expressions.constant(expr.value),
+    tree.Bool: lambda expr, place: expressions.constant(expr.value),
+    tree.Color: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
     tree.Vector: expressions.prepare_vector,
     tree.Range: expressions.prepare_range,
     tree.NameRef: expressions.prepare_name,
@@ -606,17 +606,19 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Conditional: expressions.prepare_conditional,
     tree.CallExpr: expressions.prepare_call,
     tree.Member: expressions.prepare_member,
-    tree.Index: expressions.prepare_index,
+    tree.Index: lambda expr, place: expressions.computed(
+        place, expressions.item, expr.span, (expr.value, expr.index), item_steps=0
+    ),
     tree.MaterialExpr: modifiers.prepare_material,
-    tree.BadExpr: expressions.skip_bad,
+    tree.BadExpr: lambda expr, place: expressions.POISONED,  # recovery has reported it
 }
 STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Version: prepare_version,
     tree.Model: prepare_model,
     tree.Param: prepare_param,
     tree.Let: blocks.prepare_let,
-    tree.Fn: blocks.skip,
-    tree.Module: blocks.skip,
+    tree.Fn: lambda stmt, place: None,  # `prepare_block` has declared it
+    tree.Module: lambda stmt, place: None,
     tree.Import: prepare_import,
     tree.For: blocks.prepare_for,
     tree.If: blocks.prepare_if,
@@ -624,5 +626,5 @@ STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Node: blocks.prepare_node,
     tree.Combined: blocks.prepare_combined,
     tree.MaterialUse: modifiers.prepare_use,
-    tree.BadStmt: blocks.skip,
+    tree.BadStmt: lambda stmt, place: None,
 }

@@ -6,6 +6,7 @@ The evaluator takes arguments from it, the language server texts and highlighter
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, Literal, get_args
 
 from scenelang.assets.records import Record
@@ -46,6 +47,14 @@ def _word(head: str, text: str, snippet: str = "") -> Word:
     return Word(head.partition(" ")[0], head, text, snippet=snippet)
 
 
+def signature(name: str, params: Sequence[str], required: int) -> str:
+    """Form of a call, for help texts: ``translate(x, y[, z])``."""
+    text = ", ".join(params[:required])
+    for param in params[required:]:
+        text += f"[, {param}]" if text else f"[{param}]"
+    return f"{name}({text})"
+
+
 def _call(
     name: str, params: str, text: str, about: tuple[str, ...] = (), snippet: str = "", head: str = ""
 ) -> Word:
@@ -54,12 +63,11 @@ def _call(
     kinds = tuple([param.partition(":")[2] or "number" for param in params.split()])
     names = [param.rstrip("?…") for param in given]
     required = sum(not param.endswith("?") for param in given)
-    shown = ", ".join(names[:required]) + "".join(f"[, {param}]" for param in names[required:])
-    shown = shown if required or not names else f"[{', '.join(names)}]"
     variadic = params.endswith("…")
     if not snippet:
         holes = ", ".join(f"${{{at}:{param}}}" for at, param in enumerate(names, 1))
         snippet = f"{name}({holes})"
+    shown = signature("", names, required)[1:-1] if required else f"[{', '.join(names)}]" * bool(names)
     head = head or f"{name}({shown}{', …' * variadic})"
     return Word(name, head, text, tuple(names), required, about, snippet, variadic, kinds)
 
