@@ -13,13 +13,11 @@ import scenelang as nsg
 from scenelang.assets.zoo import zoo_bytes
 from scenelang.compiler.check import check_compiles
 from scenelang.compiler.compile import compile_scene, find_model
-from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import parse_program, program_bytes
 from scenelang.drawing.metrics import psnr
 from scenelang.language.diagnostics import Diagnostics
 from tests.assets.scenes import IMPORT, good, load
 from tests.assets.shapes import ball, element, square, torus
-from tests.test_architecture import loaded_by
 
 RING = "zoo.ring { scale(0.9); rotate(40deg, axis = X); translate(0.2, 0, 0); }"
 PURE = RING.replace("zoo.ring", "torus")
@@ -204,18 +202,6 @@ def test_json_of_other_files(folder: Path, change: dict[str, Any], words: str) -
         nsg.Scene.from_json(json.dumps(data), root=folder)
 
 
-def test_python_makes_the_same_scene(folder: Path) -> None:
-    zoo = nsg.load_elements(folder / "zoo.safetensors")
-    made = nsg.Scene(elements=zoo, nodes=nsg.Object("zoo.ring", nsg.Scale(0.5)))
-    text = good(folder, IMPORT + "zoo.ring { scale(0.5); }")
-    assert compile_scene(made).digest() == compile_scene(text).digest()
-
-
-def test_checking_needs_no_numpy(folder: Path) -> None:
-    good(folder, IMPORT + RING)
-    assert not loaded_by("check", str(folder / "scene.nsg")) & {"torch", "numpy"}
-
-
 def test_programs_carry_their_elements(folder: Path) -> None:
     text = f"{IMPORT} {RING} torus {{ translate(1, 0, 0); }} zoo.ring {{ translate(-1, 0, 0); }}"
     program = compile_scene(good(folder, text))
@@ -231,11 +217,6 @@ def test_a_program_without_elements_is_of_the_old_format(folder: Path) -> None:
     data = program_bytes(compile_scene(good(folder, f"{IMPORT} torus {{ }}")))
     assert b'\\"format\\":1' in data
     assert b"forms" not in data
-
-
-def test_models_that_draw_elements() -> None:
-    assert load_manifest("solids3d").elements == ("element of space", "texture", "colouring of space")
-    assert load_manifest("shapes2d-reading").elements == ()
 
 
 def test_data_of_an_earlier_version_takes_the_meshes_that_ship_now() -> None:

@@ -15,7 +15,6 @@ from scenelang.editors.dumps import scene_schema
 from scenelang.language.formatting import format_text
 from tests.assets.scenes import IMPORT, good, load
 from tests.assets.shapes import element, noise, torus
-from tests.test_architecture import loaded_by
 
 
 @pytest.fixture
@@ -120,24 +119,6 @@ def test_misspelt_materials_are_mended(folder: Path) -> None:
     (found,) = check(folder / "scene.nsg")
     assert found.fix is not None
     assert [edit.replacement for edit in found.fix.edits] == ["bark"]
-
-
-def test_an_import_whose_materials_are_used_is_used(folder: Path) -> None:
-    (folder / "scene.nsg").write_text(IMPORT + "square { material zoo.bark; }")
-    assert list(check(folder / "scene.nsg")) == []
-
-
-def test_checking_needs_no_numpy(folder: Path) -> None:
-    load(folder, IMPORT + "square { material zoo.bark; }")
-    assert not loaded_by("check", str(folder / "scene.nsg")) & {"torch", "numpy"}
-
-
-def test_python_makes_the_same_scene(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    zoo = nsg.load_elements("zoo.safetensors")
-    made = nsg.Scene(elements=zoo, nodes=nsg.Object("square", (), nsg.Material("zoo.bark", FLIP, "flat")))
-    text, _ = load(folder, IMPORT + "square { material flat zoo.bark { flip(); } }")
-    assert text == made
 
 
 def test_json_says_how_a_texture_is_lit(folder: Path) -> None:
