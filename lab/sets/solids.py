@@ -152,4 +152,4 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
         other = word == "smooth" and rng.random() < 0.5
         links.append(Link(word, item, k=float(rng.uniform(0.05, 0.5)) if other else None))
     others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
-    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]
+    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)

@@ -496,11 +496,15 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
         prepare_statement(stmt.child, Place(place.file, place.scope, "unknown", place.nested))
         return None
-    if not _makes_child(stmt.child, place):
+    child, makes = stmt.child, isinstance(stmt.child, tree.Node)
+    if isinstance(child, tree.Call):
+        binding = lookup(child.name, place)
+        makes = child.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
+    if not makes:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
         return None
-    act = prepare_statement(stmt.child, place)
+    act = prepare_statement(child, place)
     if act is None:
         return None
 
@@ -515,14 +519,6 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         out.op, out.k = "union", None
 
     return action
-
-
-def _makes_child(stmt: tree.Stmt, place: Place) -> bool:
-    """Test whether a statement after a boolean word is an object, a node or a call of a module."""
-    if isinstance(stmt, tree.Call):
-        binding = lookup(stmt.name, place)
-        return stmt.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
-    return isinstance(stmt, tree.Node)
 
 
 # ---------------------------------------------------------------- modules

@@ -217,7 +217,7 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
 # ---------------------------------------------------------------- parts of values
 
 
-def member(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
+def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
@@ -465,7 +465,7 @@ def prepare_member(expr: tree.Member, place: Place) -> Code:
     binding = place.scope.find(value.name.text) if isinstance(value, tree.NameRef) else None
     if binding is None or binding.kind != "import":
         code = prepare(value, place)
-        return POISONED if code.value is POISON else member(code, expr.name, place, value)
+        return POISONED if code.value is POISON else _component(code, expr.name, place, value)
     name = tree.Name(expr.span, f"{value.span.text}.{expr.name.text}")
     result = lookup(name, place)
     if result is not None:

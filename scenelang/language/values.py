@@ -259,7 +259,12 @@ ARITHMETIC: Final[dict[str, Callable[[float, float], float]]] = {
     "%": modulo,
     "^": power,
 }
-COMPARE: Final = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
 
 
 def same_unit(a: float, ua: str, b: float, ub: str) -> str:
