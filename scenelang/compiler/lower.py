@@ -36,9 +36,9 @@ from scenelang.compiler.steps import (
     shearing,
     translation,
 )
-from scenelang.language import scene as schema
+from scenelang.language import nodes as schema
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
-from scenelang.language.scene import Brought
+from scenelang.language.scene import Brought, Scene
 from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
 
 
@@ -111,7 +111,7 @@ class Memory:
 
 
 def lower(
-    scene: schema.Scene,
+    scene: Scene,
     manifest: Manifest,
     spans: Spans | None,
     diagnostics: Diagnostics,
@@ -145,9 +145,7 @@ def lower(
     return Graph(root, scene.canvas, background, space, stage, brought.geometries)
 
 
-def _check_canvas(
-    scene: schema.Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics
-) -> None:
+def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics) -> None:
     width, height = scene.canvas
     most, model = manifest.limits.get("canvas", 8192), f"model `{manifest.name}`"
     if max(width, height) > most:
@@ -163,7 +161,7 @@ def _check_canvas(
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
 
 
-Composite = schema.Scene | schema.Group | schema.Boolean | schema.Chain
+Composite = Scene | schema.Group | schema.Boolean | schema.Chain
 
 
 @dataclass(slots=True)
@@ -185,7 +183,7 @@ def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNod
     k = 0.0
     if isinstance(node, schema.Boolean):
         op, k = node.op, _width(node)
-    return ((op, k, child) for child in (node.nodes if isinstance(node, schema.Scene) else node.children))
+    return ((op, k, child) for child in (node.nodes if isinstance(node, Scene) else node.children))
 
 
 def _width(node: schema.Boolean | schema.Link) -> float:
@@ -208,7 +206,7 @@ class _Lowering:
     said: set[tuple[str, str]] = field(default_factory=set)
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
-    def run(self, scene: schema.Scene) -> Fold:
+    def run(self, scene: Scene) -> Fold:
         stack = [_Open("union", 0.0, scene, None, _children(scene))]
         self.origin = scene if scene.model else None
         while True:
@@ -216,7 +214,7 @@ class _Lowering:
             item = next(here.todo, None)
             if item is None:
                 stack.pop()
-                if isinstance(here.node, schema.Scene):
+                if isinstance(here.node, Scene):
                     return Fold("scene", tuple(here.links))
                 kind = here.node.op if isinstance(here.node, schema.Boolean) else here.node.kind
                 fold = Fold(kind, tuple(here.links), self.moves(here.node), self.place(here.node))
