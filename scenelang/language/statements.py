@@ -310,8 +310,8 @@ def _checked_default(value: Any, allowed: Any, stmt: tree.Param, session: Sessio
         if not within(value, allowed):
             labels = (Label(stmt.range.span, "the range"),)
             message = f"default of `{stmt.name.text}` is outside {stmt.range.span.text}"
-            help, fix = _range_meant(value, allowed, stmt.range)
-            session.report.error("E0309", message, stmt.default.span, labels=labels, help=help, fix=fix)
+            about, fix = _range_meant(value, allowed, stmt.range)
+            session.report.error("E0309", message, stmt.default.span, labels=labels, help=about, fix=fix)
     except Problem as problem:
         advice.report_problem(session.report, problem, stmt.range.span, (stmt.default,))
     return value
