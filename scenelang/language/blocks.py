@@ -299,10 +299,11 @@ class Replayed(Record, frozen=False):
         """Run the statement, or replay what it did."""
         if self.varies is None:
             self.varies = self.needs.varies()
-        session = self.session
-        if self.varies:
+        session, kept = self.session, self.kept
+        clashes = kept and ((kept[0].children and out.moved) or (kept[0].material and out.material))
+        if self.varies or clashes:  # an error needs the place it stands in
             self.action(env, out)
-        elif self.kept is None:
+        elif kept is None:
             own = Builder(out.material, out.material_span, out.moved)
             steps, objects, parts = session.steps, session.objects, session.parts
             around, session.spans = session.spans, SpanMap()
@@ -313,14 +314,10 @@ class Replayed(Record, frozen=False):
                 spans, session.spans = session.spans, around
             own.material = own.material if out.material is None else None
             own.moved = own.moved if own.transforms else None
-            counted = session.steps - steps, session.objects - objects, session.parts - parts
-            self.kept = (own, spans, *counted)
+            self.kept = own, spans, session.steps - steps, session.objects - objects, session.parts - parts
             out.extend(own)
         else:
-            own, spans, steps, objects, parts = self.kept
-            if (own.children and out.moved) or (own.material and out.material):
-                self.action(env, out)  # an error that needs the place it stands in
-                return
+            own, spans, steps, objects, parts = kept
             session.tick(steps, self.span)
             session.count_parts(parts, self.span)
             session.count_objects(objects, self.span)

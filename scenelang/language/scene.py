@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails, PydanticSerializationError
@@ -160,7 +160,7 @@ class Elements(Frozen):
         return None
 
 
-class Brought(NamedTuple):
+class Brought(Record):
     """Elements by the names that scenes have them by."""
 
     geometries: dict[str, Element]

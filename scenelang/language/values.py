@@ -31,7 +31,7 @@ class Problem(Exception):
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         operand: which operand or argument is to blame, from 0; None for all of it.
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
-            with the fix; a ``colour`` of a string; of three ``turns`` the last.
+            with the fix; a ``colour`` of a string.
         notes: words for further operands, by their numbers.
         found: the kind that is odd about a value, whatever was going to be done with it. Problems that found
             the same may have one cause.
