@@ -21,7 +21,6 @@ from scenelang.drawing.metrics import over_white, psnr
 from scenelang.inverse.fit import Number, fit
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import loads
-from scenelang.language.scene_text import to_nsg
 from scenelang.output.plan import reference_of
 
 FAR_DB: Final = 25.0
@@ -133,7 +132,7 @@ def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Ca
     names, ranges = (SOLID if manifest.dimension == 3 else PLANE), _RANGES[manifest.dimension]
     name = names[index % len(names)]
     made = random_solid(rng, SOLID_SETS[name]) if manifest.dimension == 3 else random_scene(rng, SETS[name])
-    text, word, slots = to_nsg(made), "", []
+    text, word, slots = made.to_nsg(), "", []
     for line in re.finditer(r"[^\n]+", text):
         words = {result.end(): result[1] for result in _WORD.finditer(line[0])}
         for result in _NUMBER.finditer(line[0]):

@@ -38,32 +38,32 @@ if TYPE_CHECKING:
     from scenelang.language.evaluation import load as load
     from scenelang.language.evaluation import loads as loads
     from scenelang.language.formatting import format_text as format_text
+    from scenelang.language.nodes import Animation as Animation
+    from scenelang.language.nodes import Bend as Bend
+    from scenelang.language.nodes import Boolean as Boolean
+    from scenelang.language.nodes import Camera as Camera
+    from scenelang.language.nodes import Chain as Chain
+    from scenelang.language.nodes import Color as Color
+    from scenelang.language.nodes import Displace as Displace
+    from scenelang.language.nodes import Flip as Flip
+    from scenelang.language.nodes import Grayscale as Grayscale
+    from scenelang.language.nodes import Ground as Ground
+    from scenelang.language.nodes import Group as Group
+    from scenelang.language.nodes import Hue as Hue
+    from scenelang.language.nodes import Light as Light
+    from scenelang.language.nodes import Link as Link
+    from scenelang.language.nodes import Material as Material
+    from scenelang.language.nodes import Matrix as Matrix
+    from scenelang.language.nodes import Object as Object
+    from scenelang.language.nodes import Rotate as Rotate
+    from scenelang.language.nodes import Scale as Scale
+    from scenelang.language.nodes import Shear as Shear
+    from scenelang.language.nodes import Translate as Translate
+    from scenelang.language.nodes import Twirl as Twirl
+    from scenelang.language.nodes import Twist as Twist
     from scenelang.language.reports import SceneError as SceneError
-    from scenelang.language.scene import Animation as Animation
-    from scenelang.language.scene import Bend as Bend
-    from scenelang.language.scene import Boolean as Boolean
-    from scenelang.language.scene import Camera as Camera
-    from scenelang.language.scene import Chain as Chain
-    from scenelang.language.scene import Color as Color
-    from scenelang.language.scene import Displace as Displace
     from scenelang.language.scene import Elements as Elements
-    from scenelang.language.scene import Flip as Flip
-    from scenelang.language.scene import Grayscale as Grayscale
-    from scenelang.language.scene import Ground as Ground
-    from scenelang.language.scene import Group as Group
-    from scenelang.language.scene import Hue as Hue
-    from scenelang.language.scene import Light as Light
-    from scenelang.language.scene import Link as Link
-    from scenelang.language.scene import Material as Material
-    from scenelang.language.scene import Matrix as Matrix
-    from scenelang.language.scene import Object as Object
-    from scenelang.language.scene import Rotate as Rotate
-    from scenelang.language.scene import Scale as Scale
     from scenelang.language.scene import Scene as Scene
-    from scenelang.language.scene import Shear as Shear
-    from scenelang.language.scene import Translate as Translate
-    from scenelang.language.scene import Twirl as Twirl
-    from scenelang.language.scene import Twist as Twist
     from scenelang.language.scene import load_elements as load_elements
     from scenelang.output.animate import animate as animate
     from scenelang.output.animate import render_frames as render_frames
@@ -87,11 +87,12 @@ _HOME: Final = {
     "scenelang.language.diagnostics": "Diagnostic Diagnostics",
     "scenelang.language.evaluation": "load loads",
     "scenelang.language.formatting": "format_text",
-    "scenelang.language.reports": "SceneError",
-    "scenelang.language.scene": (
-        "Animation Bend Boolean Camera Chain Color Displace Elements Flip Grayscale Ground Group Hue "
-        "Light Link load_elements Material Matrix Object Rotate Scale Scene Shear Translate Twirl Twist"
+    "scenelang.language.nodes": (
+        "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
+        "Material Matrix Object Rotate Scale Shear Translate Twirl Twist"
     ),
+    "scenelang.language.reports": "SceneError",
+    "scenelang.language.scene": "Elements load_elements Scene",
     "scenelang.output.animate": "animate render_frames",
     "scenelang.output.frames": "FramesError",
     "scenelang.output.sweep": "render_many",

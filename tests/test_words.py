@@ -29,7 +29,12 @@ def test_keywords_and_units_are_those_of_the_grammar() -> None:
 def test_everything_called_has_a_meaning() -> None:
     assert values.FUNCTIONS.keys() == words.FUNCTIONS.keys()
     assert values.CONSTANTS.keys() == words.CONSTANTS.keys()
-    assert modifiers._BUILDS.keys() == words.TRANSFORMS.keys() | words.OPERATIONS.keys()
+    assert {
+        kind
+        for table in (words.SETTINGS, words.TRANSFORMS, words.OPERATIONS)
+        for word in table.values()
+        for kind in word.kinds
+    } <= modifiers.KINDS.keys()
     for model in map(load_manifest, available()):
         assert words.LEAVES[model.dimension].keys() >= {*model.geometries}
         assert [*words.SHADINGS[model.dimension]] == [*model.materials]

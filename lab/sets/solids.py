@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from lab.sets.plane import Rng, any_tree
 from scenelang.language.scene import (
     Bend,
+    Brought,
     Camera,
     Chain,
     Color,
@@ -31,8 +32,8 @@ from scenelang.language.scene import (
     Translate,
     Twirl,
     Twist,
+    load_elements,
 )
-from scenelang.language.scene_data import Brought, load_elements
 from scenelang.language.words import COMBINE
 
 Triple = tuple[float, float, float]
@@ -151,4 +152,4 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
         other = word == "smooth" and rng.random() < 0.5
         links.append(Link(word, item, k=float(rng.uniform(0.05, 0.5)) if other else None))
     others = _stage(rng) if config.staged else {"elements": zoo} if zoo is not None else {}
-    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)  # type: ignore[arg-type]
+    return Scene(model="solids3d", canvas=config.canvas, nodes=Chain(links), **others)

@@ -104,14 +104,14 @@ def read_input(
     path, root = (None, ".") if name == STDIN else (name, None)
     source = replace(request.source, path=path, text=text, root=request.source.root or root)
     if name.endswith(JSON) or (path is None and text.text.lstrip()[:1] == "{"):
-        from scenelang.language.scene_json import load_json
+        from scenelang.language.scene import load_json
 
         if frame:
             fact = f"frame {frame} of a scene from JSON, which is one frame"
             result.diagnostics.add("E0337", fact, None, help="convert that frame of the animation to JSON")
         with clock("read"):
             folder = Path(source.root or Path(name).parent)
-            scene, spans = load_json(text, Scene, result.diagnostics, folder)
+            scene, spans = load_json(text, result.diagnostics, folder)
             if scene is not None and (source.size or source.model):
                 changed = (scene if source.size is None else scene.sized(source.size)).of_model(source.model)
                 if spans.span(scene) is not None:

@@ -12,8 +12,7 @@ from scenelang.compiler.manifest import USUAL, Manifest, available, load_manifes
 from scenelang.compiler.passes import check_scene
 from scenelang.language.diagnostics import Diagnostics, Span, did_you_mean
 from scenelang.language.reports import SceneError
-from scenelang.language.scene import Chain, Object, Scene, SceneNode
-from scenelang.language.scene_data import Brought
+from scenelang.language.scene import Brought, Chain, Object, Scene, SceneNode
 from scenelang.language.words import STAGE, dimension_of
 
 if TYPE_CHECKING:

@@ -36,28 +36,28 @@ from scenelang.compiler.steps import (
     shearing,
     translation,
 )
-from scenelang.language import scene as scenes
+from scenelang.language import nodes as schema
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
-from scenelang.language.scene_data import Brought
+from scenelang.language.scene import Brought, Scene
 from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
 
 
-def step_of(transform: scenes.Transform | scenes.Flip, space: Space) -> Step | Refusal:
+def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
     """The step of a transform, or the reason why there is none.
 
     In the plane nothing may leave it, and scales along z drop out.
     """
-    if isinstance(transform, scenes.Flip):
+    if isinstance(transform, schema.Flip):
         return Affine(scaling(-1.0, 1.0))
-    if isinstance(transform, scenes.Twirl):
+    if isinstance(transform, schema.Twirl):
         return Warp(transform.k, (0.0, 0.0))
-    if isinstance(transform, scenes.Bend):
+    if isinstance(transform, schema.Bend):
         return Warp(0.0, (transform.k, 0.0))
-    if isinstance(transform, (scenes.Twist, scenes.Displace)):
+    if isinstance(transform, (schema.Twist, schema.Displace)):
         if space.dimension == 2:
             fact = f"`{transform.kind}` leaves the plane"
             return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
-        if isinstance(transform, scenes.Twist):
+        if isinstance(transform, schema.Twist):
             return Twist(transform.k)
         return Displace(transform.amount, transform.frequency)
     fitted = space.fitted(transform, _rows(transform))
@@ -73,16 +73,16 @@ def step_of(transform: scenes.Transform | scenes.Flip, space: Space) -> Step | R
     return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
 
 
-def _rows(transform: scenes.Transform) -> Rows:
-    if isinstance(transform, scenes.Translate):
+def _rows(transform: schema.Transform) -> Rows:
+    if isinstance(transform, schema.Translate):
         return translation(transform.x, transform.y, transform.z)
-    if isinstance(transform, scenes.Scale):
+    if isinstance(transform, schema.Scale):
         return scaling(transform.x, transform.y, transform.z)
-    if isinstance(transform, scenes.Rotate):
+    if isinstance(transform, schema.Rotate):
         return rotation(transform.angle, transform.axis)
-    if isinstance(transform, scenes.Shear):
+    if isinstance(transform, schema.Shear):
         return shearing(transform.axes, transform.k)
-    assert isinstance(transform, scenes.Matrix)
+    assert isinstance(transform, schema.Matrix)
     first, second, third, _ = transform.rows
     return (*first, *second, *third)
 
@@ -98,7 +98,7 @@ class Spans(Protocol):
         """The place of ``node``, None where it is unknown."""
 
 
-Leaves = dict[int, tuple[scenes.Object, scenes.Material | None, Leaf]]
+Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
 """Objects, by identity, with the material around them and their leaves."""
 
 
@@ -111,7 +111,7 @@ class Memory:
 
 
 def lower(
-    scene: scenes.Scene,
+    scene: Scene,
     manifest: Manifest,
     spans: Spans | None,
     diagnostics: Diagnostics,
@@ -144,9 +144,7 @@ def lower(
     return Graph(root, scene.canvas, background, space, stage, brought.geometries)
 
 
-def _check_canvas(
-    scene: scenes.Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics
-) -> None:
+def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics) -> None:
     width, height = scene.canvas
     most, model = manifest.limits.get("canvas", 8192), f"model `{manifest.name}`"
     if max(width, height) > most:
@@ -162,7 +160,7 @@ def _check_canvas(
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
 
 
-Composite = scenes.Scene | scenes.Group | scenes.Boolean | scenes.Chain
+Composite = Scene | schema.Group | schema.Boolean | schema.Chain
 
 
 @dataclass(slots=True)
@@ -172,22 +170,22 @@ class _Open:
     op: Combine
     k: float
     node: Composite
-    material: scenes.Material | None
-    todo: Iterator[tuple[Combine, float, scenes.SceneNode]]
+    material: schema.Material | None
+    todo: Iterator[tuple[Combine, float, schema.SceneNode]]
     links: list[Link] = field(default_factory=list)
 
 
-def _children(node: Composite) -> Iterator[tuple[Combine, float, scenes.SceneNode]]:
-    if isinstance(node, scenes.Chain):
+def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNode]]:
+    if isinstance(node, schema.Chain):
         return ((link.op, _width(link), link.node) for link in node.children)
     op: Combine = "union"
     k = 0.0
-    if isinstance(node, scenes.Boolean):
+    if isinstance(node, schema.Boolean):
         op, k = node.op, _width(node)
-    return ((op, k, child) for child in (node.nodes if isinstance(node, scenes.Scene) else node.children))
+    return ((op, k, child) for child in (node.nodes if isinstance(node, Scene) else node.children))
 
 
-def _width(node: scenes.Boolean | scenes.Link) -> float:
+def _width(node: schema.Boolean | schema.Link) -> float:
     """The width of a blend where it is not the usual one, else 0."""
     return 0.0 if node.k is None or (node.op == "smooth" and node.k == BLEND) else node.k
 
@@ -207,7 +205,7 @@ class _Lowering:
     said: set[tuple[str, str]] = field(default_factory=set)
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
-    def run(self, scene: scenes.Scene) -> Fold:
+    def run(self, scene: Scene) -> Fold:
         stack = [_Open("union", 0.0, scene, None, _children(scene))]
         self.origin = scene if scene.model else None
         while True:
@@ -215,9 +213,9 @@ class _Lowering:
             item = next(here.todo, None)
             if item is None:
                 stack.pop()
-                if isinstance(here.node, scenes.Scene):
+                if isinstance(here.node, Scene):
                     return Fold("scene", tuple(here.links))
-                kind = here.node.op if isinstance(here.node, scenes.Boolean) else here.node.kind
+                kind = here.node.op if isinstance(here.node, schema.Boolean) else here.node.kind
                 fold = Fold(kind, tuple(here.links), self.moves(here.node), self.place(here.node))
                 stack[-1].links.append(Link(here.op, fold, here.k))
                 continue
@@ -226,10 +224,10 @@ class _Lowering:
                 op, k = "union", 0.0
             elif k and op == "smooth" and not self.manifest.any_blend:
                 fact = f"model `{self.manifest.name}` blends over {BLEND} and no other width"
-                joined = here.node if isinstance(here.node, scenes.Boolean) else node
+                joined = here.node if isinstance(here.node, schema.Boolean) else node
                 self.say("E0512", fact, joined, "leave k out, or draw with another model")
             material = node.material or here.material
-            if isinstance(node, scenes.Object):
+            if isinstance(node, schema.Object):
                 here.links.append(Link(op, self.leaf(node, material), k))
                 self.objects += 1
                 if self.objects > MAX_OBJECTS:
@@ -242,7 +240,7 @@ class _Lowering:
             else:
                 stack.append(_Open(op, k, node, material, _children(node)))
 
-    def leaf(self, node: scenes.Object, material: scenes.Material | None) -> Leaf:
+    def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
         self.origin = self.origin or node
         seen = self.old.get(id(node))
         number = self.objects + 1
@@ -276,10 +274,10 @@ class _Lowering:
             self.say(code, fact, node, "list its file in `elements`")
         return element
 
-    def moves(self, node: scenes.SceneNode) -> tuple[Move, ...]:
+    def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         result = []
         for at, transform in enumerate(node.transforms):
-            if isinstance(transform, scenes.Displace) and (at or not isinstance(node, scenes.Object)):
+            if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
                 fact = "`displace` does not stand first in the block of an object"
                 self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
                 continue
@@ -295,7 +293,7 @@ class _Lowering:
                 result.append(Move(step, self.place(transform)))
         return tuple(result)
 
-    def look(self, material: scenes.Material) -> Look:
+    def look(self, material: schema.Material) -> Look:
         known = self.looks.get(id(material))
         if known is not None:
             return known
@@ -319,11 +317,11 @@ class _Lowering:
         look = self.looks[id(material)] = Look(shading, colours, element=element, texture=moves)
         return look
 
-    def texture_moves(self, material: scenes.Material, element: Element | None) -> Iterator[Affine]:
+    def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
         """The moves of a texture; a constant material's are checked too, colours of space have none."""
         rows = IDENTITY
         for op in material.ops:
-            if isinstance(op, scenes.Color | scenes.Grayscale | scenes.Hue):
+            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
                 continue
             if element is not None and element.dimension == 3:
                 fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"

@@ -34,7 +34,7 @@ from scenelang.inverse.sandbox import (
     run_in_sandbox,
 )
 from scenelang.language.diagnostics import plural
-from scenelang.language.scene_data import Elements, load_elements
+from scenelang.language.scene import Elements, load_elements
 from scenelang.output.workers import GivenUp, by_workers
 
 SEEN: Final = 960  # assumed width of a solid in pixels, by which the report states its smallest details

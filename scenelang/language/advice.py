@@ -37,8 +37,6 @@ def problem_advice(problem: Problem, operand: tree.Expr | None) -> Advice:
         if operand is None or colour is None:
             return problem.help, None
         return problem.help, Fix(f"write `{colour}`", (Edit(operand.span, colour),))
-    if problem.fix == "turns":
-        return problem.help, None
     inner = operand.operand if isinstance(operand, tree.Unary) else operand
     if isinstance(inner, tree.Number):
         size, end = abs(inner.value), inner.span.end

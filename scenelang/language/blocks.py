@@ -23,8 +23,7 @@ from scenelang.language.expressions import (
 from scenelang.language.library import SpanMap, Written
 from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
 from scenelang.language.nodes import blend_width
-from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object
-from scenelang.language.scene_data import objects_of
+from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object, objects_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
 from scenelang.language.values import POISON, Problem, RangeValue, Vec, number, show, unexpected
 from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
@@ -216,11 +215,6 @@ def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Pl
     definition.size = slots.size
 
 
-def skip(stmt: tree.Fn | tree.Module | tree.BadStmt, place: Place) -> Action | None:
-    """Nothing to run: `prepare_block` has declared it, or recovery has reported it."""
-    return None
-
-
 # ---------------------------------------------------------------- control flow
 
 
@@ -305,10 +299,11 @@ class Replayed(Record, frozen=False):
         """Run the statement, or replay what it did."""
         if self.varies is None:
             self.varies = self.needs.varies()
-        session = self.session
-        if self.varies:
+        session, kept = self.session, self.kept
+        clashes = kept and ((kept[0].children and out.moved) or (kept[0].material and out.material))
+        if self.varies or clashes:  # an error needs the place it stands in
             self.action(env, out)
-        elif self.kept is None:
+        elif kept is None:
             own = Builder(out.material, out.material_span, out.moved)
             steps, objects, parts = session.steps, session.objects, session.parts
             around, session.spans = session.spans, SpanMap()
@@ -319,14 +314,10 @@ class Replayed(Record, frozen=False):
                 spans, session.spans = session.spans, around
             own.material = own.material if out.material is None else None
             own.moved = own.moved if own.transforms else None
-            counted = session.steps - steps, session.objects - objects, session.parts - parts
-            self.kept = (own, spans, *counted)
+            self.kept = own, spans, session.steps - steps, session.objects - objects, session.parts - parts
             out.extend(own)
         else:
-            own, spans, steps, objects, parts = self.kept
-            if (own.children and out.moved) or (own.material and out.material):
-                self.action(env, out)  # an error that needs the place it stands in
-                return
+            own, spans, steps, objects, parts = kept
             session.tick(steps, self.span)
             session.count_parts(parts, self.span)
             session.count_objects(objects, self.span)
@@ -502,11 +493,15 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
         prepare_statement(stmt.child, Place(place.file, place.scope, "unknown", place.nested))
         return None
-    if not _makes_child(stmt.child, place):
+    child, makes = stmt.child, isinstance(stmt.child, tree.Node)
+    if isinstance(child, tree.Call):
+        binding = lookup(child.name, place)
+        makes = child.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
+    if not makes:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
         return None
-    act = prepare_statement(stmt.child, place)
+    act = prepare_statement(child, place)
     if act is None:
         return None
 
@@ -521,14 +516,6 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         out.op, out.k = "union", None
 
     return action
-
-
-def _makes_child(stmt: tree.Stmt, place: Place) -> bool:
-    """Test whether a statement after a boolean word is an object, a node or a call of a module."""
-    if isinstance(stmt, tree.Call):
-        binding = lookup(stmt.name, place)
-        return stmt.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
-    return isinstance(stmt, tree.Node)
 
 
 # ---------------------------------------------------------------- modules

@@ -28,7 +28,6 @@ from scenelang.language.values import (
     Time,
     Vec,
     describe,
-    doubt_hue,
     number,
     unexpected,
     unpack,
@@ -40,8 +39,6 @@ Run = Callable[[Env], Any]
 VARIES: Final = object()
 """Marks an expression whose value is known only when it runs."""
 _FOLDED_NUMBERS: Final = 64
-_ANGLES: Final = {"rotate": "angle", "hue": "angle", "sin": "x", "cos": "x", "tan": "x"}
-"""Words whose first argument is an angle, and its name."""
 
 
 class Code(NamedTuple):
@@ -82,7 +79,8 @@ def prepare(expr: tree.Expr, place: Place) -> Code:
 
 def prepare_arguments(args: Iterable[tree.Argument] | None, place: Place, name: str = "") -> list[Given]:
     """Prepare the arguments of a call; ``name`` is that of one of the language's own words."""
-    angle, given = _ANGLES.get(name, ""), []
+    word, given = words.word_for_call(name, False), []
+    angle = word.params[0] if word and word.kinds[:1] in (("angle",), ("hue",)) else None
     for index, arg in enumerate(args or ()):
         is_angle = angle and (arg.name.text == angle if arg.name else index == 0)
         given.append(Given(arg, (_prepare_angle if is_angle else prepare)(arg.value, place)))
@@ -186,27 +184,14 @@ def prepare_number(expr: tree.Number, place: Place) -> Code:
     return constant(_LITERALS[expr.unit](value) if expr.unit else value)
 
 
-def prepare_literal(expr: tree.String | tree.Bool, place: Place) -> Code:
-    return constant(expr.value)
-
-
-def prepare_color(expr: tree.Color, place: Place) -> Code:
-    return constant(Vec(tuple([float(c) for c in expr.rgb])))
-
-
-def skip_bad(expr: tree.BadExpr, place: Place) -> Code:
-    return POISONED
-
-
-def _vector(*items: Any) -> Vec:
-    for index, item in enumerate(items):
-        if item.__class__ is RangeValue:
-            raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
-    return Vec(items)
-
-
 def prepare_vector(expr: tree.Vector, place: Place) -> Code:
-    return computed(place, _vector, expr.span, expr.items, item_steps=0)
+    def vector(*items: Any) -> Vec:
+        for index, item in enumerate(items):
+            if item.__class__ is RangeValue:
+                raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
+        return Vec(items)
+
+    return computed(place, vector, expr.span, expr.items, item_steps=0)
 
 
 def prepare_range(expr: tree.Range, place: Place) -> Code:
@@ -232,7 +217,7 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
 # ---------------------------------------------------------------- parts of values
 
 
-def member(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
+def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)
     if index is None:
@@ -262,7 +247,8 @@ def member(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     return folded([code], pick, run)
 
 
-def _item(value: Any, index: Any) -> Any:
+def item(value: Any, index: Any) -> Any:
+    """``value[index]``."""
     at = number(index, 1)
     if value.__class__ is Vec:
         length = len(value.items)
@@ -279,18 +265,9 @@ def _item(value: Any, index: Any) -> Any:
     return value.items[int(at)] if value.__class__ is Vec else value.item(int(at))
 
 
-def prepare_index(expr: tree.Index, place: Place) -> Code:
-    return computed(place, _item, expr.span, (expr.value, expr.index), item_steps=0)
-
-
 _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
-    **values.ARITHMETIC,
-    **values.COMPARE,
-    "/": operator.truediv,
-    "%": operator.mod,
-    "^": math.pow,
-    "==": operator.eq,
-    "!=": operator.ne,
+    **(values.ARITHMETIC | {"/": operator.truediv, "%": operator.mod, "^": math.pow}),
+    **(values.COMPARE | {"==": operator.eq, "!=": operator.ne}),
 }
 """Operators on two numbers, unless the result is an error or not finite."""
 _MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
@@ -488,21 +465,13 @@ def prepare_member(expr: tree.Member, place: Place) -> Code:
     binding = place.scope.find(value.name.text) if isinstance(value, tree.NameRef) else None
     if binding is None or binding.kind != "import":
         code = prepare(value, place)
-        return POISONED if code.value is POISON else member(code, expr.name, place, value)
+        return POISONED if code.value is POISON else _component(code, expr.name, place, value)
     name = tree.Name(expr.span, f"{value.span.text}.{expr.name.text}")
     result = lookup(name, place)
     if result is not None:
         return _as_value(name, result, place)
     unknown_member(name, place, binding.value)
     return POISONED
-
-
-def signature(name: str, params: Sequence[str], required: int) -> str:
-    """Form of a call, for help texts: ``translate(x, y[, z])``."""
-    text = ", ".join(params[:required])
-    for param in params[required:]:
-        text += f"[, {param}]" if text else f"[{param}]"
-    return f"{name}({text})"
 
 
 def bind(
@@ -529,7 +498,7 @@ def bind(
     """
     bound: list[Given | None] = [None] * len(params)
     called, places = name.text, [param.name for param in definition.params] if definition else []
-    shown = help or f"it is called {signature(called, params, required)}"
+    shown = help or f"it is called {words.signature(called, params, required)}"
     here = (Label(definition.name.span, "defined here"),) if definition else ()
 
     def fail(
@@ -642,7 +611,9 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code
             return POISONED
         given = [one for one in bound if one is not None]
     exprs = [arg.value for arg, _ in given]
-    meaning = _doubted_hsv(exprs, place) if name.text == "hsv" else FUNCTIONS[name.text]
+    meaning = FUNCTIONS[name.text]
+    if name.text == "hsv":
+        meaning = _doubted(meaning, exprs[0].span, place)
     place.file.weight += limits.FUNCTIONS.get(name.text, 4 * len(given) if word.variadic else 0)
     per_item = 0 if name.text == "len" else limits.FUNCTION_ITEM_STEPS
     return computed(place, meaning, expr.span, exprs, [code for _, code in given], per_item)
@@ -656,13 +627,15 @@ def _method(expr: tree.CallExpr, place: Place) -> None:
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help)
 
 
-def _doubted_hsv(exprs: Sequence[tree.Expr], place: Place) -> Callable[..., Any]:
-    """``hsv``, which warns of doubtful values."""
+def _doubted(hsv: Callable[..., Any], span: Span, place: Place) -> Callable[..., Any]:
+    """``hsv``, which warns of a hue that looks like degrees."""
 
-    def run(*values: Any) -> Any:
-        result, doubt = FUNCTIONS["hsv"](*values), doubt_hue(*values)
-        if doubt is not None:
-            place.report.warn(doubt.code, doubt.message, exprs[0].span, doubt.help)
+    def run(h: Any, s: Any, v: Any) -> Any:
+        result = hsv(h, s, v)
+        if h.__class__ is float and abs(h) > 2.0:
+            turns = values.show(h)
+            help = f"a bare hue is in turns: write {turns}deg, multiply what is computed by 1deg, or take % 1"
+            place.report.warn("W0302", f"a hue of {turns} turns", span, help)
         return result
 
     return run

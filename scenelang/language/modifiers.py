@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from scenelang.assets.records import Record
-from scenelang.language import tree
-from scenelang.language.advice import (
-    VALUES,
-    material_advice,
-    report_problem,
-    unknown,
-    unknown_material,
-    unknown_member,
-)
+from scenelang.language import advice, nodes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -30,43 +23,26 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import (
-    Bend,
-    Color,
-    Displace,
-    Flip,
-    Frozen,
-    Grayscale,
-    Hue,
-    Matrix,
-    Rotate,
-    Scale,
-    Shear,
-    Translate,
-    Twirl,
-    Twist,
-    singular,
-)
+from scenelang.language.nodes import Color, Frozen, Grayscale, Shear, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env
-from scenelang.language.values import POISON, MaterialValue, Problem, Vec, angle, describe, number, unexpected
-from scenelang.language.words import GEOMETRIES, MATERIALS, OPERATIONS, TEXTURES, TRANSFORMS, Word
+from scenelang.language.values import (
+    POISON,
+    Angle,
+    MaterialValue,
+    Problem,
+    Time,
+    Vec,
+    angle,
+    describe,
+    number,
+    show,
+    unexpected,
+)
 
-
-class Spec(Record):
-    """One transform or operation.
-
-    Args:
-        build: the node from one value an argument, None where left out; raises Problem.
-        spread: whether one vector may stand for all arguments.
-        help: advice for a wrong number of arguments; None prints the signature.
-    """
-
-    word: Word
-    build: Callable[..., Any]
-    spread: bool = False
-    help: str | None = None
+LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
+MAX_SIDE_PX: Final = 8192
 
 
 def vector(value: Any, length: int, operand: int = 0, what: str = "a vector") -> tuple[float, ...]:
@@ -77,140 +53,196 @@ def vector(value: Any, length: int, operand: int = 0, what: str = "a vector") ->
     return tuple([number(item, operand) for item in value.items])
 
 
-def color(value: Any, operand: int = 0) -> tuple[float, float, float]:
+def color(value: Any, operand: int = 0) -> tuple[float, ...]:
     """A colour's three numbers."""
     if value.__class__ is not Vec:
         help = "write #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)"
         raise unexpected("a colour", value, help, operand, fix="colour")
     if len(value.items) == 4:
-        raise unexpected(
-            "a colour of 3 numbers", value, "colours have no alpha: leave the fourth out", operand
-        )
-    r, g, b = vector(value, 3, operand, "a colour")
-    return r, g, b
+        help = "colours have no alpha: leave the fourth out"
+        raise unexpected("a colour of 3 numbers", value, help, operand)
+    return vector(value, 3, operand, "a colour")
 
 
-_ONE_AXIS: Final = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
+def _opaque(value: Any, operand: int, what: str = "colour") -> tuple[float, ...]:
+    rgb = color(value, operand)
+    for component in rgb:
+        if not 0.0 <= component <= 1.0:
+            raise Problem("E0311", f"{what} component {show(component)} is outside 0..1", operand=operand)
+    return rgb
 
 
-def _translate(x: Any, y: Any, z: Any) -> Translate:
-    third = 0.0 if z is None else number(z, 2)
-    return make(Translate, {"kind": "translate", "x": number(x, 0), "y": number(y, 1), "z": third})
+def _side(value: Any, operand: int) -> int:
+    side = number(value, operand)
+    if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
+        message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
+        raise Problem("E0311", message, operand=operand)
+    return int(side)
 
 
-def _rotate(turn: Any, axis: Any) -> Rotate:
-    if turn.__class__ is Vec:
-        raise unexpected("an angle", turn, _ONE_AXIS, 0, fix="turns")
-    rad = angle(turn, 0)
-    direction = (0.0, 0.0, 1.0) if axis is None else vector(axis, 3, 1, "an axis")
-    if not any(direction):
-        raise Problem("E0312", "an axis of length 0", operand=1)
-    return make(Rotate, {"kind": "rotate", "angle": rad, "axis": direction})
+def _positive(value: Any, operand: int, what: str) -> float:
+    size = float(value.size) if value.__class__ is Time and what == "length" else number(value, operand)
+    if size <= 0.0:
+        raise Problem("E0311", f"a {what} of {show(size)} is not above 0", operand=operand)
+    return size
 
 
-def _scale(x: Any, y: Any, z: Any) -> Scale:
-    factors = [number(x, 0), number(y, 1), 1.0 if z is None else number(z, 2)]
-    for index, factor in enumerate(factors):
-        if factor == 0.0:
-            help = "decimals stand behind a point, as in 0.5"
-            raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand=index)
-    return make(Scale, {"kind": "scale", "x": factors[0], "y": factors[1], "z": factors[2]})
+def _boolean(value: Any, operand: int) -> bool:
+    if value.__class__ is bool:
+        return value
+    raise unexpected("a boolean", value, operand=operand)
 
 
-def _scale_of_one(s: Any) -> Scale:
-    """``scale(s)``, or ``scale([sx, sy])`` with its components in a vector."""
-    return _scale(*spread([s, None, None], GEOMETRY["scale"])) if s.__class__ is Vec else _scale(s, s, s)
+def _factor(value: Any, operand: int) -> float:
+    factor = number(value, operand)
+    if factor == 0.0:
+        help = "decimals stand behind a point, as in 0.5"
+        raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand)
+    return factor
 
 
-def _shear(*terms: Any) -> Shear:
-    given = [i for i, term in enumerate(terms) if term is not None]
-    if len(given) != 1:
-        help = "write one term a call, as in shear(xy = 0.5); several calls apply in order"
-        raise Problem("E0308", f"shear takes one term, found {len(given)}", help)
-    at = given[0]
-    return make(Shear, {"kind": "shear", "axes": TRANSFORMS["shear"].params[at], "k": number(terms[at], at)})
+def _axis(value: Any, operand: int) -> tuple[float, ...]:
+    axis = vector(value, 3, operand, "an axis")
+    if not any(axis):
+        raise Problem("E0312", "an axis of length 0", operand=operand)
+    return axis
 
 
-def _matrix(rows: Any) -> Matrix:
+def _rate(value: Any, operand: int) -> float:
+    if value.__class__ is Angle:
+        help = "k is radians per unit length, a bare number: divide by 1rad"
+        raise unexpected("a number", value, help, operand)
+    return number(value, operand)
+
+
+def _rows(rows: Any, operand: int) -> tuple[tuple[float, ...], ...]:
     if rows.__class__ is not Vec or len(rows.items) != 4:
-        raise unexpected("4 rows of 4 numbers", rows, operand=0)
-    values = tuple([vector(row, 4, 0, "a row") for row in rows.items])
+        raise unexpected("4 rows of 4 numbers", rows, operand=operand)
+    values = tuple([vector(row, 4, operand, "a row") for row in rows.items])
     if values[3] != (0.0, 0.0, 0.0, 1.0):
-        raise Problem("E0311", "the last row of a matrix is not 0, 0, 0, 1", operand=0)
+        raise Problem("E0311", "the last row of a matrix is not 0, 0, 0, 1", operand=operand)
     if singular(values):
-        raise Problem("E0312", "a singular matrix flattens what it moves", operand=0)
-    return make(Matrix, {"kind": "matrix", "rows": values})
+        raise Problem("E0312", "a singular matrix flattens what it moves", operand=operand)
+    return values
 
 
-def _numbers(cls: type[Frozen], refused: str = "") -> Callable[..., Any]:
-    """A node whose fields are all numbers; ``refused`` says why an angle is not one of them."""
-    kind, *names = [cls.model_fields["kind"].default, *(name for name in cls.model_fields if name != "kind")]
-
-    def build(*values: Any) -> Any:
-        for operand, value in enumerate(values):
-            if refused and describe(value) == "an angle":
-                raise unexpected("a number", value, refused, operand)
-        parameters = {
-            name: number(value, at) for at, (name, value) in enumerate(zip(names, values, strict=True))
-        }
-        return make(cls, {"kind": kind, **parameters})
-
-    return build
-
-
-_RATE: Final = "k is radians per unit length, a bare number: divide by 1rad"
-_BUILDS: Final[dict[str, Callable[..., Any]]] = {
-    "translate": _translate,
-    "rotate": _rotate,
-    "scale": _scale,
-    "shear": _shear,
-    "matrix": _matrix,
-    "twirl": _numbers(Twirl, _RATE),
-    "bend": _numbers(Bend, _RATE),
-    "twist": _numbers(Twist, _RATE),
-    "displace": _numbers(Displace),
-    "flip": _numbers(Flip),
-    "color": lambda c: make(Color, {"kind": "color", "rgb": color(c)}),
-    "grayscale": _numbers(Grayscale),
-    "hue": lambda h: make(Hue, {"kind": "hue", "angle": angle(h, fix="hue")}),
+KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
+    "number": number,
+    "angle": angle,
+    "hue": lambda value, at: angle(value, at, "hue"),
+    "rate": _rate,
+    "factor": _factor,
+    "point": lambda value, at: vector(value, 3, at, "a point"),
+    "axis": _axis,
+    "rows": _rows,
+    "colour": color,
+    "opaque": _opaque,
+    "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
+    "side": _side,
+    "seconds": lambda value, at: _positive(value, at, "length"),
+    "fps": lambda value, at: _positive(value, at, "frame rate"),
+    "boolean": _boolean,
 }
-_SPREAD: Final = ("translate", "scale")
+"""Readers of arguments by their kinds in `words`: the value in base units; each raises Problem."""
+_ONE_AXIS: Final = "it turns by one angle about one axis: rotate(45deg), or rotate(45deg, axis = X)"
 _HELP: Final = {
     "rotate": _ONE_AXIS,
     "shear": "name the term, as in shear(xy = 0.5)",
     "color": "it is called color(c), with c as #d33, [r, g, b], rgb(r, g, b) or hsv(h, s, v)",
-    **{name: f"it is called {TRANSFORMS[name].head}" for name in ("scale", "matrix")},
+    **{name: f"it is called {words.TRANSFORMS[name].head}" for name in ("scale", "matrix")},
 }
+_NO_VECTOR: Final = {
+    "rotate": (0, _ONE_AXIS),
+    "light": (1, "the power is second: light([2, 4, 3], 30, #fff)"),
+    "ground": (0, "the height comes first: ground(-1, #888), or ground(color = #888)"),
+}
+"""Arguments in whose place a vector is a common mistake, and what to say of it."""
 
 
-def _specs(known: Mapping[str, Word]) -> dict[str, Spec]:
-    return {name: Spec(word, _BUILDS[name], name in _SPREAD, _HELP.get(name)) for name, word in known.items()}
+class Spec(Record):
+    """How the arguments of a statement become a node, or values in order where it has none.
+
+    Args:
+        word: its name, its arguments and their kinds.
+        help: advice for a wrong number of arguments; None prints the signature.
+        spread: whether one vector may stand for all arguments.
+        node: class of the node; None for the size and the background of the picture.
+        rows: field, reader, default and number of each argument.
+        stated: whether it is a setting.
+    """
+
+    word: words.Word
+    help: str | None
+    spread: bool
+    node: type[Frozen] | None
+    rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]
+    stated: bool
+
+    @staticmethod
+    def of(word: words.Word) -> Spec:
+        """The one for a word of the language."""
+        node = getattr(nodes, "Animation" if word.name == "animate" else word.name.capitalize(), None)
+        fields = {} if node is None else {n: f for n, f in node.model_fields.items() if n != "kind"}
+        defaults = [1.0 if field.is_required() else field.default for field in fields.values()]
+        readers = [KINDS[kind] for kind in word.kinds]
+        rows = tuple(zip(fields or word.params, readers, defaults or [None] * 2, range(6), strict=False))
+        spread, stated = word.name in ("translate", "scale", "canvas"), word.name in words.SETTINGS
+        return Spec(word, _HELP.get(word.name), spread, node, rows, stated)
+
+    def read(self, values: Sequence[Any]) -> dict[str, Any]:
+        """Fields of the node; raises Problem."""
+        fields: dict[str, Any] = {} if self.stated else {"kind": self.word.name}
+        at, value = 0, None
+        try:
+            for (name, read, default, at), value in zip(self.rows, values, strict=False):
+                fields[name] = default if value is LEFT_OUT else read(value, at)
+        except Problem as problem:
+            place, help = _NO_VECTOR.get(self.word.name, (at, problem.help))
+            problem.help = help if at == place and value.__class__ is Vec else problem.help
+            raise
+        return fields
+
+    def build(self, values: Sequence[Any]) -> Any:
+        """The node of values, one an argument; raises Problem."""
+        assert self.node is not None
+        return make(self.node, self.read(spread(values, self.word) if self.spread else values))
 
 
-GEOMETRY: Final = _specs(TRANSFORMS)
-TEXTURE: Final = _specs(OPERATIONS)
-EVEN_SCALE: Final = Spec(Word("scale", "scale(s)", "", ("s",), 1), _scale_of_one)
+def _shear(spec: Spec, terms: Sequence[Any]) -> Shear:
+    given = [at for at, term in enumerate(terms) if term is not LEFT_OUT]
+    if len(given) != 1:
+        help = "write one term a call, as in shear(xy = 0.5); several calls apply in order"
+        raise Problem("E0308", f"shear takes one term, found {len(given)}", help)
+    at = given[0]
+    return make(Shear, {"kind": "shear", "axes": spec.word.params[at], "k": number(terms[at], at)})
 
 
-def spread(values: Sequence[Any], spec: Spec) -> list[Any]:
+GEOMETRY: Final = {name: Spec.of(word) for name, word in words.TRANSFORMS.items()}
+TEXTURE: Final = {name: Spec.of(word) for name, word in words.OPERATIONS.items()}
+EVEN_SCALE: Final = replace(GEOMETRY["scale"], word=words.Word("scale", "scale(s)", "", ("s",), 1))
+
+
+def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
     """Arguments in full: the items of one vector, or the values as they are.
 
     Raises:
         Problem: a vector of a length that does not fit, or one number alone.
     """
-    first = values[0]
-    if any(v is not None for v in values[1:]):
-        return list(values)
+    first, params, required = values[0], word.params, word.required
+    if len(values) > 1 and (values[1] is not LEFT_OUT or values[-1] is not LEFT_OUT):
+        return values
+    if len(params) == 1 and first.__class__ is not Vec:  # scale(s)
+        return [first] * 3
     if first.__class__ is float:
-        missing = " and ".join(f"`{name}`" for name in spec.word.params[1 : spec.word.required])
+        missing = " and ".join(f"`{name}`" for name in params[1:required])
         raise Problem("E0308", f"{missing} is missing, or a vector of all components")
     if first.__class__ is not Vec:
         raise unexpected("a vector or its components", first, operand=0)
-    count = len(first.items)
-    if not spec.word.required <= count <= len(spec.word.params):
-        numbers = f"{spec.word.required} or {len(spec.word.params)} numbers"
-        raise unexpected(f"a vector of {numbers}", first, operand=0)
-    return [*first.items, *[None] * (len(spec.word.params) - count)]
+    params, required = (words.TRANSFORMS["scale"].params, 2) if len(params) == 1 else (params, required)
+    if not required <= len(first.items) <= len(params):
+        counts = " or ".join(str(count) for count in range(required, len(params) + 1))
+        raise unexpected(f"a vector of {counts} numbers", first, operand=0)
+    return [*first.items, *[LEFT_OUT] * (len(params) - len(first.items))]
 
 
 def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
@@ -245,7 +277,7 @@ def _spec(stmt: tree.Call, place: Place) -> Spec | None:
             misplaced(place, span, "`{}` does not move textures", name, "put it into the object's block")
         return TEXTURE.get(name)
     if name not in GEOMETRY and place.kind != "unknown":
-        help = f"put it into a material's block, as in {material_advice(place, name)}"
+        help = f"put it into a material's block, as in {advice.material_advice(place, name)}"
         if name == "flip":
             help = "a material's flip() mirrors its texture; for an object write scale(-1, 1)"
         _skim(stmt, place)
@@ -270,16 +302,16 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     operands = tuple([None if one is None else one.arg.value for one in bound])
     first = operands[0] if operands else None
     if first is not None and not any(operands[1:]):
-        operands = (first,) * len(spec.word.params)
+        operands = (first,) * len(spec.rows)
 
     def construct(values: list[Any]) -> Any:
         """The node, or None after a report."""
         if POISON in values:
             return None
         try:
-            node = spec.build(*spread(values, spec)) if spec.spread else spec.build(*values)
+            node = _shear(spec, values) if spec.node is Shear else spec.build(values)
         except Problem as problem:
-            report_problem(session.report, problem, span, operands)
+            advice.report_problem(session.report, problem, span, operands)
             return None
         if node.__class__ is Color or node.__class__ is Grayscale:
             _warn(node, session.report, first.span if first else span)
@@ -297,7 +329,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
 
     if all(one is None or one.code.value is not VARIES for one in bound):
         place.file.weight += SAME_MOVE
-        constants = [None if one is None else one.code.value for one in bound]
+        constants = [LEFT_OUT if one is None else one.code.value for one in bound]
         created: list[Any] = []
 
         def repeat(env: Env, out: Builder) -> None:
@@ -311,7 +343,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     getters = [None if one is None else one.code.run for one in bound]
 
     def action(env: Env, out: Builder) -> None:
-        append(construct([None if get is None else get(env) for get in getters]), out)
+        append(construct([LEFT_OUT if get is None else get(env) for get in getters]), out)
 
     return action
 
@@ -382,7 +414,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
-        known = {*MATERIALS, *TEXTURES}
+        known = {*words.MATERIALS, *words.TEXTURES}
         if alias in known:
             return alias
         _unknown(name, place, known)
@@ -393,15 +425,15 @@ def _called(name: tree.Name, place: Place) -> str | None:
     if exported is not None and rest in exported.materials:
         return exported.materials[rest]
     if binding is None:
-        unknown(name, place)
+        advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
         wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
-    elif own is not None and own.kind in VALUES:
+    elif own is not None and own.kind in advice.VALUES:
         _is_value(name, place)
     elif own is not None:
         wrong_kind(name, own, place, "a material")
     else:
-        unknown_member(name, place, exported, "material")
+        advice.unknown_member(name, place, exported, "material")
     return None
 
 
@@ -410,10 +442,10 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     word, name = written.shading, written.name
     if word is None:
         return None
-    if word.text not in MATERIALS:
-        _unknown(word, place, {*MATERIALS})
+    if word.text not in words.MATERIALS:
+        _unknown(word, place, {*words.MATERIALS})
         return ""
-    if name.text in MATERIALS:
+    if name.text in words.MATERIALS:
         help = f"write material {name.text}"
         place.report.error("E0213", f"`{name.text}` is not a texture", name.span, help=help)
         return ""
@@ -440,10 +472,10 @@ def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
     report, span, binding = place.report, name.span, place.scope.find(name.text)
     if binding is not None and binding.kind in ("let", "argument", "loop"):
         _is_value(name, place)
-    elif name.text in GEOMETRIES:
+    elif name.text in words.GEOMETRIES:
         report.error("E0213", f"`{name.text}` is a geometry, not a material", span)
     else:
-        hint, fix = unknown_material(name, place, known)
+        hint, fix = advice.unknown_material(name, place, known)
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
 
@@ -452,7 +484,7 @@ def _is_value(name: tree.Name, place: Place) -> None:
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
         message = f"expected a material, found {describe(binding.value)}"
-        help = f"for a colour write {material_advice(place, 'color', name.text)}"
+        help = f"for a colour write {advice.material_advice(place, 'color', name.text)}"
         place.report.error("E0301", message, span, help=help, labels=binding.labels())
         return
     start = span.source.text.rfind("material", 0, span.start)
@@ -493,7 +525,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         if value.__class__ is not MaterialValue:
             message = f"expected a material, found {describe(value)}"
-            help = f"for a colour write {material_advice(place, 'color', name)}"
+            help = f"for a colour write {advice.material_advice(place, 'color', name)}"
             session.report.error("E0301", message, span, labels=binding.labels(), help=help)
             return
         material = value.material

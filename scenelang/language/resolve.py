@@ -60,7 +60,7 @@ class Symbol(Record, frozen=False):
 
     @property
     def is_exported(self) -> bool:
-        """Test whether files that import this one see it."""
+        """Whether files that import this one see it."""
         return self.scope.parent is None and self.kind in ("let", "param", "fn", "module")
 
 
@@ -202,14 +202,10 @@ class Names:
             case tree.Model():
                 if isinstance(node.name, tree.String):
                     self._add(node.name.span, node.name.value, "model")
-            case tree.Let():
-                self._walk(node.value, scope, kind)
-                self._define(node.name, "let", node, scope, node.span.end)
-            case tree.Param():
-                self._walk(node.default, scope, kind)
-                if node.range is not None:
-                    self._walk(node.range, scope, kind)
-                self._define(node.name, "param", node, scope, node.span.end)
+            case tree.Let() | tree.Param():
+                self._children(node, scope, kind)
+                which: Kind = "let" if isinstance(node, tree.Let) else "param"
+                self._define(node.name, which, node, scope, node.span.end)
             case tree.Import():
                 self._add(node.path.span, node.path.value, "path")
                 self._define(node.alias, "import", node, scope, node.span.end)
@@ -226,12 +222,13 @@ class Names:
                     at = at.otherwise
                 if at is not None:
                     self._walk(at, scope, kind)
-            case tree.Node():
-                self._arguments(node.args or (), scope, self._blend(node))
-                self._walk(node.body, scope, "chain" if node.kind == "chain" else "group")
-            case tree.Combined():
-                self._arguments(node.args or (), scope, self._blend(node))
-                self._walk(node.child, scope, kind)
+            case tree.Node() | tree.Combined():
+                word = node.keyword
+                self._arguments(node.args or (), scope, Use(word.start, word.end, word.text, "setting"))
+                if isinstance(node, tree.Node):
+                    self._walk(node.body, scope, "group")
+                else:
+                    self._walk(node.child, scope, kind)
             case tree.MaterialUse() | tree.MaterialExpr():
                 for name in [node.name] if node.shading is None else [node.shading, node.name]:
                     if "." in name.text:
@@ -260,9 +257,13 @@ class Names:
                 imported = symbol is not None and symbol.kind == "import"
                 role: Role = "member" if imported else "property"
                 self._add(node.name.span, node.name.text, role, symbol if imported else None)
-            case _ if not isinstance(node, tree.Name):
-                for child in tree.children(node):
-                    self._walk(child, scope, kind)
+            case _:
+                self._children(node, scope, kind)
+
+    def _children(self, node: Any, scope: Scope, kind: str) -> None:
+        for child in tree.children(node):
+            if not isinstance(child, tree.Name):
+                self._walk(child, scope, kind)
 
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
@@ -281,10 +282,6 @@ class Names:
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")
             self._walk(stmt.body, scope, "material" if value else "object")
-
-    @staticmethod
-    def _blend(node: tree.Node | tree.Combined) -> Use:
-        return Use(node.keyword.start, node.keyword.end, node.keyword.text, "setting")
 
     def _add(self, span: Span, text: str, role: Role, symbol: Symbol | None = None) -> Use:
         use = Use(span.start, span.end, text, role, symbol)
@@ -330,14 +327,21 @@ def find_unused(file: tree.File, diagnostics: Diagnostics) -> None:
     used = {use.symbol for use in names.uses if not _is_inside_its_definition(use)}
     library = not any(isinstance(stmt, _DRAWING) for stmt in file.statements)
     for symbol in names.symbols:
-        if symbol in used or symbol.kind not in _KINDS or symbol.name.startswith("_"):
+        name, kind, span = symbol.name, symbol.kind, symbol.span
+        if symbol in used or kind not in _KINDS or name.startswith("_"):
             continue
-        if symbol.kind == "import":
-            fix = removal(symbol.span.source, symbol.node.span.start, symbol.node.span.end)
-            message = f"import `{symbol.name}` is never used"
-            diagnostics.add("W0201", message, symbol.span, help="delete it", fix=fix)
-        elif not (library and symbol.scope is names.top):
-            _warn(symbol, diagnostics)
+        if library and symbol.scope is names.top and kind != "import":
+            continue
+        fix: Fix | None = None
+        if kind == "import":
+            help, fix = "delete it", removal(span.source, symbol.node.span.start, symbol.node.span.end)
+        elif kind == "param":
+            help = "it changes nothing: use it or delete it"
+        else:
+            help = "delete it, or let its name begin with `_`"
+            if f"_{name}" not in span.source.text:
+                fix = Fix(f"rename to `_{name}`", (Edit(span, f"_{name}"),))
+        diagnostics.add("W0201", f"{kind} `{name}` is never used", span, help=help, fix=fix)
 
 
 def _is_inside_its_definition(use: Use) -> bool:
@@ -346,19 +350,3 @@ def _is_inside_its_definition(use: Use) -> bool:
     if symbol is None or use.defines or symbol.kind not in ("fn", "module"):
         return use.defines
     return symbol.node.span.start <= use.start < symbol.node.span.end
-
-
-def _warn(symbol: Symbol, diagnostics: Diagnostics) -> None:
-    name, span = symbol.name, symbol.span
-    if symbol.kind == "param":
-        help = "it changes nothing: use it or delete it"
-        diagnostics.add("W0201", f"param `{name}` is never used", span, help=help)
-        return
-    fix = Fix(f"rename to `_{name}`", (Edit(span, f"_{name}"),))
-    diagnostics.add(
-        "W0201",
-        f"{symbol.kind} `{name}` is never used",
-        span,
-        help="delete it, or let its name begin with `_`",
-        fix=None if f"_{name}" in span.source.text else fix,
-    )

@@ -1,72 +1,29 @@
-"""A Scene as canonical text that evaluates back to an equal Scene."""
+"""Nodes of a Scene as canonical text that evaluates back to equal ones."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import Any, Final
+from collections.abc import Iterable
+from typing import Final
 
-from scenelang.language.formatting import format_text
 from scenelang.language.nodes import Boolean, Link, Material, MaterialOp, Object, Rgb, SceneNode, Transform
-from scenelang.language.reports import SceneError
-from scenelang.language.scene_data import SceneData
-from scenelang.language.words import STAGE
 
 _Line = str | tuple[str, SceneNode, int]
 _INDENT: Final = "  "
 _AXES: Final = {"[1, 0, 0]": "X", "[0, 1, 0]": "Y"}
 
 
-def to_nsg(scene: SceneData) -> str:
-    """Text of a scene: settings that differ from the defaults, then its nodes in order."""
-    lines = ["nsg 1;"]
-    if scene.model is not None:
-        lines.append(f'model "{scene.model}";')
-    lines += [f'import "{file.path}" as {file.name};' for file in scene.elements]
-    if scene.canvas != (256, 256):
-        lines.append(f"canvas({scene.canvas[0]}, {scene.canvas[1]});")
-    if scene.background is None:
-        lines.append("background(none);")
-    elif scene.background != "default":
-        lines.append(f"background({rgb(scene.background)});")
-    lines += [f"{word}({given});" for word, given in _stage(scene)]
-    if scene.animation is not None:
-        loop = "" if scene.animation.loop else ", loop = false"
-        lines.append(f"animate({number(scene.animation.seconds)}s, {number(scene.animation.fps)}{loop});")
-    # Nodes nest deeper than Python likes to recurse: a stack of lines and nodes still to print.
-    todo: list[_Line] = [("", node, 0) for node in reversed(scene.nodes)]
+def node_lines(nodes: Iterable[SceneNode]) -> list[str]:
+    """Lines of nodes in order, which nest deeper than Python likes to recurse."""
+    lines: list[str] = []
+    todo: list[_Line] = [("", node, 0) for node in reversed([*nodes])]
     while todo:
         entry = todo.pop()
         if isinstance(entry, str):
             lines.append(entry)
         else:
-            word, node, depth = entry
-            todo.extend(reversed(_node(word, node, depth)))
-    text = "\n".join(lines) + "\n"
-    try:
-        return format_text(text)
-    except SceneError:  # nested deeper than text may be: to be looked at, not to be read back
-        return text
-
-
-def _stage(scene: SceneData) -> Iterator[tuple[str, str]]:
-    """The settings of the stage, each with what differs from its defaults."""
-    for word in STAGE:
-        value = getattr(scene, word)
-        if value is None:
-            yield word, "none"
-        elif value != "default":
-            given = ((name, item) for name, item in value.__repr_args__())
-            yield word, ", ".join(f"{name} = {_field(name, item)}" for name, item in given)
-
-
-def _field(name: str | None, value: Any) -> str:
-    """A value of the stage."""
-    if name == "color":
-        return rgb(value)
-    if isinstance(value, tuple):
-        return _vector(value)
-    return angle(value) if name == "fov" else number(value)
+            todo.extend(reversed(_node(*entry)))
+    return lines
 
 
 def blend(op: str, k: float | None) -> str:
@@ -112,7 +69,7 @@ def angle(rad: float) -> str:
 
 def rgb(color: Rgb) -> str:
     """A colour as ``#rrggbb`` where that is exact, else as a vector."""
-    return hex_colour(color) or _vector(color)
+    return hex_colour(color) or vector(color)
 
 
 def hex_colour(color: Rgb) -> str | None:
@@ -127,7 +84,7 @@ def _numbers(values: Iterable[float]) -> str:
     return ", ".join(map(number, values))
 
 
-def _vector(values: Iterable[float]) -> str:
+def vector(values: Iterable[float]) -> str:
     return f"[{_numbers(values)}]"
 
 
@@ -142,7 +99,7 @@ def transform(t: Transform | MaterialOp) -> str:
     """A transform, or a statement in a material's block."""
     match t.kind:
         case "rotate":
-            axis = _vector(t.axis)
+            axis = vector(t.axis)
             about = "" if axis == "[0, 0, 1]" else f", axis = {_AXES.get(axis, axis)}"
             given = angle(t.angle) + about
         case "translate":
@@ -154,7 +111,7 @@ def transform(t: Transform | MaterialOp) -> str:
         case "shear":
             given = f"{t.axes} = {number(t.k)}"
         case "matrix":
-            given = f"[{', '.join(map(_vector, t.rows))}]"
+            given = f"[{', '.join(map(vector, t.rows))}]"
         case "color":
             given = rgb(t.rgb)
         case "hue":

@@ -358,31 +358,23 @@ class Loader(Record, frozen=False):
         try:
             path = self._locate(stmt.path.value, importer)
             if path in self.chain:
-                self._refuse_cycle(path)
+                first = self.chain.index(path)
+                names = " → ".join(p.name for p in [*self.chain[first:], path])
+                # The first file of the chain, unless it is standard input, was not imported.
+                around = self.sites[max(0, first + 1 - len(self.chain) + len(self.sites)) :]
+                labels = tuple([Label(site, "which imports this") for site in around])
+                raise Unreadable("E0216", f"import cycle: {names}", labels=labels)
             self.count += 1
             if self.count > MAX_IMPORTS:
                 raise session.halt("E0324", f"more than {MAX_IMPORTS:,} imports", span)
             if len(self.chain) > MAX_IMPORT_DEPTH:
                 raise session.halt("E0324", f"imports nested deeper than {MAX_IMPORT_DEPTH}", span)
-            if path.suffix == SUFFIX:
-                if path not in self.zoos:
-                    self.zoos[path] = self._read_zoo(path, stmt.path.value)
-                return path, self.zoos[path]
-            if path not in self.parsed:
-                self.parsed[path] = parse(self._read(path, stmt.path), session.report.diagnostics)
+            self._read(path, stmt.path, session)
         except Unreadable as error:
-            fix, labels = error.fix, error.labels
-            session.report.error(error.code, str(error), span, help=error.help, fix=fix, labels=labels)
+            code, fix, labels = error.code, error.fix, error.labels
+            session.report.error(code, str(error), span, help=error.help, fix=fix, labels=labels)
             return None
-        return path, self.parsed[path]
-
-    def _refuse_cycle(self, path: Path) -> None:
-        first = self.chain.index(path)
-        names = " → ".join(p.name for p in [*self.chain[first:], path])
-        # The first file of the chain, unless it is standard input, was not imported.
-        around = self.sites[max(0, first + 1 - len(self.chain) + len(self.sites)) :]
-        labels = tuple([Label(site, "which imports this") for site in around])
-        raise Unreadable("E0216", f"import cycle: {names}", labels=labels)
+        return path, self.zoos.get(path) or self.parsed[path]
 
     def _locate(self, text: str, importer: Path | None) -> Path:
         """The place of a file of the library, or inside the root."""
@@ -410,27 +402,27 @@ class Loader(Record, frozen=False):
         self.wanted.update({Path(os.path.abspath(folder / text)): None, path: None})
         return path
 
-    def _read_zoo(self, path: Path, text: str) -> Zoo:
+    def _read(self, path: Path, written: tree.String, session: Session) -> None:
+        """Read a file, if it has not been read."""
+        text, span = written.value, written.span
+        if path in self.parsed or path in self.zoos:
+            return
+        name = os.path.normpath(os.path.join(os.path.dirname(span.source.name), text))
+        name = library.called(text) if library.is_reserved(text) else name
         try:
-            return load_zoo(path)
+            if path.suffix == SUFFIX:
+                self.zoos[path] = load_zoo(path)
+                return
+            source = SourceFile(name, self.texts[path]) if path in self.texts else read_source(path, name)
         except TensorError as error:
             help = "`scenelang learn` makes files of elements"
             raise Unreadable("E0217", f"`{text}` is not a file of elements: {error}", help) from None
-        except OSError as error:
-            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
-
-    def _read(self, path: Path, written: tree.String) -> SourceFile:
-        text, span = written.value, written.span
-        name = os.path.normpath(os.path.join(os.path.dirname(span.source.name), text))
-        if library.is_reserved(text):
-            name = library.called(text)
-        try:
-            return SourceFile(name, self.texts[path]) if path in self.texts else read_source(path, name)
         except Unreadable as error:
             raise Unreadable(error.code, f"cannot read `{text}`: {error}") from None
         except OSError as error:
-            help, fix = library.meant(text, span)
-            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}", help, fix) from None
+            meant = (None, None) if path.suffix == SUFFIX else library.meant(text, span)
+            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}", *meant) from None
+        self.parsed[path] = parse(source, session.report.diagnostics)
 
 
 def _reason(error: BaseException) -> str:

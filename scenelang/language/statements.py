@@ -12,30 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.zoo import Zoo
-from scenelang.language import blocks, expressions, foreign, library, modifiers, tree
-from scenelang.language.advice import (
-    VALUES,
-    drawn,
-    in_library,
-    material_advice,
-    report_early,
-    report_problem,
-    report_unknown,
-    unknown,
-    unknown_member,
-    visible,
-)
-from scenelang.language.blocks import (
-    HOLDERS,
-    Body,
-    define,
-    misplaced,
-    prepare_block,
-    prepare_element,
-    prepare_inner,
-    prepare_module_call,
-    prepare_object,
-)
+from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, tree, words
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
     Diagnostics,
@@ -51,11 +28,11 @@ from scenelang.language.diagnostics import (
 from scenelang.language.expressions import VARIES, bind, lookup, prepare, prepare_arguments, wrong_kind
 from scenelang.language.library import Written
 from scenelang.language.limits import MAX_BYTES
-from scenelang.language.modifiers import color, prepare_move, prepare_value_use, vector
+from scenelang.language.modifiers import LEFT_OUT, Spec, prepare_move, prepare_value_use, spread
 from scenelang.language.nodes import MOST, camera_fault, light_fault
 from scenelang.language.parser import parse
 from scenelang.language.reporter import Advice, Reporter, find_damage
-from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Ground, Light
+from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Light
 from scenelang.language.session import Binding, Defines, Env, Session
 from scenelang.language.values import (
     POISON,
@@ -65,39 +42,18 @@ from scenelang.language.values import (
     RangeValue,
     Time,
     Vec,
-    angle,
     describe,
     equal,
-    number,
     same_unit,
-    show,
-    unexpected,
     unpack,
 )
-from scenelang.language.words import (
-    ANIMATED,
-    COMBINE,
-    CONSTANTS,
-    FUNCTIONS,
-    GEOMETRIES,
-    LANGUAGE,
-    MATERIALS,
-    NODES,
-    OPERATIONS,
-    SETTINGS,
-    STAGE,
-    TRANSFORMS,
-)
-
-MAX_SIDE_PX: Final = 8192
-LEFT_OUT: Final = object()  # an argument that was not given; None is the value ``none``
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
     """Test whether a statement stands at top level, and report it if not."""
     if place.kind == "file" and not place.nested:
         return True
-    misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
+    blocks.misplaced(place, span, f"{what} inside a block", name, "it stands at top level")
     return False
 
 
@@ -152,133 +108,75 @@ def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
     if stmt.body is not None:
         session.report.error("E0330", f"`{name}` takes no block", span, help=f"write {name}(…);")
         return None
-    word, apply = SETTINGS[name], _APPLY[name]
-    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=name == "canvas")
+    spec = _SETTINGS[name]
+    word, where = spec.word, Written(span, stmt.span)
+    bound = bind(session.report, stmt.name, word.params, word.required, given, spread=spec.spread)
     getters = [None if one is None else one.code.run for one in bound or ()]
     operands = tuple([None if one is None else one.arg.value for one in bound or ()])
-
-    where = Written(span, stmt.span)
 
     def action(env: Env, out: Builder) -> None:
         values = [LEFT_OUT if get is None else get(env) for get in getters]
         try:
             if bound is not None and POISON not in values:
-                apply(session, where, *values)
+                _apply(spec, values, session, where)
                 return
         except Problem as problem:
-            report_problem(session.report, problem, span, operands)
+            advice.report_problem(session.report, problem, span, operands)
         if name == "animate":  # with a mistake, which is not a further one of what needs its variables
             session.animated[:] = [POISON] * 4
 
     return action
 
 
-def _canvas(session: Session, where: Written, width: Any, height: Any) -> None:
-    if width.__class__ is Vec and height is LEFT_OUT:
-        if len(width.items) != 2:
-            raise unexpected("a vector of 2 numbers", width, operand=0)
-        width, height = width.items
-    if height is LEFT_OUT:
-        raise Problem("E0308", "`canvas` needs `w` and `h`", "it is called canvas(w, h)")
-    sides = []
-    for operand, value in enumerate((width, height)):
-        side = number(value, operand)
-        if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
-            message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
-            raise Problem("E0311", message, operand=operand)
-        sides.append(int(side))
-    session.settings.canvas = (sides[0], sides[1])
+_SETTINGS: Final = {name: Spec.of(word) for name, word in words.SETTINGS.items()}
 
 
-def _opaque(value: Any, what: str, operand: int) -> tuple[float, float, float]:
-    """A colour whose components are in 0..1."""
-    rgb = color(value, operand)
-    for component in rgb:
-        if not 0.0 <= component <= 1.0:
-            raise Problem("E0311", f"{what} component {show(component)} is outside 0..1", operand=operand)
-    return rgb
+def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> None:
+    """Set what a statement states; raises Problem."""
+    settings, name = session.settings, spec.word.name
+    if name == "ground" and values[0] is None:
+        if values[1] is not LEFT_OUT:
+            raise Problem("E0308", "`ground(none)` has no colour", operand=1)
+        settings.stage[name] = None
+    elif name in words.STAGE:
+        settings.stage[name] = node = _stage(spec, values)
+        session.spans.record(node, where)
+    elif name == "animate":
+        _animate(spec.read(values), session)
+    elif name == "canvas":
+        settings.canvas = tuple(spec.read(spread(values, spec.word)).values())
+    else:
+        settings.background = spec.read(values)["c"]
 
 
-def _background(session: Session, where: Written, value: Any) -> None:
-    session.settings.background = None if value is None else _opaque(value, "background", 0)
-
-
-def _state(session: Session, where: Written, cls: type[Camera | Light | Ground], *given: Any) -> None:
-    """Set one value of the stage from its fields in order, with defaults for those left out."""
-    names = list(cls.model_fields)
-    for at, value in enumerate(given):
-        if value is not LEFT_OUT and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST:
-            raise Problem("E0311", f"`{names[at]}` is not within {MOST:,.0f} of 0", operand=at)
-    default = [field.default for field in cls.model_fields.values()]
-    values = [own if value is LEFT_OUT else value for value, own in zip(given, default, strict=True)]
-    node = make(cls, dict(zip(names, values, strict=True)))
+def _stage(spec: Spec, values: list[Any]) -> Any:
+    """The camera, light or ground; raises Problem."""
+    node = spec.build(values)
+    for at, (name, *_) in enumerate(spec.rows):
+        value = getattr(node, name)
+        if (
+            values[at] is not LEFT_OUT
+            and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST
+        ):
+            raise Problem("E0311", f"`{name}` is not within {MOST:,.0f} of 0", operand=at)
     if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
-        at = names.index(fault[0])
-        raise Problem("E0338", fault[1], operand=1 if given[at] is LEFT_OUT else at)
+        at = [*Camera.model_fields].index(fault[0])
+        raise Problem("E0338", fault[1], operand=1 if values[at] is LEFT_OUT else at)
     if isinstance(node, Light) and (dark := light_fault(node.power)):
         raise Problem("E0339", dark, operand=1)
-    session.settings.stage[cls.__name__.lower()] = node
-    session.spans.record(node, where)
+    return node
 
 
-def _given(value: Any, read: Callable[..., Any], *rest: Any) -> Any:
-    return LEFT_OUT if value is LEFT_OUT else read(value, *rest)
-
-
-def _camera(session: Session, where: Written, eye: Any, target: Any, fov: Any) -> None:
-    points = [_given(value, vector, 3, at, "a point") for at, value in enumerate((eye, target))]
-    _state(session, where, Camera, *points, _given(fov, angle, 2))
-
-
-def _light(session: Session, where: Written, position: Any, power: Any, rgb: Any) -> None:
-    place = _given(position, vector, 3, 0, "a point")
-    if power.__class__ is Vec:
-        raise unexpected("a number", power, "the power is second: light([2, 4, 3], 30, #fff)", 1)
-    _state(session, where, Light, place, _given(power, number, 1), _given(rgb, _opaque, "colour", 2))
-
-
-def _ground(session: Session, where: Written, y: Any, rgb: Any) -> None:
-    if y.__class__ is Vec:
-        raise unexpected(
-            "a number", y, "the height comes first: ground(-1, #888), or ground(color = #888)", 0
-        )
-    if y is not None:
-        _state(session, where, Ground, _given(y, number, 0), _given(rgb, _opaque, "colour", 1))
-        return
-    if rgb is not LEFT_OUT:
-        raise Problem("E0308", "`ground(none)` has no colour", operand=1)
-    session.settings.stage["ground"] = None
-
-
-def _animate(session: Session, where: Written, seconds: Any, fps: Any, loop: Any) -> None:
-    length = seconds.size if seconds.__class__ is Time else number(seconds, 0)
-    rate = number(fps, 1)
-    for operand, (what, value) in enumerate((("length", length), ("frame rate", rate))):
-        if value <= 0.0:
-            raise Problem("E0311", f"a {what} of {show(value)} is not above 0", operand=operand)
-    if loop is not LEFT_OUT and loop.__class__ is not bool:
-        raise unexpected("a boolean", loop, operand=2)
-    rate = session.fps or rate
-    if length * rate > MAX_FRAMES:
+def _animate(fields: dict[str, Any], session: Session) -> None:
+    fields["fps"] = session.fps or fields["fps"]
+    if fields["seconds"] * fields["fps"] > MAX_FRAMES:
         raise Problem("E0311", f"an animation of more than {MAX_FRAMES:,} frames", operand=0)
-    looping = loop is not False
-    animation = make(Animation, {"seconds": length, "fps": rate, "loop": looping})
-    session.settings.animation = animation
+    session.settings.animation = animation = make(Animation, fields)
     frame, frames = session.frame, animation.frames
     if not 0 <= frame < frames:
         raise Problem("E0337", f"frame {frame} is outside 0..{frames - 1}")
-    u = frame / frames if looping else frame / max(1, frames - 1)
-    session.animated[:] = [frame / rate, u, float(frame), float(frames)]
-
-
-_APPLY: Final[dict[str, Callable[..., None]]] = {
-    "canvas": _canvas,
-    "background": _background,
-    "animate": _animate,
-    "camera": _camera,
-    "light": _light,
-    "ground": _ground,
-}
+    u = frame / frames if animation.loop else frame / max(1, frames - 1)
+    session.animated[:] = [frame / animation.fps, u, float(frame), float(frames)]
 
 
 BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version)
@@ -287,11 +185,11 @@ BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version
 def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     context, alias = place.file, stmt.alias
     if not at_top_level(place, stmt.span, "an import"):
-        define(alias, Binding("poison", alias.span), place)
+        blocks.define(alias, Binding("poison", alias.span), place)
         return None
     loader = context.loader
     binding = Binding("import", alias.span)
-    good = define(alias, binding, place)
+    good = blocks.define(alias, binding, place)
     loaded = loader.load(stmt, context.path, context.session)
     if loaded is None or not good:
         return None
@@ -348,7 +246,7 @@ def _elements(path: Path, zoo: Zoo, stmt: tree.Import, context: FileContext) -> 
     return brought
 
 
-def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> Body:
+def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> blocks.Body:
     """Prepare a file's statements; of an imported one only what it brings."""
     report = context.session.report
     damage = find_damage(file, report.diagnostics)
@@ -358,12 +256,12 @@ def prepare_file(context: FileContext, file: tree.File, *, imported: bool = Fals
     if imported:
         own = {s.name.text for s in file.statements if isinstance(s, tree.Module)}
         for stmt in file.statements:
-            if isinstance(stmt, tree.Call) and stmt.name.text in STAGE and stmt.name.text not in own:
+            if isinstance(stmt, tree.Call) and stmt.name.text in words.STAGE and stmt.name.text not in own:
                 help = "it belongs to the scene: put it into the file that is drawn"
                 fact = f"`{stmt.name.text}` in an imported file"
                 report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
     statements = [s for s in file.statements if not imported or isinstance(s, BROUGHT)]
-    return prepare_block(statements, Place(context, context.scope, "file"), file.span)
+    return blocks.prepare_block(statements, Place(context, context.scope, "file"), file.span)
 
 
 def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
@@ -372,9 +270,9 @@ def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
     bounds = prepare(stmt.range, place) if stmt.range is not None else None
     slot = slots.add()
     if not at_top_level(place, name.span, "a param"):
-        define(name, Binding("poison", name.span), place)
+        blocks.define(name, Binding("poison", name.span), place)
         return None
-    if not define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
+    if not blocks.define(name, Binding("param", name.span, slots, slot, needs=session.needs), place):
         return None
     full = file.prefix + name.text
     file.has_params = True
@@ -412,10 +310,10 @@ def _checked_default(value: Any, allowed: Any, stmt: tree.Param, session: Sessio
         if not within(value, allowed):
             labels = (Label(stmt.range.span, "the range"),)
             message = f"default of `{stmt.name.text}` is outside {stmt.range.span.text}"
-            advice, fix = _range_meant(value, allowed, stmt.range)
-            session.report.error("E0309", message, stmt.default.span, labels=labels, help=advice, fix=fix)
+            about, fix = _range_meant(value, allowed, stmt.range)
+            session.report.error("E0309", message, stmt.default.span, labels=labels, help=about, fix=fix)
     except Problem as problem:
-        report_problem(session.report, problem, stmt.range.span, (stmt.default,))
+        advice.report_problem(session.report, problem, stmt.range.span, (stmt.default,))
     return value
 
 
@@ -542,24 +440,24 @@ def _is_literal(expr: tree.Expr) -> bool:
 
 def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     name = stmt.name.text
-    binding = None if name in LANGUAGE else lookup(stmt.name, place)
-    if name in SETTINGS and not hides(binding, stmt):
+    binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
+    if name in words.SETTINGS and not hides(binding, stmt):
         return prepare_setting(stmt, place)
-    if name in LANGUAGE:
+    if name in words.LANGUAGE:
         return prepare_move(stmt, place)
     if binding is None:
-        if name in GEOMETRIES:
-            return prepare_object(stmt, place)
+        if name in words.GEOMETRIES:
+            return blocks.prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
             if _boolean(stmt) is None:
                 _skim(stmt, place)
             _unknown(stmt, place)
         return None
     if binding.kind == "module":
-        return prepare_module_call(stmt, binding.value, place)
+        return blocks.prepare_module_call(stmt, binding.value, place)
     if binding.kind == "element":
-        return prepare_element(stmt, place, binding.value)
-    if binding.kind in VALUES:
+        return blocks.prepare_element(stmt, place, binding.value)
+    if binding.kind in advice.VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)
     if binding.kind != "poison":
@@ -570,20 +468,20 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
 def hides(binding: Binding | None, stmt: tree.Call) -> bool:
     """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
     return binding is not None and (
-        binding.kind in ("module", "poison") or (binding.kind in VALUES and stmt.args is None)
+        binding.kind in ("module", "poison") or (binding.kind in advice.VALUES and stmt.args is None)
     )
 
 
 def _boolean(stmt: tree.Call) -> str | None:
     """The boolean word that a call with objects as arguments stands for."""
     here = foreign.WORDS.get(stmt.name.text.lower())
-    return here if here in COMBINE and stmt.args and stmt.body is None else None
+    return here if here in words.COMBINE and stmt.args and stmt.body is None else None
 
 
 def _skim(stmt: tree.Call, place: Place) -> None:
     """Look for mistakes in the arguments and the block of something that will not run."""
     prepare_arguments(stmt.args, place)
-    prepare_inner(stmt.body, place.inner("unknown"))
+    blocks.prepare_inner(stmt.body, place.inner("unknown"))
 
 
 def _lacks_module(stmt: tree.Call, place: Place) -> bool:
@@ -595,15 +493,15 @@ def _lacks_module(stmt: tree.Call, place: Place) -> bool:
     params = [arg.name for arg in stmt.args if arg.name] + values
     if len(params) < len(stmt.args) or not values:
         return False
-    if any(place.scope.find(p.text) or p.text in CONSTANTS or p.text in ANIMATED for p in values):
+    if any(place.scope.find(p.text) or p.text in words.CONSTANTS or p.text in words.ANIMATED for p in values):
         return False
     body = place.inner("unknown")
     body.scope.names.update({param.text: Binding("poison", param.span) for param in params})
-    prepare_inner(stmt.body, body)
+    blocks.prepare_inner(stmt.body, body)
     written = ", ".join(arg.span.text for arg in stmt.args)
     help = f"to define it write module {name}({written}) {{ … }}"
     message = f"unknown geometry or module `{name}`"
-    report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
+    advice.report_unknown(stmt.name, place, "E0204", message, lambda: (help, None))
     return True
 
 
@@ -613,22 +511,22 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
     if "." in text:
         alias = place.scope.find(text.partition(".")[0])
         if alias is None:
-            unknown(name, place)
+            advice.unknown(name, place)
         elif alias.kind == "import":
-            unknown_member(name, place, alias.value, kinds=("module", "element"))
+            advice.unknown_member(name, place, alias.value, kinds=("module", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return
-    if report_early(name, place):
+    if advice.report_early(name, place):
         return
-    if text in FUNCTIONS:
+    if text in words.FUNCTIONS:
         call, inside = stmt.span.text.rstrip("; "), place.kind == "material"
-        written = f"write color({call});" if inside else material_advice(place, "color", call)
+        written = f"write color({call});" if inside else advice.material_advice(place, "color", call)
         message = f"`{text}` is a function, not an object or a module"
         place.report.error("E0213", message, name.span, help=written if text in ("rgb", "hsv") else None)
         return
     what = {"object": "transform", "material": "texture operation"}.get(place.kind, "geometry or module")
-    report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
+    advice.report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
 
 
 def _advice(stmt: tree.Call, place: Place) -> Advice:
@@ -638,24 +536,24 @@ def _advice(stmt: tree.Call, place: Place) -> Advice:
     help, fix = did_you_mean(text, candidates, name.span, effort=place.report.effort)
     if fix is None and text.lower() in foreign.STATEMENTS:
         help = None  # what is known of a word goes before what is only near
-    if place.kind == "object" and text in MATERIALS:
+    if place.kind == "object" and text in words.MATERIALS:
         return _lacks_material(stmt)
-    if help is None and place.kind in HOLDERS:
+    if help is None and place.kind in blocks.HOLDERS:
         if (here := _boolean(stmt)) is not None:
             return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
-        help, fix = in_library(stmt, place), None
+        help, fix = advice.in_library(stmt, place), None
     if fix is None:
         known, fix = instead(text, foreign.WORDS, candidates, name.span)
         help = known or help
-    if fix is not None and stmt.body is not None and fix.edits[0].replacement in NODES:
+    if fix is not None and stmt.body is not None and fix.edits[0].replacement in words.NODES:
         span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
         fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
     meant = foreign.WORDS.get(text, "")
-    if help is None and place.kind == "object" and meant in OPERATIONS.keys() - TRANSFORMS.keys():
-        help = f"it is called `{meant}` here and stands in a material: {material_advice(place, meant)}"
+    if help is None and place.kind == "object" and meant in words.OPERATIONS.keys() - words.TRANSFORMS.keys():
+        help = f"it is called `{meant}` here and stands in a material: {advice.material_advice(place, meant)}"
     help = help or foreign.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain"):
-        help = drawn(place)
+        help = advice.drawn(place)
     return help, fix
 
 
@@ -675,27 +573,31 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
     kind = place.kind
     if kind == "material":
-        return {*OPERATIONS}
+        return {*words.OPERATIONS}
     if kind == "object" and stmt.args is not None:
-        return {*TRANSFORMS}
-    names = visible(place, VALUES if kind == "object" else ("module",))
+        return {*words.TRANSFORMS}
+    names = advice.visible(place, advice.VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    known = {*GEOMETRIES, *names}
+    known = {*words.GEOMETRIES, *names}
     if stmt.body is None:
-        return known if stmt.args is None else known | {*(TRANSFORMS if kind != "file" else SETTINGS)}
+        return (
+            known
+            if stmt.args is None
+            else known | {*(words.TRANSFORMS if kind != "file" else words.SETTINGS)}
+        )
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:
-        known = {*known, *NODES, *(["else"] if otherwise else [])}
+        known = {*known, *words.NODES, *(["else"] if otherwise else [])}
     return {*known, "else if"} if stmt.args is not None and otherwise else known
 
 
 EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Number: expressions.prepare_number,
-    tree.String: expressions.prepare_literal,
-    tree.Bool: expressions.prepare_literal,
-    tree.Color: expressions.prepare_color,
+    tree.String: lambda expr, place: expressions.constant(expr.value),
+    tree.Bool: lambda expr, place: expressions.constant(expr.value),
+    tree.Color: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
     tree.Vector: expressions.prepare_vector,
     tree.Range: expressions.prepare_range,
     tree.NameRef: expressions.prepare_name,
@@ -704,17 +606,19 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Conditional: expressions.prepare_conditional,
     tree.CallExpr: expressions.prepare_call,
     tree.Member: expressions.prepare_member,
-    tree.Index: expressions.prepare_index,
+    tree.Index: lambda expr, place: expressions.computed(
+        place, expressions.item, expr.span, (expr.value, expr.index), item_steps=0
+    ),
     tree.MaterialExpr: modifiers.prepare_material,
-    tree.BadExpr: expressions.skip_bad,
+    tree.BadExpr: lambda expr, place: expressions.POISONED,  # recovery has reported it
 }
 STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Version: prepare_version,
     tree.Model: prepare_model,
     tree.Param: prepare_param,
     tree.Let: blocks.prepare_let,
-    tree.Fn: blocks.skip,
-    tree.Module: blocks.skip,
+    tree.Fn: lambda stmt, place: None,  # `prepare_block` has declared it
+    tree.Module: lambda stmt, place: None,
     tree.Import: prepare_import,
     tree.For: blocks.prepare_for,
     tree.If: blocks.prepare_if,
@@ -722,5 +626,5 @@ STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Node: blocks.prepare_node,
     tree.Combined: blocks.prepare_combined,
     tree.MaterialUse: modifiers.prepare_use,
-    tree.BadStmt: blocks.skip,
+    tree.BadStmt: lambda stmt, place: None,
 }

@@ -16,8 +16,9 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
+from scenelang.assets.records import Record
 from scenelang.language.diagnostics import plural
-from scenelang.language.scene import Material
+from scenelang.language.nodes import Material
 
 MAX_VECTOR: Final = 1_000_000  # numbers in one vector, nested ones counted
 MAX_VECTOR_DEPTH: Final = 16
@@ -30,7 +31,7 @@ class Problem(Exception):
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         operand: which operand or argument is to blame, from 0; None for all of it.
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
-            with the fix; a ``colour`` of a string; of three ``turns`` the last.
+            with the fix; a ``colour`` of a string.
         notes: words for further operands, by their numbers.
         found: the kind that is odd about a value, whatever was going to be done with it. Problems that found
             the same may have one cause.
@@ -110,7 +111,7 @@ class Vec:
         return f"Vec({self.items!r})"
 
 
-class RangeValue:
+class RangeValue(Record):
     """Numbers, angles or times from ``start`` towards ``stop``, made one at a time.
 
     Args:
@@ -121,14 +122,11 @@ class RangeValue:
         unit: ``number``, ``angle`` or ``time``.
     """
 
-    __slots__ = ("exclusive", "start", "step", "stop", "unit")
-
-    def __init__(self, start: float, stop: float, exclusive: bool, step: float | None, unit: str) -> None:
-        self.start = start
-        self.stop = stop
-        self.exclusive = exclusive
-        self.step = step
-        self.unit = unit
+    start: float
+    stop: float
+    exclusive: bool
+    step: float | None
+    unit: str
 
     def count(self) -> int:
         """Number of values; 0 when descending."""
@@ -165,13 +163,10 @@ class RangeValue:
         return not math.isfinite(steps) or abs(steps - round(steps)) <= 1e-9
 
 
-class MaterialValue:
+class MaterialValue(Record):
     """A material that an expression made, with the node it stands for."""
 
-    __slots__ = ("material",)
-
-    def __init__(self, material: Material) -> None:
-        self.material = material
+    material: Material
 
 
 COMPONENTS: Final = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
@@ -391,12 +386,6 @@ def equal(a: Any, b: Any) -> bool:
         return len(a.items) == len(b.items) and all(
             equal(x, y) for x, y in zip(a.items, b.items, strict=True)
         )
-    if ca is RangeValue:
-        return bool(
-            (a.start, a.stop, a.exclusive, a.step, a.unit) == (b.start, b.stop, b.exclusive, b.step, b.unit)
-        )
-    if ca is MaterialValue:
-        return bool(a.material == b.material)
     return bool(a == b)
 
 
@@ -581,14 +570,6 @@ def _rgb(*components: Any) -> Vec:
 def _hsv(h: Any, s: Any, v: Any) -> Vec:
     turns = h.size / math.tau if h.__class__ is Angle else number(h, 0)
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
-
-
-def doubt_hue(h: Any, s: Any, v: Any) -> Problem | None:
-    """A warning about the arguments of ``hsv``; its operand is to blame."""
-    if h.__class__ is not float or abs(h) <= 2.0:
-        return None
-    help = f"a bare hue is in turns: write {show(h)}deg, multiply what is computed by 1deg, or take % 1"
-    return Problem("W0302", f"a hue of {show(h)} turns", help, operand=0)
 
 
 FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {

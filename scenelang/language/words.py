@@ -6,6 +6,7 @@ The evaluator takes arguments from it, the language server texts and highlighter
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, Literal, get_args
 
 from scenelang.assets.records import Record
@@ -30,6 +31,7 @@ class Word(Record):
     about: tuple[str, ...] = ()  # a line for each argument
     snippet: str = ""  # what completion inserts, with placeholders; empty for the word itself
     variadic: bool = False  # whether its one argument may be repeated
+    kinds: tuple[str, ...] = ()  # of each argument, as `modifiers.KINDS` reads it
 
     @property
     def notes(self) -> dict[str, str]:
@@ -45,21 +47,29 @@ def _word(head: str, text: str, snippet: str = "") -> Word:
     return Word(head.partition(" ")[0], head, text, snippet=snippet)
 
 
+def signature(name: str, params: Sequence[str], required: int) -> str:
+    """Form of a call, for help texts: ``translate(x, y[, z])``."""
+    text = ", ".join(params[:required])
+    for param in params[required:]:
+        text += f"[, {param}]" if text else f"[{param}]"
+    return f"{name}({text})"
+
+
 def _call(
     name: str, params: str, text: str, about: tuple[str, ...] = (), snippet: str = "", head: str = ""
 ) -> Word:
-    """A word with arguments: ``x?`` may be left out, ``x…`` may be repeated."""
-    given = params.split()
+    """A word with arguments: ``x?`` may be left out, ``x…`` may be repeated, ``x:KIND`` is not a number."""
+    given = [param.partition(":")[0] for param in params.split()]
+    kinds = tuple([param.partition(":")[2] or "number" for param in params.split()])
     names = [param.rstrip("?…") for param in given]
     required = sum(not param.endswith("?") for param in given)
-    shown = ", ".join(names[:required]) + "".join(f"[, {param}]" for param in names[required:])
-    shown = shown if required or not names else f"[{', '.join(names)}]"
     variadic = params.endswith("…")
     if not snippet:
         holes = ", ".join(f"${{{at}:{param}}}" for at, param in enumerate(names, 1))
         snippet = f"{name}({holes})"
+    shown = signature("", names, required)[1:-1] if required else f"[{', '.join(names)}]" * bool(names)
     head = head or f"{name}({shown}{', …' * variadic})"
-    return Word(name, head, text, tuple(names), required, about, snippet, variadic)
+    return Word(name, head, text, tuple(names), required, about, snippet, variadic, kinds)
 
 
 _ANGLE = "an angle, such as `30deg`, `0.5rad` or `0.25turn`"
@@ -133,14 +143,14 @@ RESERVED: Final = tuple(word for word in KEYWORDS if word not in ("step", "as"))
 PLAIN_SETTINGS: Final = _table(
     _call(
         "canvas",
-        "w h",
+        "w:side h:side",
         "The output size in pixels, 256 × 256 without it, at most 8192 a side. `--size` overrides it.",
         ("width in pixels", "height in pixels"),
         "canvas(${1:256}, ${2:256});",
     ),
     _call(
         "background",
-        "c",
+        "c:backdrop",
         "The colour where nothing is drawn, without it white in 2D and the sky in 3D; `none` leaves it "
         "transparent.",
         ("a colour, or `none`",),
@@ -148,7 +158,7 @@ PLAIN_SETTINGS: Final = _table(
     ),
     _call(
         "animate",
-        "seconds fps loop?",
+        "seconds:seconds fps:fps loop?:boolean",
         "Makes `t`, `u`, `frame` and `frames` run.",
         ("how long, such as `2s`", "frames a second", "whether the end joins the start"),
         "animate(seconds = ${1:2}, fps = ${2:24}, loop = ${3|true,false|});",
@@ -158,21 +168,21 @@ PLAIN_SETTINGS: Final = _table(
 STAGE: Final = _table(
     _call(
         "camera",
-        "eye? target? fov?",
+        "eye?:point target?:point fov?:angle",
         "3D: where the picture is taken from, without it from [0, 1.2, 6] to the origin.",
         ("a point", "the point it looks at", "angle of view across the shorter side, 36.87° by default"),
         "camera(eye = [${1:0}, ${2:1.2}, ${3:6}]);",
     ),
     _call(
         "light",
-        "position? power? color?",
+        "position?:point power? color?:opaque",
         "3D: the point light, without it a white one of power 28 at [2.5, 4, 3].",
         ("a point", "what a white surface at distance 1 receives, from 0", "its colour"),
         "light(position = [${1:2.5}, ${2:4}, ${3:3}]);",
     ),
     _call(
         "ground",
-        "y? color?",
+        "y? color?:opaque",
         "3D: the plane below, without it at y = −1; `ground(none)` leaves it out.",
         ("its height, or `none`", "its colour"),
         "ground(${1:-1});",
@@ -190,7 +200,7 @@ _BOTH: Final = _table(
     ),
     _call(
         "rotate",
-        "angle axis?",
+        "angle:angle axis?:axis",
         "Turns counter-clockwise about an axis through the origin, by the right hand in 3D.",
         (_ANGLE, "`X`, `Y`, `Z` or a vector; `Z` by default, the only one in 2D"),
         "rotate(${1:30}deg);",
@@ -198,7 +208,7 @@ _BOTH: Final = _table(
     ),
     _call(
         "scale",
-        "sx sy sz?",
+        "sx:factor sy:factor sz?:factor",
         "Scales about the origin, evenly or along each axis; not by 0. `sz` does nothing in 2D (W0508).",
         ("along x, or evenly where it is alone", "along y", "along z, 1 by default"),
         "scale(${1:0.5});",
@@ -216,7 +226,7 @@ _BOTH: Final = _table(
 TRANSFORMS: Final = _BOTH | _table(
     _call(
         "matrix",
-        "rows",
+        "rows:rows",
         "An affine map, not singular, by its rows, for column vectors; the last one is 0, 0, 0, 1.",
         ("four rows of four numbers",),
         "matrix([[${1:1}, 0, 0, ${2:0}], [0, ${3:1}, 0, ${4:0}], [0, 0, 1, 0], [0, 0, 0, 1]]);",
@@ -224,19 +234,19 @@ TRANSFORMS: Final = _BOTH | _table(
     ),
     _call(
         "twirl",
-        "k",
+        "k:rate",
         "Turns each point by k times its distance from the origin: p → R(k·|p|) p on the way back. " + _TURN,
         _RATE,
         "twirl(${1:1});",
     ),
     _call(
         "bend",
-        "k",
+        "k:rate",
         "Turns each point by k times its x: p → R(k·p.x) p on the way back. " + _TURN,
         _RATE,
         "bend(${1:0.5});",
     ),
-    _call("twist", "k", "3D: turns (x, z) by k·y, on the way back.", _RATE, "twist(${1:1});"),
+    _call("twist", "k:rate", "3D: turns (x, z) by k·y, on the way back.", _RATE, "twist(${1:1});"),
     _call(
         "displace",
         "amount frequency",
@@ -249,7 +259,7 @@ OPERATIONS: Final = _BOTH | _table(
     _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
     _call(
         "color",
-        "c",
+        "c:colour",
         "Multiplies the material's colour.",
         ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
         "color(${1:#d33});",
@@ -261,14 +271,14 @@ OPERATIONS: Final = _BOTH | _table(
         ("0 keeps the colour, 1 is grey",),
         "grayscale(${1:1});",
     ),
-    _call("hue", "angle", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+    _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
 )
 """Operations in a material's block."""
 
 FUNCTIONS: Final = _table(
-    _call("sin", "x", "The sine of an angle."),
-    _call("cos", "x", "The cosine of an angle."),
-    _call("tan", "x", "The tangent of an angle."),
+    _call("sin", "x:angle", "The sine of an angle."),
+    _call("cos", "x:angle", "The cosine of an angle."),
+    _call("tan", "x:angle", "The tangent of an angle."),
     _call("asin", "x", "The angle whose sine is x."),
     _call("acos", "x", "The angle whose cosine is x."),
     _call("atan2", "y x", "The angle of the point (x, y), from the x axis."),

@@ -44,7 +44,7 @@ from scenelang.language.evaluation import (
     written,
 )
 from scenelang.language.reports import SceneError
-from scenelang.language.scene_text import number, to_nsg
+from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
@@ -446,7 +446,7 @@ class SweepTable:
         self._note(frame.number, Line(line.picture, line.values, frame.key))
         result = {}
         if "scene" in self.texts:
-            result[TEXTS["scene"]] = to_nsg(frame.shot.scene).encode()
+            result[TEXTS["scene"]] = frame.shot.scene.to_nsg().encode()
         if "program" in self.texts:
             if frame.program is None:
                 raise RenderError("the reference has no programs to write")

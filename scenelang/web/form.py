@@ -24,8 +24,7 @@ from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
-from scenelang.language.scene import Color, Matrix, Object, Scale, Translate
-from scenelang.language.scene_data import Brought, objects_of
+from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
 from scenelang.language.words import (

@@ -19,7 +19,7 @@ import scenelang as nsg
 from scenelang.compiler.manifest import ROOT, Manifest
 from scenelang.editors.dumps import SCHEMAS, scene_schema
 from scenelang.language.machine import render_json
-from scenelang.language.scene_json import to_readable_json
+from scenelang.language.scene import to_readable_json
 from tests.strategies import scenes
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))

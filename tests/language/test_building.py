@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 import scenelang as nsg
-from scenelang.language.scene_text import to_nsg
 
 ROOT = Path(__file__).parents[2]
 STAR = nsg.Object("star")
@@ -67,6 +66,19 @@ def test_short_forms(short: object, long: object) -> None:
         (lambda: nsg.Light(color="red"), "Light: `red` is not a colour such as `#d33`"),
         (lambda: nsg.Scene(background="#12"), "Scene: `#12` is not a colour such as `#d33`"),
         (lambda: nsg.Scene(camera=nsg.Light()), "`camera` is Light(), not a Camera"),
+        (lambda: nsg.Camera((0, 0, 0)), "the eye is the target"),
+        (lambda: nsg.Camera(fov=1e-20), "too narrow"),
+        (lambda: nsg.Light(power=-1), "power"),
+        (lambda: nsg.Light((0, 1e13, 0)), "position"),
+        (lambda: nsg.Ground(-1e13), "y"),
+        (lambda: nsg.Boolean("smooth", k=0), "k"),
+        (lambda: nsg.Link("union", STAR, 0.3), "`union` has no k"),
+        (lambda: nsg.Rotate(angle=1, axis=(0, 0, 0)), "an axis of length 0"),
+        (lambda: nsg.Translate(math.inf, 0), "Translate: `x`"),
+        (lambda: nsg.Matrix(((1, 0, 0, 0), (1, 0, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))), "a singular matrix"),
+        (lambda: nsg.Chain([nsg.Link("subtract", STAR)]), "the first child of a chain"),
+        (lambda: nsg.Scene(canvas=(0, 1)), "`canvas[0]`"),
+        (lambda: nsg.Scene(model='a"b'), "`model`: not a possible name"),
         (lambda: nsg.Scene((STAR,)), "Scene takes its arguments by name"),  # type: ignore[call-arg, arg-type]
     ],
 )
@@ -132,7 +144,7 @@ def test_widths_of_cuts() -> None:
         assert again == scene
         (node,) = again.nodes
         assert node.k == (kept if kept is None else pytest.approx(kept, rel=1e-15))
-        assert (f"{op}(k = {kept}" in to_nsg(scene)) == (kept is not None)
+        assert (f"{op}(k = {kept}" in scene.to_nsg()) == (kept is not None)
     old = '{"nodes": [{"kind": "boolean", "op": "subtract", "children": [], "k": 0.15}]}'
     assert nsg.Scene.from_json(old).nodes[0].k is None  # type: ignore[union-attr]
     with pytest.raises(ValueError, match="`union` has no k"):

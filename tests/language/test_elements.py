@@ -1,4 +1,4 @@
-"""Elements in scenes: imported by text and JSON, compiled, drawn."""
+"""Elements, ready groups and materials of elements in scenes: in text, JSON and Python, compiled, drawn."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.assets.element import Part
 from scenelang.assets.zoo import zoo_bytes
-from scenelang.compiler.check import check_compiles
+from scenelang.compiler.check import check, check_compiles
 from scenelang.compiler.compile import compile_scene, find_model
-from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import parse_program, program_bytes
 from scenelang.drawing.metrics import psnr
+from scenelang.editors.dumps import scene_schema
 from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.evaluation import Source
+from scenelang.language.formatting import format_text
 from tests.assets.scenes import IMPORT, good, load
-from tests.assets.shapes import ball, element, square, torus
+from tests.assets.shapes import ball, element, noise, square, torus
 from tests.test_architecture import loaded_by
 
 RING = "zoo.ring { scale(0.9); rotate(40deg, axis = X); translate(0.2, 0, 0); }"
@@ -37,8 +40,9 @@ def folder(tmp_path: Path) -> Path:
 def test_an_element_is_drawn_as_the_shape_it_is(folder: Path) -> None:
     scene = good(folder, f"{IMPORT}{RING} sphere {{ scale(0.4); translate(-1, 0, 0.5); }}")
     pure = good(folder, f"{PURE} sphere {{ scale(0.4); translate(-1, 0, 0.5); }}")
+    scene, pure = scene.sized((128, 128)), pure.sized((128, 128))
     own, exact = nsg.render(scene), nsg.render(pure, backend="reference")
-    assert psnr(own, exact) > 45
+    assert psnr(own, exact) > 42  # 45 at 256 × 256
     ours = np.asarray(nsg.render(scene.sized((64, 64)), device="cpu"))  # torch's
     assert abs(ours - np.asarray(nsg.render(scene.sized((64, 64))))).max() < 1.5 / 255
 
@@ -108,26 +112,6 @@ def test_names_come_through_other_files(folder: Path) -> None:
     assert [node.geometry for node in scene.nodes] == ["zoo.ring", "zoo_2.ring"]  # type: ignore[union-attr]
     again = good(folder, scene.to_nsg())
     assert (again.nodes, again.elements) == (scene.nodes, scene.elements)
-
-
-@pytest.mark.parametrize(
-    ("text", "code", "words"),
-    [
-        (f"{IMPORT} zoo.rng {{ }}", "E0212", "`zoo` has no `rng`"),
-        (f"{IMPORT} let a = zoo.ring;", "E0213", "is a geometry, not a value"),
-        (f"{IMPORT} zoo.ring(2);", "E0308", "takes no arguments"),
-        ('import "zoo.safetensors" as if;', "E0110", "`if` is a keyword"),
-        ('import "zoo.safetensors" as ..;', "E0109", "expected a name"),
-        ('import "none.safetensors" as zoo;', "E0214", "no such file"),
-        ('import "../zoo.safetensors" as zoo;', "E0215", "outside the import root"),
-        ('import "text.safetensors" as zoo; zoo.ring { }', "E0217", "not a file of elements"),
-    ],
-)
-def test_mistakes(folder: Path, text: str, code: str, words: str) -> None:
-    (folder / "text.safetensors").write_text("let size = 1;")
-    _, found = load(folder, text)
-    assert [d[0] for d in found] == [code]
-    assert words in found[0][1]
 
 
 def test_the_smallest_model_that_draws_elements_is_chosen(folder: Path) -> None:
@@ -207,18 +191,6 @@ def test_json_of_other_files(folder: Path, change: dict[str, Any], words: str) -
         nsg.Scene.from_json(json.dumps(data), root=folder)
 
 
-def test_python_makes_the_same_scene(folder: Path) -> None:
-    zoo = nsg.load_elements(folder / "zoo.safetensors")
-    made = nsg.Scene(elements=zoo, nodes=nsg.Object("zoo.ring", nsg.Scale(0.5)))
-    text = good(folder, IMPORT + "zoo.ring { scale(0.5); }")
-    assert compile_scene(made).digest() == compile_scene(text).digest()
-
-
-def test_checking_needs_no_numpy(folder: Path) -> None:
-    good(folder, IMPORT + RING)
-    assert not loaded_by("check", str(folder / "scene.nsg")) & {"torch", "numpy"}
-
-
 def test_programs_carry_their_elements(folder: Path) -> None:
     text = f"{IMPORT} {RING} torus {{ translate(1, 0, 0); }} zoo.ring {{ translate(-1, 0, 0); }}"
     program = compile_scene(good(folder, text))
@@ -236,12 +208,221 @@ def test_a_program_without_elements_is_of_the_old_format(folder: Path) -> None:
     assert b"forms" not in data
 
 
-def test_models_that_draw_elements() -> None:
-    assert load_manifest("solids3d").elements == ("element of space", "texture", "colouring of space")
-    assert load_manifest("shapes2d-reading").elements == ()
-
-
 def test_data_of_an_earlier_version_takes_the_meshes_that_ship_now() -> None:
     data = json.loads(nsg.loads('import "std/meshes" as m; m.teapot { }').to_json())
     data["elements"][0]["digest"] = "0" * 64
     assert len(compile_scene(nsg.Scene.from_json(json.dumps(data), root="."))) == 1
+
+
+# ---------------------------------------------------------------- ready groups
+
+TURN = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+GROUPS = {
+    "car": (
+        Part("ring", (0.0, 0.5, 0.0), 0.5, material="hide"),
+        Part("ring", (0.5, -0.5, 0.0), 0.25, TURN, (1.0, 0.5, 0.0)),
+        Part("ball", (0.0, 0.0, 0.0), 1.0),
+    ),
+    "ring": (Part("ring", (0.0, 0.0, 0.0), 1.0, (), (0.0, 0.0, 1.0)),),
+    "logo": (Part("tile", (0.0, 0.0), 1.0, (), (1.0, 0.0, 0.0)), Part("tile", (0.2, 0.0), 0.5)),
+}
+CAR = """
+group {
+  zoo.ring { scale(0.5); translate(0, 0.5, 0); material zoo.hide; }
+  zoo.ring { rotate(90deg); scale(0.25); translate(0.5, -0.5, 0); material diffuse { color(#ff8000); } }
+  zoo.ball { }
+  @
+}
+"""
+
+
+@pytest.fixture
+def garage(tmp_path: Path) -> Path:
+    held = [
+        element(torus, "ring", levels=2),
+        element(ball, "ball", levels=2),
+        element(square, "tile", levels=3, d=2),
+        noise(3, 3, 3, name="hide"),
+        noise(4, 6),
+        noise(2, 2, name="stone"),
+    ]
+    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(held, GROUPS))
+    return tmp_path
+
+
+def rows(scene: nsg.Scene) -> np.ndarray:
+    return np.asarray(compile_scene(scene).vectors)
+
+
+@pytest.mark.parametrize(
+    ("call", "block"),
+    [("zoo.car();", ""), ("zoo.car() { rotate(30deg, axis = Y); }", "rotate(30deg, axis = Y);")],
+)
+def test_a_call_is_the_parts_in_their_places_and_looks(garage: Path, call: str, block: str) -> None:
+    made, written = good(garage, IMPORT + call), good(garage, IMPORT + CAR.replace("@", block))
+    np.testing.assert_allclose(rows(made), rows(written), atol=3e-3)  # colours in 8 bits there
+    ours, theirs = compile_scene(made), compile_scene(written)
+    assert ours.brought() == theirs.brought()
+    assert [p and p.element.name for p in ours.paints()] == ["hide", None, None]
+
+
+def test_a_group_of_one_part_is_that_object(garage: Path) -> None:
+    own = good(garage, IMPORT + "zoo.ring() { scale(0.5); }")
+    same = good(garage, IMPORT + "zoo.ring { scale(0.5); material diffuse { color(#00f); } }")
+    assert own == same
+    worn = good(garage, IMPORT + "group { zoo.ring(); zoo.ball { } material volumetric { } }")
+    assert [leaf.material and leaf.material.name for leaf in worn.nodes[0].children] == ["diffuse", None]  # type: ignore[union-attr]
+
+
+def test_groups_stand_in_modules_and_chains(garage: Path) -> None:
+    module = "module mark() { zoo.logo() { scale(0.5); } }"
+    scene = good(garage, f"{IMPORT} {module} chain {{ square {{ }} smooth mark(); }}")
+    assert [child.op for child in scene.nodes[0].children] == ["union", "smooth"]  # type: ignore[union-attr]
+    scene = good(garage, IMPORT + "chain { zoo.logo(); subtract zoo.tile { scale(0.2); } }")
+    assert compile_scene(scene).objects == ("zoo.tile", "zoo.tile", "zoo.tile")
+
+
+def test_text_json_and_python_hold_the_parts(garage: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(garage)
+    scene = good(garage, IMPORT + "zoo.car() { rotate(30deg, axis = Y); }")
+    assert nsg.Scene.from_json(scene.to_json(), root=garage) == scene
+    (garage / "again.nsg").write_text(scene.to_nsg())
+    assert nsg.load(garage / "again.nsg").nodes == scene.nodes
+    zoo = nsg.load_elements("zoo.safetensors")
+    made = nsg.Scene(elements=zoo, nodes=nsg.Group(zoo.group("car"), nsg.Rotate.degrees(30, axis=(0, 1, 0))))
+    assert compile_scene(made).digest() == compile_scene(scene).digest()
+    assert (
+        nsg.Scene(elements=zoo, nodes=zoo.group("ring")).nodes == good(garage, IMPORT + "zoo.ring();").nodes
+    )
+    with pytest.raises(KeyError, match="`zoo` has no group `cow`; it has car, logo, ring"):
+        zoo.group("cow")
+
+
+def test_objects_of_groups_are_counted(garage: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scenelang.language.session.MAX_OBJECTS", 8)
+    assert load(garage, IMPORT + "for (i in 0..<2) { zoo.car(); }")[0] is not None
+    assert [code for code, _ in load(garage, IMPORT + "for (i in 0..<3) { zoo.car(); }")[1]] == ["E0320"]
+
+
+def test_checking_groups_needs_no_numpy(garage: Path) -> None:
+    good(garage, IMPORT + "zoo.car();")
+    assert not loaded_by("check", str(garage / "scene.nsg")) & {"torch", "numpy"}
+
+
+# ---------------------------------------------------------------- materials
+
+
+def worn(garage: Path, text: str, **files: str) -> list[nsg.Material | None]:
+    scene = good(garage, IMPORT + text, **files)
+    again = good(garage, scene.to_nsg())
+    assert again.nodes == scene.nodes
+    assert nsg.Scene.from_json(scene.to_json(), root=garage) == scene
+    assert compile_scene(again).digest() == compile_scene(scene).digest()
+    return [node.material for node in scene.nodes]
+
+
+FLIP, TURN = nsg.Flip(), nsg.Hue.degrees(36)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("square { material zoo.bark; }", nsg.Material("zoo.bark")),
+        ("square { material zoo.bark { flip(); hue(0.1turn); } }", nsg.Material("zoo.bark", (FLIP, TURN))),
+        ("square { material flat zoo.bark { flip(); } }", nsg.Material("zoo.bark", FLIP, "flat")),
+        ("torus { material volumetric zoo.bark; }", nsg.Material("zoo.bark", (), "volumetric")),
+        ("zoo.ring { material zoo.hide { hue(0.1turn); } }", nsg.Material("zoo.hide", TURN)),
+        (
+            "let mist = material volumetric zoo.bark { flip(); }; torus { mist { hue(0.1turn); } }",
+            nsg.Material("zoo.bark", (FLIP, TURN), "volumetric"),
+        ),
+        (
+            "module ball(m) { sphere { m { flip(); } } } ball(material zoo.stone);",
+            nsg.Material("zoo.stone", FLIP),
+        ),
+        (
+            "let flat = 1; for (m in [material flat zoo.bark]) { square { m; } }",
+            nsg.Material("zoo.bark", (), "flat"),
+        ),
+    ],
+)
+def test_materials_of_elements(garage: Path, text: str, expected: nsg.Material) -> None:
+    assert worn(garage, text) == [expected]
+    assert format_text(format_text(text)) == format_text(text)
+
+
+def test_materials_come_through_other_files(garage: Path) -> None:
+    library = f"{IMPORT} let bark = material zoo.bark {{ flip(); }}; module tile() {{ square {{ bark; }} }}"
+    text = 'import "lib.nsg" as lib; square { lib.bark { hue(0.1turn); } } lib.tile();'
+    found = worn(garage, text, lib=library)
+    assert found == [nsg.Material("zoo.bark", (FLIP, TURN)), nsg.Material("zoo.bark", FLIP)]
+
+
+def test_equal_materials_are_equal_values(garage: Path) -> None:
+    text = "let a = material zoo.bark == material flat zoo.bark; square { scale(a ? 1 : 0.5); }"
+    scene, _ = load(garage, IMPORT + text)
+    assert scene is not None
+    assert scene.nodes[0].transforms == (nsg.Scale(0.5),)
+
+
+def test_misspelt_materials_are_mended(garage: Path) -> None:
+    (garage / "scene.nsg").write_text(IMPORT + "square { material zoo.brak; }")
+    (found,) = check(garage / "scene.nsg")
+    assert found.fix is not None
+    assert [edit.replacement for edit in found.fix.edits] == ["bark"]
+
+
+def test_json_says_how_a_texture_is_lit(garage: Path) -> None:
+    scene, _ = load(garage, IMPORT + "torus { material volumetric zoo.bark; }")
+    assert scene is not None
+    (node,) = json.loads(scene.to_json())["nodes"]
+    assert (node["material"]["name"], node["material"]["shading"]) == ("zoo.bark", "volumetric")
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.validate(json.loads(scene.to_json()), scene_schema())
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message", "help"),
+    [
+        ("zoo.rng { }", "E0212", "`zoo` has no `rng`", "did you mean `ring`?"),
+        ("zoo.cat();", "E0212", "`zoo` has no `cat`", "did you mean `car`?"),
+        ("zoo.car(2);", "E0308", "group `zoo.car` takes no arguments", "scale(0.5)"),
+        ("zoo.ball();", "E0212", "`zoo` has no group `ball`", "its geometry is zoo.ball { … }"),
+        ("zoo.ball(2);", "E0308", "`zoo.ball` takes no arguments", "scale(0.5)"),
+        ("zoo.car { }", "E0212", "`zoo` has no geometry `car`", "its group is zoo.car() { … }"),
+        ("zoo.logo() { zoo.tile { } }", "E0330", "object `zoo.tile` inside an object", "group"),
+        ("sphere { zoo.car(); }", "E0330", "group `zoo.car` inside an object", "group"),
+        ("let a = zoo.car;", "E0213", "`zoo.car` is a geometry, not a value", ""),
+        ('import "zoo.safetensors" as if;', "E0110", "`if` is a keyword", ""),
+        ('import "zoo.safetensors" as ..;', "E0109", "expected a name", ""),
+        ('import "none.safetensors" as a;', "E0214", "no such file", ""),
+        ('import "../zoo.safetensors" as a;', "E0215", "outside the import root", ""),
+        ('import "text.safetensors" as a; a.ring { }', "E0217", "not a file of elements", ""),
+        ("square { material zoo.brak; }", "E0212", "`zoo` has no material `brak`", "did you mean `bark`?"),
+        ("square { material zo.bark; }", "E0201", "unknown name `zo`", ""),
+        ("let zo = 2; square { material zo.bark; }", "E0213", "`zo` is a value, not an imported file", ""),
+        ("zoo.bark { }", "E0213", "`zoo.bark` is the name of a material", "write material zoo.bark"),
+        ("square { zoo.bark; }", "E0213", "`zoo.bark` is the name of a material", ""),
+        ("let a = zoo.bark;", "E0213", "`zoo.bark` is the name of a material", ""),
+        ("square { material zoo.ring; }", "E0213", "`zoo.ring` is a geometry, not a material", ""),
+        ("square { material flat square; }", "E0213", "`square` is a geometry, not a material", ""),
+        ("square { material mist zoo.bark; }", "E0208", "unknown material `mist`", ""),
+        ("torus { material diffuse volumetric; }", "E0213", "`volumetric` is not a texture", ""),
+        ("square { material zoo.bark; material zoo.stone; }", "E0332", "a second material in one block", ""),
+        (
+            'import "lib.nsg" as lib; square { material lib.bark; }',
+            "E0213",
+            "`lib.bark` is a value, not a material's name",
+            "",
+        ),
+    ],
+)
+def test_mistakes(garage: Path, text: str, code: str, message: str, help: str) -> None:
+    (garage / "text.safetensors").write_text("let size = 1;")
+    (garage / "lib.nsg").write_text("let bark = material flat;")
+    (garage / "scene.nsg").write_text(IMPORT + text)
+    found = Diagnostics()
+    Source(garage / "scene.nsg").scene(found)
+    assert [d.code for d in found] == [code]
+    assert message in found.items[0].message
+    assert help in (found.items[0].help or "")

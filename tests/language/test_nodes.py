@@ -7,9 +7,11 @@ import math
 import pytest
 
 import scenelang as nsg
+from scenelang.language import tree
 from scenelang.language.diagnostics import SourceFile, Span
 from scenelang.language.library import Calls, SpanMap, Written
 from scenelang.language.scene import SceneNode
+from scenelang.language.statements import EXPRESSIONS, STATEMENTS
 from tests.language.cases import run_text, transform
 
 
@@ -29,18 +31,6 @@ chain {                                  // streamed top to bottom, one boolean 
 }
 """
 
-SOLIDS = """
-nsg 1;
-model "solids3d";                        // its camera, point light, ground and sky belong to the model
-canvas(256, 256);
-let mist = material volumetric { color([0.3, 0.5, 1.0]); };
-module ball(at, c = #e8c060) {
-  sphere { scale(0.6); translate(at); material diffuse { color(c); } }
-}
-ball(at = [0, 0.6, 0]);
-torus  { scale(1.2, 1.2, 0.4); rotate(70deg, axis = X); mist { hue(0.1turn); } }
-sphere { scale(0.4); translate(1.1, 0.4, 0); mist { grayscale(0.5); } }
-"""
 
 ANIMATION = """
 nsg 1;
@@ -84,27 +74,6 @@ def test_chain_scene() -> None:
     links = [("union", square), ("smooth", pentagon), ("subtract", star), ("intersect", turned)]
     chain = nsg.Chain(children=tuple(nsg.Link(op=op, node=node) for op, node in links))  # type: ignore[arg-type]
     assert scene == nsg.Scene(model="shapes2d", nodes=(chain,))
-
-
-def test_solid_scene() -> None:
-    scene = run_text(SOLIDS).good()
-    blue = nsg.Color(rgb=(0.3, 0.5, 1.0))
-    ball = nsg.Object(
-        "sphere",
-        transforms=(nsg.Scale.uniform(0.6), nsg.Translate(x=0, y=0.6, z=0)),
-        material=nsg.Material(name="diffuse", ops=(nsg.Color(rgb=(0xE8 / 255, 0xC0 / 255, 0x60 / 255)),)),
-    )
-    torus = nsg.Object(
-        "torus",
-        transforms=(nsg.Scale(x=1.2, y=1.2, z=0.4), nsg.Rotate.degrees(70, (1.0, 0.0, 0.0))),
-        material=nsg.Material(name="volumetric", ops=(blue, nsg.Hue(angle=0.1 * math.tau))),
-    )
-    sphere = nsg.Object(
-        "sphere",
-        transforms=(nsg.Scale.uniform(0.4), nsg.Translate(x=1.1, y=0.4, z=0)),
-        material=nsg.Material(name="volumetric", ops=(blue, nsg.Grayscale(amount=0.5))),
-    )
-    assert scene == nsg.Scene(model="solids3d", nodes=(ball, torus, sphere))
 
 
 @pytest.mark.parametrize("frame", [0, 7, 47])
@@ -178,14 +147,6 @@ def test_transform(text: str, expected: object) -> None:
     for geometry in ("square", "sphere"):
         (node,) = nodes(f"{geometry} {{ {text} }}")
         assert node.transforms == (expected,)
-
-
-def test_texture_operations() -> None:
-    (node,) = nodes(
-        "square { material flat { flip(); translate(1, 0); color(#fff); hue(90deg); scale(2); } }"
-    )
-    assert node.material is not None
-    assert [op.kind for op in node.material.ops] == ["flip", "translate", "color", "hue", "scale"]
 
 
 def test_control_flow_among_transforms_and_chain_children() -> None:
@@ -279,12 +240,6 @@ def test_materials_are_values() -> None:
     assert node.material == nsg.Material(name="flat")
 
 
-def test_names_of_a_module_hide_a_geometry() -> None:
-    (node,) = nodes("module star(n) { square { scale(n); } } star(2);")
-    assert isinstance(node, nsg.Object)
-    assert node.geometry == "square"
-
-
 def test_spans_beside_the_scene() -> None:
     text = "module m(x) { square { scale(x); } }\ngroup {\n  m(2);\n  star { rotate(1rad); }\n}"
     outcome = run_text(text)
@@ -306,10 +261,6 @@ def test_spans_beside_the_scene() -> None:
     assert spans.span(object()) is None
 
 
-def test_the_same_text_gives_the_same_scene() -> None:
-    assert run_text(ANIMATION, frame=5).good() == run_text(ANIMATION, frame=5).good()
-
-
 def test_a_place_of_its_own_is_kept_for_a_node_that_nobody_else_keeps() -> None:
     """What was known of a node that is gone is not told of the next one, which may have its address."""
     spans, span = SpanMap(), Span(SourceFile("a.nsg", "square;"), 0, 6)
@@ -320,3 +271,8 @@ def test_a_place_of_its_own_is_kept_for_a_node_that_nobody_else_keeps() -> None:
     spans.record(node, Written(span, span), Calls(span, None))
     spans.record(node, Written(span, span))
     assert spans.calls(node) == ()
+
+
+def test_each_class_of_the_tree_is_in_its_table() -> None:
+    assert list(EXPRESSIONS) == tree.Expr.__subclasses__()
+    assert list(STATEMENTS) == tree.Stmt.__subclasses__()

@@ -11,7 +11,7 @@ import scenelang
 from lab.docs.make_errors import index
 from scenelang.compiler import lower
 from scenelang.compiler.check import check_compiles, check_frames
-from scenelang.language import lexer, limits, parser, session, statements, values
+from scenelang.language import lexer, limits, modifiers, parser, session, values
 from scenelang.language import scene as schema
 from scenelang.language import values as functions
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
@@ -129,7 +129,7 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
     for code, number in {
         "E0120": f"{parser.MAX_DEPTH} levels",
         "E0121": f"more than {lexer.MAX_MISTAKES} syntax",
-        "E0311": f"above {statements.MAX_SIDE_PX}",
+        "E0311": f"above {modifiers.MAX_SIDE_PX}",
         "E0320": f"{limits.MAX_OBJECTS:,} objects",
         "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
         "E0322": f"{limits.MAX_STEPS // 1_000_000} million steps",

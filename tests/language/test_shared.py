@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
-from scenelang.language.values import Angle, Problem, Time, Vec, angle, binary, compare, number
 from tests.language.cases import run_text
 
 SPREAD = {
@@ -50,24 +47,3 @@ def test_independent_mistakes_are_told_apart(text: str) -> None:
 def test_ten_mistakes_are_ten_reports() -> None:
     text = "".join(f"fn f{i}(a) = a;\nsquare {{ scale(f{i}(1, 2)); }}\n" for i in range(10))
     assert len(run_text(text).diagnostics) == 10
-
-
-@pytest.mark.parametrize(
-    ("function", "values", "found"),
-    [
-        (number, ("a",), "a string"),
-        (angle, (2.0,), "a bare number"),
-        (angle, (Time(1.0),), "a time"),
-        (binary, ("+", 1.0, True), "a boolean"),
-        (binary, ("/", 1.0, True), ""),
-        (binary, ("-", "a", True), ""),
-        (binary, ("+", 1.0, Angle(1.0)), "an angle"),
-        (compare, ("<", Vec((1.0,)), 2.0), "a vector of 1 item"),
-    ],
-)
-def test_a_problem_says_what_it_found(
-    function: Callable[..., object], values: tuple[object, ...], found: str
-) -> None:
-    with pytest.raises(Problem) as raised:
-        function(*values)
-    assert raised.value.found == found

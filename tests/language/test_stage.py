@@ -137,23 +137,3 @@ def test_the_width_of_each_blend_reaches_the_graph() -> None:
     (chain,) = [link.node for link in graph.root.links]
     assert [link.k for link in chain.links] == [0.0, 0.3, 0.0, 0.2]
     assert [link.k for link in chain.links[3].node.links] == [0.0, 1.0]
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: nsg.Camera((0, 0, 0)), "the eye is the target"),
-        (lambda: nsg.Camera(fov=4.0), "fov"),
-        (lambda: nsg.Camera((0, 0, 1e13)), "eye"),
-        (lambda: nsg.Camera(fov=1e-20), "too narrow"),
-        (lambda: nsg.Light(power=-1), "power"),
-        (lambda: nsg.Light((0, 1e13, 0)), "position"),
-        (lambda: nsg.Ground(-1e13), "y"),
-        (lambda: nsg.Link("union", nsg.Object("sphere"), 0.3), "`union` has no k"),
-        (lambda: nsg.Boolean("smooth", k=0), "k"),
-        (lambda: nsg.Scene(ground="none"), "`ground`"),
-    ],
-)
-def test_constructors_refuse(make, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        make()

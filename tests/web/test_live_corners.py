@@ -9,11 +9,11 @@ import pytest
 
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.reports import SceneError
-from tests.language.test_groups import IMPORT, folder
+from tests.language.test_elements import IMPORT, garage
 from tests.web.live import check_picture, check_rows, compiled, pictures
 
 pytestmark = pytest.mark.browser
-__all__ = ["folder"]  # a fixture
+__all__ = ["garage"]  # a fixture
 
 TEXTS = Path(__file__).with_name("corners.nsgs").read_text().split("--- ")[1:]
 SCENES = dict(text.split("\n", 1) for text in TEXTS)
@@ -50,11 +50,11 @@ ELEMENTS = [
 
 
 @pytest.mark.parametrize("text", ELEMENTS)
-def test_elements_and_imports(text: str, folder: Path, viewer_page: Any) -> None:
+def test_elements_and_imports(text: str, garage: Path, viewer_page: Any) -> None:
     lib = "param k = 0.3; fn f(x) = k * x; module two(s) { zoo.tile { scale(s); } square { scale(f(s)); } }"
     red = "let red = material flat { color([k, 0, 0]); }; square; background(#000);"
-    (folder / "lib.nsg").write_text(f"{IMPORT} {lib} {red}")
-    source, path = SourceFile("scene.nsg", IMPORT + text), folder / "scene.nsg"
+    (garage / "lib.nsg").write_text(f"{IMPORT} {lib} {red}")
+    source, path = SourceFile("scene.nsg", IMPORT + text), garage / "scene.nsg"
     first = compiled(source, path)
     form = first.form()
     changes = {"lib.k": 0.7} if "lib" in text else {"n": 1} if "param" in text else {}

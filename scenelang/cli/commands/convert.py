@@ -45,6 +45,6 @@ def command(ctx: click.Context, file: str, out: str | None, kind: Kind | None, r
     say_diagnostics(result.diagnostics)
     if result.scene is None or result.diagnostics.errors:
         ctx.exit(1)
-    from scenelang.language.scene_json import to_readable_json
+    from scenelang.language.scene import to_readable_json
 
     put_out(to_readable_json(result.scene) if wanted == "json" else result.scene.to_nsg(), out)

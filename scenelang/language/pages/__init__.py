@@ -8,7 +8,7 @@ index), and the tests, which run every example.
 - A title that begins with ``retired:`` is of a code that is not given any more; its examples are good ones.
 - The sections ``## Why``, ``## Example`` and ``## Instead`` follow the paragraph that says what it is.
 - A fence ``nsg {.bad}`` gives exactly this code, ``nsg {.good}`` nothing at all; ``json`` is a Scene for
-  `scenelang.language.scene_json`, ``python`` is run and raises `SceneError`.
+  `scenelang.language.scene`, ``python`` is run and raises `SceneError`.
 - A fence ``nsg title="parts.nsg"`` is a file beside all examples of the page, which are ``scene.nsg``.
 - A ``sh`` fence behind an example is the command that checks it; its options count.
 - ``<!-- with scenelang.module.LIMIT = 3 -->`` before an example lowers limits that it is too short to reach.
