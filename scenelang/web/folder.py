@@ -11,7 +11,7 @@ import re
 import secrets
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
@@ -314,6 +314,13 @@ def string_of(message: Json, key: str) -> str:
     value = message.get(key)
     if not isinstance(value, str):
         raise ValueError(f"`{key}` is not a text")
+    return value
+
+
+def choice_of(message: Json, key: str, choices: Collection[str]) -> str:
+    value = string_of(message, key)
+    if value not in choices:
+        raise ValueError(f"`{key}` is `{value[:40]}`")
     return value
 
 

@@ -102,7 +102,7 @@ def test_what_cannot_be_done_says_why(parts: dict[str, Any], message: str) -> No
 
 def test_a_process_has_so_much_memory_and_no_more() -> None:
     code = (
-        "from scenelang.web.worker import limit_memory\n"
+        "from scenelang.web.pool import limit_memory\n"
         "import numpy\nlimit_memory(1 << 30)\n"
         "try:\n    numpy.ones(1 << 28)\nexcept MemoryError:\n    print(numpy.ones(1 << 20).sum())"
     )
