@@ -66,7 +66,9 @@ _KINDS: Final = {
 }
 
 
-def semantic_tokens(docs: Workspace, document: Document, place: types.Range | None = None) -> list[int]:
+def semantic_tokens(
+    docs: Workspace, document: Document, place: types.Range | None = None
+) -> types.SemanticTokens:
     """The tokens of a text or of a range, encoded as the protocol wants them."""
     low, high = 0, len(document.text)
     if place is not None:
@@ -80,7 +82,7 @@ def semantic_tokens(docs: Workspace, document: Document, place: types.Range | No
         data += (at.line - line, at.character - column if at.line == line else at.character)
         data += (length, TYPES.index(kind), modifiers)
         line, column = at.line, at.character
-    return data
+    return types.SemanticTokens(data)
 
 
 def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tuple[int, int, str, int]]:

@@ -14,8 +14,7 @@ from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.editors import completion
 from scenelang.editors.completion import space_of
 from scenelang.editors.context import find_symbol, path_to, word_of
-from scenelang.editors.server import Settings
-from scenelang.editors.workspace import Document, Seen, Workspace
+from scenelang.editors.workspace import Document, Seen, Settings, Workspace
 from scenelang.language import scene_text as to_nsg
 from scenelang.language import tree, words
 from scenelang.language.resolve import Symbol, Use

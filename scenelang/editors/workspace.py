@@ -25,6 +25,7 @@ from typing import Any, Final, Literal
 from lsprotocol import types
 from pygls.uris import from_fs_path, to_fs_path
 
+from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.compiler.check import check_compiles, check_frames
@@ -227,6 +228,43 @@ def check(
         after("frames")
     wanted = frozenset(evaluation.wanted)
     return Checked(file.span.source, in_file_order(result.items), wanted, seen, manifest)
+
+
+MAX_PAUSE_MS: Final = 60_000
+
+
+class Settings(Record):
+    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+
+    Args:
+        debounce_ms: pause in typing after which a scene is evaluated.
+        model: draw with this model instead of the scene's.
+        root: the folder that imports cannot leave, instead of the scene's.
+    """
+
+    debounce_ms: float = 200.0
+    model: str | None = None
+    root: Path | None = None
+    value_hints: bool = True
+    argument_hints: bool = True
+
+    @classmethod
+    def read(cls, options: Any) -> Settings:
+        """Read a client's settings; one that is missing, of another type or out of range has its default."""
+        given = options.get("scenelang", options) if isinstance(options, dict) else None
+        given = given if isinstance(given, dict) else {}
+        hints = given.get("inlayHints")
+        hints = hints if isinstance(hints, dict) else {}
+        pause, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
+        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0 <= pause <= MAX_PAUSE_MS:
+            pause = cls().debounce_ms
+        return cls(
+            debounce_ms=float(pause),
+            model=model if isinstance(model, str) and model else None,
+            root=Path(root).expanduser() if isinstance(root, str) and root else None,
+            value_hints=hints.get("values") is not False,
+            argument_hints=hints.get("arguments") is not False,
+        )
 
 
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols

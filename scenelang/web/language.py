@@ -128,13 +128,13 @@ def _check_places(value: Any, folder: Folder) -> None:
 def main() -> None:
     """Serve standard input and output, with as much memory as a drawing may have."""
     from scenelang.drawing.small import thumbnail
-    from scenelang.editors.handlers import make_server
+    from scenelang.editors.server import make_server
     from scenelang.web.pool import limit_memory
 
     limit_memory()
     logging.basicConfig(level=logging.CRITICAL)
     server = make_server(lambda element: thumbnail(element, 96).encode())
-    server.serve(sys.stdin.buffer, sys.stdout.buffer)
+    server.start_io(sys.stdin.buffer, sys.stdout.buffer)
 
 
 if __name__ == "__main__":
