@@ -190,7 +190,10 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     parts = layout.unpack(program.vectors)
     forms = [at for at, element in enumerate(program.elements) if not element.material]
     paints = [element for element in program.elements if element.material]
-    scales = _scales(program, layout)
+    if layout.dimension == 2:  # world distances per leaf distance
+        scales = Frames(program.vectors, layout).scale.tolist()
+    else:
+        scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
     rows = []
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
@@ -240,13 +243,6 @@ def _index(known: np.ndarray, code: np.ndarray) -> int:
     if not len(result):
         raise ProgramError("codes that are not the model's")
     return int(result[0])
-
-
-def _scales(program: Program, layout: Layout) -> list[float]:
-    """World distances per leaf distance."""
-    if layout.dimension == 2:
-        return list(Frames(program.vectors, layout).scale.tolist())
-    return [read_solid_frame(vector, layout).scale for vector in program.vectors]
 
 
 def _row_steps(v: np.ndarray, layout: Layout) -> list[Step]:

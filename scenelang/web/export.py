@@ -25,7 +25,7 @@ from scenelang.assets.element import credit_of
 from scenelang.assets.files import write_output
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
-from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError, load_program
 from scenelang.compiler.spaces import encoded
 from scenelang.drawing.neural.files import load_arrays
@@ -72,12 +72,18 @@ def alternative(data: dict[str, Any]) -> str:
     around = np.append(groups.joins, UNION)[groups.path]
     joins = np.column_stack([around, groups.tokens])  # of rows and of the groups that they are in
     holes, drawn = (joins == SUBTRACT).any(1), (joins <= SMOOTH).all(1)
-    parts = _counted(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
+    counts = Counter(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
+    several = {name: f"{n:,} {_PLURALS.get(name, f'{name}s')}" for name, n in counts.most_common(MOST)}
+    one = {name: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for name, n in counts.items() if n == 1}
+    parts = _listed([one.get(name, text) for name, text in several.items()], len(counts))
     said = f"A {'3D scene' if solid else 'picture'} of {parts}" if parts else "An empty picture"
     if count := int(holes.sum()):
         said += f", with {count:,} cut-outs" if count > 1 else ", with a cut-out"
-    plain = [rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0]
-    colours = Counter(colour_name(_colour(data, row)) for row in plain)
+    colours: Counter[str] = Counter()
+    for row in (rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0):
+        albedo = data["materials"][row["material"]]["albedo"]
+        r, g, b = (a * c for a, c in zip(albedo, row["colour"], strict=True))
+        colours[colour_name(encoded((r, g, b)) if solid else (r, g, b))] += 1
     if colours:
         said += f", in {_listed([name for name, _ in colours.most_common(MOST)], len(colours))}"
     stage, background = program["stage"], program["background"]
@@ -109,24 +115,6 @@ def colour_name(rgb: Iterable[float]) -> str:
     if light < 0.4 and name == "orange":
         return "brown"
     return f"light {name}" if light > 0.75 else f"dark {name}" if light < 0.3 else name
-
-
-def _colour(data: dict[str, Any], row: dict[str, Any]) -> Iterable[float]:
-    albedo = data["materials"][row["material"]]["albedo"]
-    colour = [a * c for a, c in zip(albedo, row["colour"], strict=True)]
-    return encoded((colour[0], colour[1], colour[2])) if data["dimension"] == 3 else colour
-
-
-def _counted(names: Iterable[str]) -> str:
-    """``2 squares, a pentagon and a star``."""
-    counts = Counter(names)
-    return _listed([_several(name, n) for name, n in counts.most_common(MOST)], len(counts))
-
-
-def _several(name: str, count: int) -> str:
-    if count == 1:
-        return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-    return f"{count:,} {_PLURALS.get(name, f'{name}s')}"
 
 
 def _listed(names: list[str], count: int) -> str:
@@ -185,6 +173,9 @@ def view_of(
     elements = (*form.shapes, *form.paints) if form else program.elements
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
     geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
+    figures = manifest.measured.get("sets", {}).get(manifest.set)  # errors on the scenes of its own set
+    measured = {} if figures is None else {"cap": manifest.measured.get("psnr_cap_db")}
+    measured |= {} if figures is None else {key: figures[key] for key in ("scenes", "psnr", "flip")}
     data: dict[str, Any] = {
         "format": FORMAT,
         "title": title,
@@ -194,7 +185,7 @@ def view_of(
             "name": manifest.name,
             "summary": manifest.summary,
             "weights": digest,
-            "measured": _measured(manifest),
+            "measured": measured,
         },
         "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [
@@ -222,15 +213,6 @@ def view_of(
         data |= solid.shader(network, store)
     data["alt"] = alternative(data)
     return View(data, store.bytes())
-
-
-def _measured(manifest: Manifest) -> dict[str, Any]:
-    """Errors of a model against exact pictures, on the scenes of its own set."""
-    figures = manifest.measured.get("sets", {}).get(manifest.set)
-    if figures is None:
-        return {}
-    cap = manifest.measured.get("psnr_cap_db")
-    return {"cap": cap, **{key: figures[key] for key in ("scenes", "psnr", "flip")}}
 
 
 MOST_TITLE: Final = 200
@@ -400,11 +382,13 @@ def scene_view(
     form = None
     if evaluation is not None:
         form = form_of(evaluation, load_manifest(program.model), program.elements)
-        first = evaluation.sources[0].name
-        own = [text for text in evaluation.sources if not library.holds(text)]
-        source = [(_shown(text.name, first), text.text) for text in own]
-    elif scene is not None and len(text := scene.to_nsg()) <= _MOST_TEXT:
-        source = [(f"{title or 'scene'}.nsg", text)]
+        folder = os.path.dirname(evaluation.sources[0].name)
+        for text in evaluation.sources:
+            if not library.holds(text):  # a file outside the folder is shown without its path
+                place = os.path.relpath(text.name, folder).replace(os.sep, "/")
+                source.append((Path(text.name).name if place.startswith("../") else place, text.text))
+    elif scene is not None and len(written := scene.to_nsg()) <= _MOST_TEXT:
+        source = [(f"{title or 'scene'}.nsg", written)]
     animation = None if scene is None else scene.animation
     return view_of(program, title=title, source=source, form=form, animation=animation)
 
@@ -448,9 +432,3 @@ def _packed(picture: PIL.Image.Image) -> bytes:
         if data.tell() <= _MOST_STILL:
             break
     return data.getvalue()
-
-
-def _shown(name: str, first: str) -> str:
-    """A file's name on a page: its path from the scene's folder; of a file outside it the last part alone."""
-    place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
-    return Path(name).name if place.startswith("../") else place

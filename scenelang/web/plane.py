@@ -123,17 +123,13 @@ def leaves(network: FramedArrays) -> list[Leaf]:
             gaps = [n - (middle - rise) / min(far, 1.0) for n in (*abs(p), radius)]
             bounds = tuple([float(gap[seen].max()) + off for gap in gaps])
             inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
-        result.append(Leaf(*_pruned(layers), far, bounds, inner))
+        (w, b), (v, c), (u, d) = layers
+        first = b + RADIUS * np.hypot(*w.T) > 0  # without the units that are nowhere above zero
+        w, b, v = w[first], b[first], v[:, first]
+        second = _firing(w, b, v, c)
+        kept = np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
+        result.append(Leaf(*kept, far, bounds, inner))
     return result
-
-
-def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
-    """The layers of a `Leaf`: a decoder without the units that are nowhere above zero."""
-    (w, b), (v, c), (u, d) = layers
-    first = b + RADIUS * np.hypot(*w.T) > 0
-    w, b, v = w[first], b[first], v[:, first]
-    second = _firing(w, b, v, c)
-    return np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
 
 
 def _firing(w: Floats, b: Floats, v: Floats, c: Floats) -> npt.NDArray[np.bool_]:
