@@ -60,48 +60,40 @@ def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pyte
         assert use.symbol.span == place, name
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "head"),
-    [
-        ("|", "file", ""),
-        ("group { | }", "group", "group"),
-        ("group { for (i in 0..3) { | } }", "group", "group"),
-        ("chain { smooth star { | } }", "object", "star"),
-        ("chain { square; | }", "chain", "chain"),
-        ("subtract { | }", "group", "subtract"),
-        ("module m(a) { if (a) { } else { | } }", "group", "module"),
-        ("square { material flat { | } }", "material", "material"),
-        ("let m = material flat { | };", "material", "let"),
-        ("let m = 1; square { m { | } }", "material", "m"),
-        ("m(1) { | }", "object", "m"),
-        ("square { group { a } | ", "object", "square"),
-    ],
-)
-def test_the_kind_of_block_is_read_off_tokens(text: str, kind: str, head: str) -> None:
-    offset = text.index("|")
-    block = cursor_at(tokens_of(text), offset, frozenset({"m"}) if "let m" in text else frozenset()).block
-    assert (block.kind, block.head) == (kind, head)
+BLOCKS = [
+    ("|", "file", ""),
+    ("group { | }", "group", "group"),
+    ("group { for (i in 0..3) { | } }", "group", "group"),
+    ("chain { smooth star { | } }", "object", "star"),
+    ("chain { square; | }", "chain", "chain"),
+    ("subtract { | }", "group", "subtract"),
+    ("module m(a) { if (a) { } else { | } }", "group", "module"),
+    ("square { material flat { | } }", "material", "material"),
+    ("let m = material flat { | };", "material", "let"),
+    ("let m = 1; square { m { | } }", "material", "m"),
+    ("m(1) { | }", "object", "m"),
+    ("square { group { a } | ", "object", "square"),
+]
+CALLS: list[tuple[str, str, int, str | None, set[str]]] = [
+    ("f(|", "f", 0, None, set()),
+    ("f(1, g(2, 3), |", "f", 2, None, set()),
+    ("f(1, g(2, |", "g", 1, None, set()),
+    ("f(a = 1, b = |", "f", 1, "b", {"a"}),
+    ("f([1, 2, |], 3", "f", 0, None, set()),
+    ("lib.f(1, |", "lib.f", 1, None, set()),
+    ("square { scale(0.5, | ); }", "scale", 1, None, set()),
+]
 
 
-@pytest.mark.parametrize(
-    ("text", "name", "index", "named", "given"),
-    [
-        ("f(|", "f", 0, None, ()),
-        ("f(1, g(2, 3), |", "f", 2, None, ()),
-        ("f(1, g(2, |", "g", 1, None, ()),
-        ("f(a = 1, b = |", "f", 1, "b", ("a",)),
-        ("f([1, 2, |], 3", "f", 0, None, ()),
-        ("lib.f(1, |", "lib.f", 1, None, ()),
-        ("square { scale(0.5, | ); }", "scale", 1, None, ()),
-    ],
-)
-def test_the_call_around_the_cursor(
-    text: str, name: str, index: int, named: str | None, given: tuple[str, ...]
-) -> None:
-    offset = text.index("|")
-    call = cursor_at(tokens_of(text), offset).call
-    assert call is not None
-    assert (call.name, call.index, call.named, call.given) == (name, index, named, frozenset(given))
+def test_blocks_and_calls_are_read_off_tokens() -> None:
+    for text, kind, head in BLOCKS:
+        values = frozenset({"m"}) if "let m" in text else frozenset()
+        block = cursor_at(tokens_of(text), text.index("|"), values).block
+        assert (block.kind, block.head) == (kind, head), text
+    for text, name, index, named, given in CALLS:
+        call = cursor_at(tokens_of(text), text.index("|")).call
+        assert call is not None, text
+        assert (call.name, call.index, call.named, call.given) == (name, index, named, given), text
 
 
 def test_parentheses_that_call_nothing_are_no_call() -> None:

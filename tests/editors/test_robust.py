@@ -15,17 +15,8 @@ from tests.editors.client import PATIENCE_S, Client
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PIECES = [
     *"{}()[];,.\"'/=#é𝄞\t\n",
-    *(
-        "\r\n",
-        "let x = ",
-        "square { scale(0.5); }\n",
-        'import "a.nsg" as b;\n',
-        "lib.",
-        "/*",
-        "*/",
-        "30deg",
-        "rotate(",
-    ),
+    *("\r\n", "let x = ", "square { scale(0.5); }\n", 'import "a.nsg" as b;\n'),
+    *("lib.", "/*", "*/", "30deg", "rotate("),
 ]
 FEATURES = ("hover", "completion", "signatureHelp", "definition", "documentHighlight", "prepareRename")
 WHOLE = ("documentSymbol", "foldingRange", "documentColor", "documentLink", "semanticTokens/full")
@@ -80,12 +71,6 @@ def test_a_missing_library_is_one_line_that_says_what_to_do() -> None:
     )
     assert done.returncode == 2
     assert done.stderr.strip() == "Error: the language server needs pygls: pip install 'scenelang[lsp]'"
-
-
-def test_stdio_and_tcp_exclude_each_other() -> None:
-    command = [sys.executable, "-m", "scenelang", "lsp", "--stdio", "--tcp", "4000"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-    assert done.returncode == 2
 
 
 def test_a_log_is_written_where_asked(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -27,16 +26,8 @@ class Server:
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
         assert self.process.stdout is not None
-        self.process.stdout.readline()
-        self.url = self.process.stdout.readline().strip()
-        assert self.url, self.process.stderr and self.process.stderr.read()
-
-    @property
-    def origin(self) -> str:
-        """Scheme, host and port."""
-        found = re.match(r"http://[^/]+", self.url)
-        assert found is not None
-        return found[0]
+        self.url = next(line.strip() for line in self.process.stdout if line.startswith("http://"))
+        self.origin = self.url.rsplit("/", 2)[0]
 
     def connect(self, name: str, **options: Any) -> ClientConnection:
         """A websocket."""

@@ -30,16 +30,15 @@ def folder(tmp_path: Path) -> Folder:
     return Folder(inside)
 
 
-@pytest.mark.parametrize("name", ESCAPES)
-def test_names_that_lead_elsewhere(folder: Folder, name: str) -> None:
-    for ask in (
-        lambda: folder.read(name),
-        lambda: folder.write(name, "x", None),
-        lambda: folder.rename("a.nsg", name),
-        lambda: folder.rename(name, "b.nsg"),
-    ):
+def test_names_that_lead_elsewhere(folder: Folder) -> None:
+    for name in ESCAPES:
         with pytest.raises(Refused):
-            ask()
+            folder.read(name)
+        with pytest.raises(Refused):
+            folder.write(name, "x", None)
+        for names in (("a.nsg", name), (name, "b.nsg")):
+            with pytest.raises(Refused):
+                folder.rename(*names)
     assert (folder.path.parent / "out.nsg").read_text() == "outside"
     assert [path.name for path in folder.path.iterdir()] == ["a.nsg"]
 
@@ -102,23 +101,16 @@ def test_line_ends_stay(folder: Folder) -> None:
     assert (folder.path / "a.nsg").read_bytes() == b"square;\r\ntriangle;\r\nstar;\r\n"
 
 
-@pytest.mark.parametrize("data", [b"\xff", b"x" * 10_000_001])
-def test_what_is_not_a_scene_is_not_read(folder: Folder, data: bytes) -> None:
-    (folder.path / "b.nsg").write_bytes(data)
-    with pytest.raises(Refused):
-        folder.read("b.nsg")
-
-
-def test_nothing_waits_for_a_pipe(folder: Folder) -> None:
+def test_what_is_not_a_scene_is_neither_read_nor_written(folder: Folder) -> None:
     os.mkfifo(folder.path / "pipe.nsg")
-    with pytest.raises(Refused):
-        folder.read("pipe.nsg")
-
-
-def test_what_is_too_large_is_not_written(folder: Folder) -> None:
+    (folder.path / "binary.nsg").write_bytes(b"\xff")
+    (folder.path / "large.nsg").write_bytes(b"x" * 10_000_001)
+    for name in ("pipe.nsg", "binary.nsg", "large.nsg"):
+        with pytest.raises(Refused):
+            folder.read(name)
     with pytest.raises(Refused):
         folder.write("big.nsg", "x" * 10_000_001, None)
-    assert folder.names() == ["a.nsg"]
+    assert not (folder.path / "big.nsg").exists()
 
 
 def test_renaming_takes_no_other_name(folder: Folder) -> None:

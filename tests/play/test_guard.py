@@ -6,7 +6,6 @@ import asyncio
 from typing import Any, NamedTuple
 from urllib.parse import unquote
 
-import pytest
 from starlette.applications import Starlette
 from starlette.datastructures import Headers
 from starlette.requests import Request
@@ -65,65 +64,41 @@ def ask(guarded: Guard, address: str, kind: str = "http", **headers: str | list[
     return Answer(code, Headers(raw=list(first.get("headers", ()))), text)
 
 
-@pytest.mark.parametrize(
-    ("path", "headers", "code"),
-    [
-        (f"/{TOKEN}/", {}, 200),
-        (f"/{TOKEN}/static/play.js", {"origin": f"http://{HERE}", "sec_fetch_site": "same-origin"}, 200),
-        (f"/static/play.js?token={TOKEN}", {}, 200),
-        (f"/{TOKEN}/", {"host": "localhost:8766"}, 200),
-        (f"/{TOKEN}/", {"host": "[::1]:8766"}, 200),
-        (f"/{TOKEN}/", {"host": "LOCALHOST"}, 200),
-        (f"/{TOKEN}", {}, 303),
-        (f"/?token={TOKEN}", {}, 303),
-        # the token
-        ("/", {}, 403),
-        (f"/{TOKEN[:-1]}/", {}, 403),
-        (f"/{TOKEN}t/", {}, 403),
-        (f"/{TOKEN.upper()}/", {}, 403),
-        ("/%C3%A9%ED%A0%80/", {}, 403),
-        ("/static/play.js?token=", {}, 403),
-        (f"/static/play.js?token={TOKEN}x", {}, 403),
-        (f"//{TOKEN}/", {}, 403),
-        ("/open/None", {}, 403),
-        ("/open/", {}, 403),
-        # the host
-        (f"/{TOKEN}/", {"host": "evil.example"}, 403),
-        (f"/{TOKEN}/", {"host": "evil.example:8766"}, 403),
-        (f"/{TOKEN}/", {"host": "127.0.0.1.evil.example:8766"}, 403),
-        (f"/{TOKEN}/", {"host": "localhost.evil.example"}, 403),
-        (f"/{TOKEN}/", {"host": "192.168.1.7:8766"}, 403),
-        (f"/{TOKEN}/", {"host": "127.0.0.1:8766:1"}, 403),
-        (f"/{TOKEN}/", {"host": ""}, 403),
-        (f"/{TOKEN}/", {"host": []}, 403),
-        (f"/{TOKEN}/", {"host": [HERE, "evil.example"]}, 403),
-        # the origin
-        (f"/{TOKEN}/", {"origin": "http://evil.example"}, 403),
-        (f"/{TOKEN}/", {"origin": "null"}, 403),
-        (f"/{TOKEN}/", {"origin": [f"http://{HERE}", "http://evil.example"]}, 403),
-        (f"/{TOKEN}/", {"origin": f"https://{HERE}"}, 403),
-        (f"/{TOKEN}/", {"origin": "http://127.0.0.1:9999"}, 403),
-        (f"/{TOKEN}/", {"origin": "http://localhost:8766"}, 403),
-        (f"/{TOKEN}/", {"origin": f"http://{HERE}.evil.example"}, 403),
-        (f"/{TOKEN}/", {"sec_fetch_site": "cross-site"}, 403),
-        (f"/{TOKEN}/", {"sec_fetch_site": "same-site"}, 403),
-    ],
-)
-def test_requests(path: str, headers: dict[str, Any], code: int) -> None:
-    found = ask(guard(), path, **headers)
-    assert found.code == code
-    for name, value in HEADERS.items():
-        assert found.headers[name] == value
-    assert "default-src 'none'" in found.headers["content-security-policy"]
-    assert "set-cookie" not in found.headers
-    if code == 403:
-        assert TOKEN not in found.text + str(found.headers)
-    if code == 303:
-        assert found.headers["location"] == f"/{TOKEN}/"
+PAGE = f"/{TOKEN}/"
+FINE: list[tuple[str, dict[str, Any], int]] = [
+    (PAGE, {}, 200),
+    (f"{PAGE}static/play.js", {"origin": f"http://{HERE}", "sec_fetch_site": "same-origin"}, 200),
+    (f"/static/play.js?token={TOKEN}", {}, 200),
+    *((PAGE, {"host": host}, 200) for host in ("localhost:8766", "[::1]:8766", "LOCALHOST")),
+    (f"/{TOKEN}", {}, 303),
+    (f"/?token={TOKEN}", {}, 303),
+]
+PATHS = ("/", f"/{TOKEN[:-1]}/", f"/{TOKEN}t/", f"/{TOKEN.upper()}/", "/%C3%A9%ED%A0%80/", f"//{TOKEN}/")
+PATHS += ("/static/play.js?token=", f"/static/play.js?token={TOKEN}x", "/open/None", "/open/")
+HOSTS = ("evil.example", "evil.example:8766", "127.0.0.1.evil.example:8766", "localhost.evil.example")
+HOSTS += ("192.168.1.7:8766", "127.0.0.1:8766:1", "", [], [HERE, "evil.example"])  # type: ignore[assignment]
+ORIGINS = ("http://evil.example", "null", [f"http://{HERE}", "http://evil.example"], f"https://{HERE}")
+ORIGINS += ("http://127.0.0.1:9999", "http://localhost:8766", f"http://{HERE}.evil.example")
+REFUSED: list[tuple[str, dict[str, Any], int]] = [
+    *((path, {}, 403) for path in PATHS),
+    *((PAGE, {"host": host}, 403) for host in HOSTS),
+    *((PAGE, {"origin": origin}, 403) for origin in ORIGINS),
+    *((PAGE, {"sec_fetch_site": site}, 403) for site in ("cross-site", "same-site")),
+]
 
 
-def test_the_token_is_taken_off_the_path() -> None:
-    assert ask(guard(), f"/{TOKEN}/static/viewer/gl.js").text == "/static/viewer/gl.js"
+def test_requests() -> None:
+    for path, headers, code in [*FINE, *REFUSED]:
+        found = ask(guard(), path, **headers)
+        assert found.code == code, (path, headers)
+        assert {name: found.headers[name] for name in HEADERS} == HEADERS
+        assert "default-src 'none'" in found.headers["content-security-policy"]
+        assert "set-cookie" not in found.headers
+        if code == 403:
+            assert TOKEN not in found.text + str(found.headers)
+        if code == 303:
+            assert found.headers["location"] == PAGE
+    assert ask(guard(), f"{PAGE}static/viewer/gl.js").text == "/static/viewer/gl.js"
 
 
 def test_a_browser_is_led_to_the_page_once() -> None:
@@ -136,34 +111,29 @@ def test_a_browser_is_led_to_the_page_once() -> None:
     assert ask(guarded, guarded.once).code == 403
 
 
-@pytest.mark.parametrize(
-    ("path", "headers"),
-    [
-        (f"/{TOKEN}/live", {}),  # no origin at all
-        (f"/{TOKEN}/live", {"origin": "http://evil.example"}),
-        (f"/{TOKEN}/live", {"origin": "null"}),
-        (f"/{TOKEN}/live", {"origin": f"http://{HERE}", "host": "evil.example"}),
-        (f"/{TOKEN}/live", {"origin": "http://evil.example", "host": "evil.example"}),
-        (f"/{TOKEN}/live", {"origin": f"http://{HERE}", "sec_fetch_site": "cross-site"}),
-        ("/live", {"origin": f"http://{HERE}"}),
-        ("/live?token=x", {"origin": f"http://{HERE}"}),
-    ],
-)
-def test_foreign_websockets_are_refused(path: str, headers: dict[str, str]) -> None:
-    assert ask(guard(), path, "websocket", **headers).code == 403
+def test_websockets() -> None:
+    here, evil = f"http://{HERE}", "http://evil.example"
+    for path, headers in (
+        (f"{PAGE}live", {}),  # no origin at all
+        (f"{PAGE}live", {"origin": evil}),
+        (f"{PAGE}live", {"origin": "null"}),
+        (f"{PAGE}live", {"origin": here, "host": "evil.example"}),
+        (f"{PAGE}live", {"origin": evil, "host": "evil.example"}),
+        (f"{PAGE}live", {"origin": here, "sec_fetch_site": "cross-site"}),
+        ("/live", {"origin": here}),
+        ("/live?token=x", {"origin": here}),
+    ):
+        assert ask(guard(), path, "websocket", **headers).code == 403, (path, headers)
+    for path in (f"{PAGE}live", f"/live?token={TOKEN}"):
+        assert ask(guard(), path, "websocket", origin=here).code == 101, path
 
 
-@pytest.mark.parametrize("path", [f"/{TOKEN}/live", f"/live?token={TOKEN}"])
-def test_a_websocket_of_the_page(path: str) -> None:
-    assert ask(guard(), path, "websocket", origin=f"http://{HERE}").code == 101
-
-
-@pytest.mark.parametrize(
-    ("host", "code"),
-    [("10.0.0.7:8766", 200), ("[fe80::1]:8766", 200), ("box.local", 200), ("evil.example", 403), ("10", 403)],
-)
-def test_a_server_for_others_has_names_and_numbers(host: str, code: int) -> None:
-    assert ask(guard(hosts=("box.local",), anywhere=True), f"/{TOKEN}/", host=host).code == code
+def test_a_server_for_others_has_names_and_numbers() -> None:
+    known = guard(hosts=("box.local",), anywhere=True)
+    for host, code in (("10.0.0.7:8766", 200), ("[fe80::1]:8766", 200), ("box.local", 200)):
+        assert ask(known, PAGE, host=host).code == code, host
+    for host in ("evil.example", "10"):
+        assert ask(known, PAGE, host=host).code == 403, host
 
 
 def test_the_page_can_load_nothing_from_elsewhere() -> None:
@@ -174,9 +144,6 @@ def test_the_page_can_load_nothing_from_elsewhere() -> None:
     assert "unsafe" not in policy("abc", HERE)
 
 
-@pytest.mark.parametrize(
-    ("host", "local"),
-    [("127.0.0.1", True), ("localhost", True), ("127.9.9.9", True), ("0.0.0.0", False), ("8.8.8.8", False)],
-)
-def test_what_is_loopback(host: str, local: bool) -> None:
-    assert is_loopback(host) is local
+def test_what_is_loopback() -> None:
+    assert all(map(is_loopback, ("127.0.0.1", "localhost", "127.9.9.9")))
+    assert not any(map(is_loopback, ("0.0.0.0", "8.8.8.8")))

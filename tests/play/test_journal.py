@@ -7,8 +7,6 @@ import os
 import time
 from pathlib import Path
 
-import pytest
-
 from scenelang.web.folder import MOST_DAYS, MOST_KEPT, Journal, state_folder
 
 SCENE = Path("/scenes/a.nsg")
@@ -31,26 +29,16 @@ def test_a_text_is_found_again(tmp_path: Path) -> None:
     journal.drop(SCENE)
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        b"",
-        b"{",
-        b"[]",
-        b"\xff",
-        b'{"file": "/scenes/a.nsg"}',
-        json.dumps({"file": "/other.nsg", "text": "x", "disk": None, "time": 0}).encode(),
-        json.dumps({"file": str(SCENE), "text": 1, "disk": None, "time": 0}).encode(),
-        json.dumps({"file": str(SCENE), "text": "x", "disk": None, "time": "now"}).encode(),
-        b"[" * 100_000,
-    ],
-)
-def test_damaged_entries_are_none(tmp_path: Path, data: bytes) -> None:
+def test_damaged_entries_are_none(tmp_path: Path) -> None:
+    good = {"file": str(SCENE), "text": "x", "disk": None, "time": 0}
+    changes = ({"file": "/other.nsg"}, {"text": 1}, {"time": "now"})
+    wrong = [json.dumps({**good, **change}).encode() for change in changes]
     journal = Journal(tmp_path)
     journal.keep(SCENE, "x", None)
     (entry,) = tmp_path.iterdir()
-    entry.write_bytes(data)
-    assert journal.find(SCENE) is None
+    for data in (*wrong, b"", b"{", b"[]", b"\xff", b'{"file": "/scenes/a.nsg"}', b"[" * 100_000):
+        entry.write_bytes(data)
+        assert journal.find(SCENE) is None, data[:80]
 
 
 def test_old_ones_go(tmp_path: Path) -> None:
@@ -66,15 +54,13 @@ def test_old_ones_go(tmp_path: Path) -> None:
     assert kept == [n for n in range(4, MOST_KEPT + 5) if n != 50]
 
 
-@pytest.mark.parametrize(
-    ("environment", "platform", "expected"),
-    [
+def test_where_it_lies() -> None:
+    home = Path.home()
+    for environment, platform, expected in (
         ({"SCENELANG_STATE": "/own", "XDG_STATE_HOME": "/x"}, "linux", Path("/own")),
         ({"XDG_STATE_HOME": "/x"}, "linux", Path("/x/scenelang")),
-        ({"XDG_STATE_HOME": "x"}, "linux", Path.home() / ".local/state/scenelang"),
-        ({}, "darwin", Path.home() / "Library/Application Support/scenelang"),
+        ({"XDG_STATE_HOME": "x"}, "linux", home / ".local/state/scenelang"),
+        ({}, "darwin", home / "Library/Application Support/scenelang"),
         ({"LOCALAPPDATA": "/local"}, "win32", Path("/local/scenelang")),
-    ],
-)
-def test_where_it_lies(environment: dict[str, str], platform: str, expected: Path) -> None:
-    assert state_folder(environment, platform) == expected
+    ):
+        assert state_folder(environment, platform) == expected

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -189,43 +188,6 @@ def drawable(source: SourceFile, **inputs: Any) -> tuple[Form, Compiled | None] 
     except SceneError:
         return form_of(evaluation, manifest), None
     return expected.form(), expected
-
-
-def solid_text(pick: random.Random, depth: int = 3) -> str:
-    """A random scene of solids."""
-
-    def numbers(count: int, low: float, high: float) -> str:
-        return ", ".join(f"{pick.uniform(low, high):.3f}" for _ in range(count))
-
-    def moves() -> str:
-        axis = pick.choice(["X", "Y", "Z", f"[{numbers(3, -1, 1)}]"])
-        some = [
-            *(
-                f"translate({numbers(3, -2, 2)});",
-                f"scale({numbers(1, 0.3, 1.5)});",
-                f"scale({numbers(3, 0.3, 2)});",
-            ),
-            *(
-                f"rotate({numbers(1, -180, 180)}deg, {axis});",
-                f"shear(xz = {numbers(1, -1, 1)});",
-                "scale(-1, 1, 1);",
-            ),
-            *(f"twirl({numbers(1, -1, 1)});", f"bend({numbers(1, -1, 1)});", f"twist({numbers(1, -1, 1)});"),
-        ]
-        return " ".join(pick.choice(some) for _ in range(pick.choice([0, 1, 1, 2, 4])))
-
-    def node(depth: int) -> str:
-        if depth == 0 or pick.random() < 0.3:
-            bumps = f"displace({numbers(2, 0, 0.2)});" if pick.random() < 0.2 else ""
-            inks = f"color([{numbers(3, 0, 1)}]); hue({numbers(1, 0, 1)}turn); grayscale({numbers(1, 0, 1)});"
-            look = f"material {pick.choice(['diffuse', 'volumetric'])} {{ {inks} }}" * pick.randint(0, 1)
-            return f"{pick.choice(['sphere', 'torus'])} {{ {bumps} {moves()} {look} }}"
-        words = ["group", "union", "subtract", "intersect", f"smooth(k = {numbers(1, 0.05, 0.4)})"]
-        children = " ".join(node(depth - 1) for _ in range(pick.choice([0, 1, 2, 2, 3])))
-        return f"{pick.choice(words)} {{ {children} {moves()} }}"
-
-    camera = f"camera([{numbers(2, -9, 9)}, 20], fov = {numbers(1, 10, 90)}deg);"
-    return f'nsg 1; model "solids3d"; {camera} {node(depth)} {node(depth)}'
 
 
 def sources(root: Path) -> Iterator[SourceFile]:

@@ -195,9 +195,3 @@ def test_orbits_zooms_and_pans(shown: Any) -> None:
     np.testing.assert_allclose(
         ask(page, "drawn.program.stage.eye && viewer.program.stage.eye"), camera["eye"]
     )
-
-
-def test_the_plane_has_no_camera(shown: Any) -> None:
-    page = shown()
-    ask(page, "viewer.orbit(1, 1), viewer.zoom(2), viewer.pan(1, 1)")
-    assert ask(page, "viewer.camera") is None
