@@ -101,14 +101,7 @@ def _word(name: str, value: Any) -> str:
 
 
 def dump(graph: Graph) -> str:
-    """One line for each node, indented by depth, moves after it from the leaf outwards.
-
-    Example::
-
-        scene 256x256
-          square #d33333  [0.8 0 -0.2; 0 0.8 0]
-          smooth pentagon #ffffff  warp(0.6; 0.2 0) [0.5 0 0; 0 0.5 0]
-    """
+    """One line for each node, indented by depth, with its moves from the leaf outwards."""
     width, height = graph.canvas
     lines = [f"{graph.root.kind} {width}x{height}"]
     lines += [f"  {line}" for line in stage_text(graph.stage)]
@@ -185,11 +178,7 @@ def hex_text(rgb: tuple[float, float, float]) -> str:
 
 
 def graph_data(graph: Graph) -> dict[str, Any]:
-    """A graph: leaves and folds with their moves, nearest the leaf first.
-
-    An affine move is the upper three rows of its matrix; the others are their fields. Solids have a stage,
-    and linear colours.
-    """
+    """A graph: leaves and folds with their moves, nearest the leaf first, affine ones as matrices."""
     with deep_stack():
         root = _node(graph.root)
     return {
@@ -286,10 +275,7 @@ def common_start(left: Sequence[str], right: Sequence[str]) -> int:
 
 
 def changes(before: str, after: str, old: str, new: str) -> str:
-    """The diff of two dumps; empty where nothing changed.
-
-    Comparing line by line takes quadratic time, so only the size of very large changes is given.
-    """
+    """The diff of two dumps; of very large changes, which take quadratic time, only the size."""
     if before == after:
         return ""
     a, b = before.splitlines(), after.splitlines()
@@ -310,20 +296,13 @@ T = TypeVar("T")
 
 
 class Box(NamedTuple):
-    """A node of a drawing.
-
-    Args:
-        lines: its text.
-        fill: its colour.
-        leaf: whether its corners are round.
-        parent: number of the box whose arrow leads here, and the word on it.
-    """
+    """A node of a drawing."""
 
     lines: tuple[str, ...]
     fill: str | None = None
-    leaf: bool = False
-    parent: int | None = None
-    word: str = ""
+    leaf: bool = False  # with round corners
+    parent: int | None = None  # number of the box whose arrow leads here
+    word: str = ""  # on that arrow
 
 
 class Drawing(NamedTuple):

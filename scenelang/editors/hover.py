@@ -35,11 +35,7 @@ _TABLES: Final = {
 def hover(
     docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
 ) -> types.Hover | None:
-    """The hover at an offset.
-
-    Args:
-        picture: gives an element's picture in Markdown.
-    """
+    """The hover at an offset; ``picture`` gives an element's picture in Markdown."""
     use = document.names.at(offset)
     if use is not None:
         text = _elements(docs, document, use, picture) or _use(docs, document, use)

@@ -71,11 +71,7 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
 
 
 def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
-    """The name at an offset, where it may be changed.
-
-    Raises:
-        Refused: it belongs to the language or to a model.
-    """
+    """The name at an offset; raises `Refused` where it belongs to the language or to a model."""
     use = document.names.at(offset)
     if use is None:
         return None
@@ -89,10 +85,7 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
 def rename(
     docs: Workspace, document: Document, offset: int, new: str, versioned: bool
 ) -> types.WorkspaceEdit | None:
-    """Rename a definition and all its uses, in all files.
-
-    Args:
-        versioned: whether the client supports edits of a version of a document.
+    """Rename a definition and all its uses, in all files, in versioned edits where the client takes them.
 
     Raises:
         Refused: the new name is not a name, or would mean something else somewhere.

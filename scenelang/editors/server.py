@@ -162,11 +162,7 @@ def _fix_all(document: Document, diagnostics: Sequence[Diagnostic]) -> list[type
 
 
 def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
-    """Edits that format a text, or the statements that a range touches.
-
-    Raises:
-        SceneError: the text has syntax errors.
-    """
+    """Edits that format a text, or the statements of a range; raises `SceneError` for syntax errors."""
     from scenelang.language.formatting import format_range, format_text
 
     text, name = document.text, document.source.name

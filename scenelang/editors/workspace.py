@@ -1,13 +1,7 @@
 """Documents of the client, their imports and positions, and the check that runs in the background.
 
-The protocol counts lines, ended by LF, CRLF or CR, and columns in code units of an encoding that client and
-server agree on; everything here counts code points of the whole text.
-
-A check does not touch a `Document`: it gets its input when it begins and returns one value, so that it may
-run while the user edits.
-
-An open buffer stands for its file, which need not be on the disk yet. Files that are not open are read when
-they are needed, and again when they have changed.
+Offsets count code points of the whole text. A check does not touch a `Document`: it gets its input when it
+begins and returns one value, so that it may run while the user edits. An open buffer stands for its file.
 """
 
 from __future__ import annotations
@@ -145,12 +139,7 @@ class Superseded(Exception):
 
 @dataclass(slots=True)
 class Seen:
-    """Values or nodes of one place during an evaluation.
-
-    Args:
-        values: the first few of the first frame, in order, each once.
-        count: the number of all.
-    """
+    """The first few values or nodes of one place in an evaluation, each once, and the number of all."""
 
     values: list[Any] = field(default_factory=list)
     count: int = 0
@@ -158,20 +147,13 @@ class Seen:
 
 @dataclass(slots=True)
 class Checked:
-    """The result of a check.
-
-    Args:
-        diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
-        wanted: the files that it imports, also those that are not there.
-        seen: by file name, start and end: values of names, nodes of statements.
-        manifest: the model that draws it, where that is known.
-    """
+    """The result of a check."""
 
     source: SourceFile
-    diagnostics: list[Diagnostic]
-    wanted: frozenset[Path]
-    seen: dict[tuple[str, int, int], Seen]
-    manifest: Manifest | None = None
+    diagnostics: list[Diagnostic]  # of evaluation and compiler
+    wanted: frozenset[Path]  # the files that it imports, also those that are not there
+    seen: dict[tuple[str, int, int], Seen]  # by file name, start and end
+    manifest: Manifest | None = None  # the model that draws it, where that is known
 
 
 def check(
@@ -183,19 +165,14 @@ def check(
     parsed: bool,
     stop: threading.Event,
 ) -> Checked:
-    """Evaluate a scene and run the compiler's checks.
+    """Evaluate a scene and run the compiler's checks; raises `Superseded` where ``stop`` was set meanwhile.
 
     Args:
-        file: the tree.
-        path: its file, if it has one.
+        file, path: the tree, and its file if it has one.
         root: the folder that imports cannot leave; by default the file's.
         texts: texts of open files.
         model: draw with this model instead of the scene's.
         parsed: the text has no syntax mistakes.
-        stop: asks it to give up.
-
-    Raises:
-        Superseded: ``stop`` was set meanwhile.
     """
     result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
@@ -274,25 +251,16 @@ MAX_TEXT: Final = 2_000_000
 
 @dataclass(eq=False)
 class Document:
-    """A text with its tree and what is known about it.
-
-    Args:
-        uri: its address for the client.
-        path: its resolved file; None for a buffer that has none.
-        version: the client's number of this text; None for a file that is not open.
-        checked: the last evaluation that ended, perhaps of an older text.
-        edits: the edits since that.
-        semantic: its diagnostics, at their current places.
-    """
+    """A text with its tree and what is known about it."""
 
     uri: str
-    path: Path | None
+    path: Path | None  # resolved; None for a buffer that has none
     source: SourceFile
-    version: int | None = None
+    version: int | None = None  # the client's number of this text; None for a file that is not open
     encoding: Encoding = "utf-16"
-    checked: Checked | None = None
-    edits: list[Edit] = field(default_factory=list)
-    semantic: list[Diagnostic] = field(default_factory=list)
+    checked: Checked | None = None  # of the last evaluation that ended, perhaps of an older text
+    edits: list[Edit] = field(default_factory=list)  # since that
+    semantic: list[Diagnostic] = field(default_factory=list)  # of that, at their current places
 
     @property
     def name(self) -> str:

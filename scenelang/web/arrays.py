@@ -1,14 +1,8 @@
 """Parts of a page: its script, the blob of arrays, elements, and the rows of a Program.
 
-The files of ``viewer/`` are ES modules for the sake of editors and tests. A page gets them one after the
-other in one scope, without imports and exports, so names at their top level differ across all of them.
-
-Arrays lie in one blob. The data names an array as ``[kind, offset, count]``: a kind of `KINDS`, an offset in
-bytes into the blob, a multiple of 4, and a count of numbers. Pyramids of elements are unfolded by the page
-(``viewer/grids.js``), as their steps, deflated, are a fifth of the grid.
-
-Rows of a Program never change; those of a scene with params are made by the page's evaluator
-(``viewer/graph.js``).
+The files of ``viewer/`` are ES modules; a page gets them one after the other in one scope, so names at their
+top level differ across all of them. The data names an array in the blob as ``[kind, offset, count]``: a kind
+of `KINDS`, bytes, a multiple of 4, and a count of numbers.
 """
 
 from __future__ import annotations
@@ -96,11 +90,7 @@ def packed(data: bytes) -> str:
 
 
 def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
-    """Entries of a view's ``shapes`` for the geometries among elements.
-
-    Raises:
-        ProgramError: one is damaged.
-    """
+    """Entries of a view's ``shapes`` for the geometries among elements; raises `ProgramError`."""
     return [_shape(element, store) for element in elements if not element.material]
 
 
@@ -177,11 +167,6 @@ Step = list[Any]
 
 def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_codes: np.ndarray) -> list[Row]:
     """Rows of a Program as JSON data, see docs/architecture.md.
-
-    Args:
-        program: compiled for the manifest's model.
-        codes: (geometries, C) of its weights.
-        material_codes: (materials, .) likewise.
 
     Raises:
         ProgramError: a vector is not one that a scene compiles to.

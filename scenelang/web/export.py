@@ -128,12 +128,7 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The content of a page.
-
-    Args:
-        data: JSON data; docs/architecture.md has its parts.
-        blob: the arrays that it names.
-    """
+    """The content of a page: JSON data, see docs/architecture.md, and the arrays that it names."""
 
     data: dict[str, Any]
     blob: bytes = field(repr=False)
@@ -151,14 +146,11 @@ def view_of(
     form: Form | None = None,
     animation: Animation | None = None,
 ) -> View:
-    """The view of a Program; without a form its numbers never change.
+    """The view of a Program that was compiled for a shipped model.
 
     Args:
-        program: compiled for a shipped model.
-        title: of the page.
         source: names and texts of the files that it was compiled from.
-        form: of the scene that it was compiled from.
-        animation: of that scene.
+        form: of the scene that it was compiled from; without one its numbers never change.
 
     Raises:
         ProgramError: it was compiled for other weights, or no page can draw its model.
@@ -228,7 +220,6 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     """An HTML file that draws a view; nothing in it comes from elsewhere, and its policy allows nothing to.
 
     Args:
-        view: what it shows.
         still: a WebP for browsers without WebGL2 or JavaScript.
         embedded: leave out heading, sources and licences, for a frame in another page.
     """
@@ -370,14 +361,7 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]
 def scene_view(
     program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
 ) -> View:
-    """The view of a compiled scene.
-
-    Args:
-        program: compiled from the scene; the page shows it at first.
-        scene: None for a Program from a file.
-        evaluation: of the scene's text, after the run that gave the scene; None for one without text.
-        title: of the page.
-    """
+    """The view of a compiled scene, None for a Program from a file; the evaluation is that of its text."""
     source: list[tuple[str, str]] = []
     form = None
     if evaluation is not None:
@@ -403,11 +387,7 @@ def still(program: Program) -> bytes:
 def frame(value: Scene | Program, picture: Image) -> str:
     """The viewer of a Scene or a Program as HTML for a notebook, in a frame that may run scripts alone.
 
-    Args:
-        picture: of the value, for browsers that cannot draw it.
-
-    Returns:
-        The HTML, empty where no page can draw its model.
+    Empty where no page can draw its model. Browsers that cannot draw it show ``picture``.
     """
     program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
     try:

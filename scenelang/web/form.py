@@ -1,12 +1,9 @@
 """Scenes as forms: their own program as JSON, for the evaluator that runs in a page.
 
-A form is the syntax trees of a scene's files without places and unused names, with names resolved. The scene
-has no mistakes. Words that the page's model does not have are ``["no", why]``, an error only where they run:
-they may stand in a branch that is never taken.
-
-An expression is a number, a boolean, or a list of a word and its operands; a statement is a list likewise; a
-block is a list of statements. ``["g", slot]`` is a variable of a file, and ``["v", hops, slot]`` one of the
-call so many definitions further out. ``viewer/evaluate.js`` runs them.
+A form is the trees of a scene's files, without mistakes, names resolved. An expression is a number, a
+boolean, or a list of a word and its operands; a statement is a list likewise, a block a list of statements.
+``["g", slot]`` is a variable of a file, ``["v", hops, slot]`` one of the call so many definitions further
+out, and ``["no", why]`` a word that the page's model does not have: an error only where it runs.
 """
 
 from __future__ import annotations
@@ -108,13 +105,7 @@ class Lacking(Exception):
 
 
 class Writer:
-    """Writes the statements of a scene's files as forms.
-
-    Args:
-        context: of the scene's file, prepared.
-        manifest: the model that draws the page.
-        elements: those that come first among `shapes` and `paints`, which rows name.
-    """
+    """Writes statements of a scene's files as forms; ``elements`` come first in `shapes` and `paints`."""
 
     def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
         self.slots = 0  # of all files
@@ -452,28 +443,19 @@ _LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 
 class Form(Record):
-    """A scene's form and its params in a view.
+    """A scene's form and its params in a view."""
 
-    Args:
-        data: JSON for ``evaluateForm``.
-        params: JSON of params that matter to the picture: their values, in radians and seconds, and ranges.
-        fixed: names of those that no page can change, and why.
-        shapes, paints: elements that rows name by index, shapes behind the model's geometries.
-    """
-
-    data: Json
-    params: list[Json]
-    fixed: list[Json]
-    shapes: tuple[Element, ...]
+    data: Json  # for `evaluateForm`
+    params: list[Json]  # that matter to the picture: their values, in radians and seconds, and ranges
+    fixed: list[Json]  # names of those that no page can change, and why
+    shapes: tuple[Element, ...]  # that rows name by index, behind the model's geometries
     paints: tuple[Element, ...]
 
 
 def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> Form:
-    """The form of a scene that was evaluated without errors.
+    """The form of a scene that was evaluated without errors; params start from the values of that run.
 
     Args:
-        evaluation: after a run, whose values params start from.
-        manifest: the model that draws the page.
         elements: those of the Program of that run; they come first among shapes and paints, in their order.
     """
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()

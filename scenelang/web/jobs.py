@@ -1,8 +1,8 @@
 """Jobs of a process for the page: views, pictures, figures and files, of texts that may not be saved.
 
 A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
-other files by their paths, ``root``, ``params``, ``frame``, ``size``, and ``message``, to which the answer's
-data adds the result; a job that makes a file also has ``folder``, an empty one for the duration.
+others by their paths, ``root``, ``params``, ``frame``, ``size``, ``message``, to which the result is added,
+and for a file an empty ``folder``.
 """
 
 from __future__ import annotations

@@ -27,7 +27,6 @@ from scenelang.web.folder import (
     Refused,
     choice_of,
     id_of,
-    in_unit,
     string_of,
     text_of,
     whole_of,
@@ -40,13 +39,7 @@ EXAMPLES: Final = files("scenelang").joinpath("web/editor/examples")  # scenes t
 
 
 class Play:
-    """The state that all pages share.
-
-    Args:
-        folder: the scenes.
-        first: the one to show at first.
-        journal: of unsaved texts.
-    """
+    """The state that all pages share: the scenes, the one to show at first, and unsaved texts."""
 
     def __init__(self, folder: Folder, first: str | None = None, journal: Journal | None = None) -> None:
         self.folder, self.first = folder, first
@@ -225,8 +218,6 @@ class Live:
             id, file = id if isinstance(id, int | str) else None, file if isinstance(file, str) else None
             self.tell({"kind": "error", "id": id, "file": file, "message": why})
 
-    # ------------------------------------------------------------ texts
-
     async def _open(self, message: Json) -> None:
         name = string_of(message, "file")
         path = self._play.folder.place(name)
@@ -238,9 +229,8 @@ class Live:
         known = self.open.get(name)
         if known is None:
             known = self.open[name] = Open(path, text or "", disk)
-        unsaved = None
-        if kept is not None and kept.text != text:
-            unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds}
+        lost = kept is not None and kept.text != text
+        unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds} if kept and lost else None
         known.saved, known.disk = text or "", disk
         if not known.version:
             known.text, known.base = text or "", disk
@@ -343,8 +333,6 @@ class Live:
             if path in known.wanted:
                 self._view(name)
 
-    # ------------------------------------------------------------ jobs
-
     def _view(self, name: str) -> None:
         version = self.open[name].version
 
@@ -394,7 +382,9 @@ class Live:
         """
         known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
-        job["params"] = {k: in_unit(v) if k in known.angles else v for k, v in job["params"].items()}
+        for key, value in job["params"].items():  # a number of radians becomes a literal of the language
+            if key in known.angles and isinstance(value, int | float) and not isinstance(value, bool):
+                job["params"] = {**job["params"], key: f"{value!r}rad"}
         job["path"], job["root"] = str(known.path), None if root is None else str(root)
         job["texts"] = {
             str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version

@@ -29,24 +29,15 @@ Floats = npt.NDArray[np.float64]
 
 
 class Leaf(NamedTuple):
-    """A decoder for shaders, in leaf units.
+    """A decoder for shaders, in leaf units."""
 
-    Args:
-        first: (n, 3) of the units of the first layer: factors of x and y, and bias.
-        second: (m, 1 + n) of those of the second: bias, and factors of the first.
-        last: (m + 1,) factors of these, and bias.
-        far: growth beyond the rim.
-        bounds: (3,) x, y and radius; it is no nearer than |q.x| - x, |q.y| - y and |q| - radius, times `far`
-            where that is below 1.
-        inner: radius of a disc within the shape, 0 where none is known.
-    """
-
-    first: Floats
-    second: Floats
-    last: Floats
-    far: float
+    first: Floats  # (n, 3) of the units of the first layer: factors of x and y, and bias
+    second: Floats  # (m, 1 + n) of those of the second: bias, and factors of the first
+    last: Floats  # (m + 1,) factors of these, and bias
+    far: float  # growth beyond the rim
+    # (3,): it is no nearer than |q.x|, |q.y| and |q| less these, times `far` where that is below 1
     bounds: tuple[float, ...]
-    inner: float
+    inner: float  # radius of a disc within the shape, 0 where none is known
 
 
 def shader(network: FramedArrays, store: Store) -> dict[str, Any]:

@@ -59,12 +59,7 @@ class Worker:
 
 
 class Pool:
-    """Processes for jobs; the one that was used last is used first.
-
-    Args:
-        most: processes at the same time.
-        nice: their niceness.
-    """
+    """Processes for jobs, so many at the same time; the one that was used last is used first."""
 
     def __init__(self, most: int, nice: int = 0) -> None:
         self._nice, self._free = nice, asyncio.Semaphore(most)
@@ -80,13 +75,8 @@ class Pool:
     async def run(self, job: dict[str, Any], limit_s: float, said: Said | None = None) -> Answer:
         """Do a job in a process; where this is cancelled the process is ended.
 
-        Args:
-            job: JSON data, as `scenelang.web.jobs` has them, but for the folder.
-            limit_s: seconds that it may take, without the wait for others.
-            said: called with the share done.
-
         Raises:
-            JobFailed: it failed, took too long, or its process ended.
+            JobFailed: it failed, took more than ``limit_s`` seconds without the wait, or its process ended.
         """
         loop = asyncio.get_running_loop()
 

@@ -65,8 +65,6 @@ class Guard:
     """Middleware that lets requests through that have the token, come from the page and name this machine.
 
     Args:
-        app: gets the requests, their paths without the token.
-        token: of the page's address.
         hosts: names of this machine besides those of its loopback.
         anywhere: accept any IP address as a name of this machine, as it serves other machines too.
     """
@@ -309,14 +307,7 @@ def listen(host: str, port: int | None) -> socket.socket:
 def serve(
     play: Play, host: str, port: int | None, *, browser: bool, say: Callable[[str], None] = print
 ) -> None:
-    """Serve until Ctrl-C, which is raised again when everything has ended; raises as `listen`.
-
-    Args:
-        host: an address or name of this machine.
-        port: None for any.
-        browser: open the page.
-        say: called with the address.
-    """
+    """Serve until Ctrl-C, which is raised again when everything has ended; raises as `listen`."""
     token = secrets.token_urlsafe(32)
     with listen(host, port) as listener:
         number = listener.getsockname()[1]
