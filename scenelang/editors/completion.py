@@ -369,9 +369,8 @@ class _Maker:
         if cursor.inside == "string":
             yield from self._strings()
         elif cursor.inside == "number":
-            number = re.match(
-                r"([0-9]+\.?[0-9]*|\.[0-9]+)(.+)", self.document.text[cursor.start : cursor.offset]
-            )
+            typed = self.document.text[cursor.start : cursor.offset]
+            number = re.match(r"([0-9]++\.?[0-9]*+|\.[0-9]++)(.+)", typed)
             for unit in UNITS if number is not None else ():
                 if unit.startswith(number[2]):
                     yield Item(f"{number[1]}{unit}", Kind.Unit)

@@ -69,9 +69,11 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         place = document.lines.span(d.span)
     else:
         here = next((label.span for label in d.labels if label.span.source.name == name), None)
-        where = here or _import_of(d.span.source.name, document)
-        if where is None:
+        imports = [stmt.path for stmt in document.file.statements if isinstance(stmt, tree.Import)]
+        named = [path for path in imports if d.span.source.name.endswith(Path(path.value).name)]
+        if here is None and not imports:
             return None
+        where = here or [*named, *imports][0].span
         place = document.lines.span(where)
         message = f"in `{Path(d.span.source.name).name}`: {message}"
         related.insert(0, types.DiagnosticRelatedInformation(to_location(d.span, document), d.message))
@@ -87,15 +89,6 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         tags=[types.DiagnosticTag.Unnecessary] if d.code == "W0201" else None,
         related_information=related or None,
     )
-
-
-def _import_of(name: str, document: Document) -> Span | None:
-    """The import statement that brings a file, or the first one where it is brought by another."""
-    imports = [stmt for stmt in document.file.statements if isinstance(stmt, tree.Import)]
-    for stmt in imports:
-        if name.endswith(Path(stmt.path.value).name):
-            return stmt.path.span
-    return imports[0].path.span if imports else None
 
 
 @cache
@@ -129,7 +122,13 @@ def code_actions(
             continue
         if lines.position(d.span.start).line <= last and lines.position(d.span.end).line >= first:
             actions.append(_quick(document, d, d.span.start <= end and d.span.end >= start))
-    return [*actions, *(_fix_all(document, result) if wanted(FIX_ALL) else ())]
+    if wanted(FIX_ALL):
+        text, done = apply_fixes(document.text, [d for d in result if _is_ours(document, d)])
+        if done and text != document.text:
+            title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
+            edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
+            actions.append(types.CodeAction(title, kind=FIX_ALL, edit=edit))
+    return actions
 
 
 def _is_ours(document: Document, d: Diagnostic) -> bool:
@@ -147,30 +146,6 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
         is_preferred=preferred,
         edit=types.WorkspaceEdit(changes={document.uri: edits}),
     )
-
-
-def _fix_all(document: Document, diagnostics: Sequence[Diagnostic]) -> list[types.CodeAction]:
-    text, done = apply_fixes(document.text, [d for d in diagnostics if _is_ours(document, d)])
-    if not done or text == document.text:
-        return []
-    title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
-    edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
-    return [types.CodeAction(title, kind=FIX_ALL, edit=edit)]
-
-
-# ---------------------------------------------------------------- formatting
-
-
-def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
-    """Edits that format a text, or the statements of a range; raises `SceneError` for syntax errors."""
-    from scenelang.language.formatting import format_range, format_text
-
-    text, name = document.text, document.source.name
-    if place is None:
-        return text_edits(document, format_text(text, name=name))
-    low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    start, end, new = format_range(text, low, high, name=name)
-    return text_edits(document, text[:start] + new + text[end:])
 
 
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
@@ -433,8 +408,16 @@ def _rename(server: Server, document: Document, params: types.RenameParams) -> t
 
 
 def _formatted(server: Server, document: Document, place: types.Range | None) -> list[types.TextEdit] | None:
+    """Edits that format a text, or the statements of a range; None for one with syntax errors."""
+    from scenelang.language.formatting import format_range, format_text
+
+    text, name = document.text, document.source.name
     try:
-        return formatted(document, place)
+        if place is None:
+            return text_edits(document, format_text(text, name=name))
+        low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+        start, end, new = format_range(text, low, high, name=name)
+        return text_edits(document, text[:start] + new + text[end:])
     except SceneError:
         message = "not formatted: the file has syntax errors"
         server.window_log_message(types.LogMessageParams(types.MessageType.Info, message))

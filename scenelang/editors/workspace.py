@@ -121,15 +121,6 @@ def width(text: str, encoding: Encoding) -> int:
     return len(text) + sum(character > "\uffff" for character in text)
 
 
-def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple[str, Edit]:
-    """The text after one change, and what changed."""
-    text = lines.text
-    if not isinstance(change, types.TextDocumentContentChangePartial):
-        return change.text, difference(text, change.text)
-    start, end = sorted((lines.offset(change.range.start), lines.offset(change.range.end)))
-    return text[:start] + change.text + text[end:], Edit(start, end, start + len(change.text))
-
-
 MAX_SEEN: Final = 4  # values and nodes that are recorded of one place
 
 
@@ -313,7 +304,12 @@ class Document:
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
-        text, edit = applied(self.lines, change)
+        if isinstance(change, types.TextDocumentContentChangePartial):
+            start, end = sorted((self.lines.offset(change.range.start), self.lines.offset(change.range.end)))
+            text = self.text[:start] + change.text + self.text[end:]
+            edit = Edit(start, end, start + len(change.text))
+        else:
+            text, edit = change.text, difference(self.text, change.text)
         source = SourceFile(self.source.name, text)
         self.source = source
         self.edits.append(edit)

@@ -163,8 +163,8 @@ class Live:
 
     async def run(self) -> None:
         """Answer the page until it is gone."""
-        self._play.pages.add(self)
         await self._socket.accept()
+        self._play.pages.add(self)
         tasks = [asyncio.create_task(work) for work in (self._write(), self._read(), self._over.wait())]
         try:
             self.tell(await self._play.files())

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from scenelang.editors.workspace import MAX_TEXT, Settings
-from tests.editors.client import PATIENCE_S, Client, Json
+from tests.editors.client import PATIENCE_S, Client
 
 ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
 
@@ -58,28 +58,6 @@ def test_positions_count_what_was_agreed_on(encoding: str) -> None:
         assert client.shown(uri, colour["range"]) == "#d33"
     finally:
         client.kill()
-
-
-def test_lines_end_as_the_protocol_says(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\r\nlet b = 2;\rlet c = #d33;\n")
-    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert colour["range"]["start"] == {"line": 2, "character": 8}
-    client.replace(uri, "let a = \u2028#d33;\x0b\nlet b = #d33;\n")
-    found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert [c["range"]["start"] for c in found] == [{"line": 0, "character": 9}, {"line": 1, "character": 8}]
-
-
-def test_places_outside_the_text_are_its_ends(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\n")
-    far = {"line": 1000, "character": 1000}
-    params: Json = {"textDocument": {"uri": uri}, "position": far}
-    for method in ("hover", "completion", "definition", "signatureHelp", "documentHighlight"):
-        client.request(f"textDocument/{method}", params)
-    version = {"uri": uri, "version": 2}
-    change = {"range": {"start": far, "end": far}, "text": "let b = #d33;\n"}
-    client.notify("textDocument/didChange", {"textDocument": version, "contentChanges": [change]})
-    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert colour["range"]["start"] == {"line": 1, "character": 8}
 
 
 def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:

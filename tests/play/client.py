@@ -32,7 +32,8 @@ class Server:
     def connect(self, name: str, **options: Any) -> ClientConnection:
         """A websocket."""
         options = {"origin": self.origin, "max_size": None, "proxy": None, **options}
-        return connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
+        socket: ClientConnection = connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
+        return socket
 
     @contextlib.contextmanager
     def page(self) -> Iterator[Page]:

@@ -11,16 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import scenelang as nsg
 from lab.sets.plane import SETS
 from lab.sets.plane import random_scene as random_set_scene
 from lab.sets.solids import SOLID_SETS, random_solid
-from scenelang.compiler.groups import OPERATOR, felt, read_groups, widths_of
-from scenelang.compiler.lifting import LAYOUTS
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Camera, Scene
-from scenelang.web.export import view_of
 from tests.compiler.random_scenes import blob_scene, full_scene, random_scene
 from tests.web.live import (
     check_picture,
@@ -93,19 +89,6 @@ def test_random_trees_of_the_plane(viewer_page: Any) -> None:
     good, refused = agree(viewer_page, (SourceFile(*scene) for scene in scenes), model="shapes2d")
     assert good > 200
     assert refused >= 5  # as the model lacks room
-
-
-def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> None:
-    told = "seen.total, seen.widest, seen.count, always || seen.hidden"
-    ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
-    for seed in range(60):
-        program = nsg.compile(any_scene(seed))
-        blends = program.vectors[:, LAYOUTS[2].places.width]
-        known = felt(
-            read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
-        )
-        found = viewer_page.evaluate(ask, view_of(program).data["program"]["rows"])
-        np.testing.assert_allclose(np.array(found, float).T, np.array(known[:4], float), rtol=1e-6)
 
 
 def test_random_solids(viewer_page: Any) -> None:

@@ -1,4 +1,4 @@
-"""The page as text: whole, inert whatever a scene's author wrote, and what it says."""
+"""The page as text: whole, inert whatever a scene's author wrote; its script, and the rows of Programs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import itertools
 import json
 import re
 import zlib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.web.arrays import script
+from scenelang.web.arrays import MODULES, script, web
 from scenelang.web.export import alternative, colour_name, page, plain, still, view_of
 
 ODD = "</script><script>alert(1)</script><!-- ]]> [[script]] \u202e\u2066 & \" ' \u2028 \ud800"
@@ -132,3 +133,14 @@ def test_sources_are_named_from_the_scenes_folder(tmp_path: Path) -> None:
     assert [one["name"] for one in data["source"]] == ["a.nsg", "lib/dots.nsg"]
     assert str(tmp_path) not in text
     assert data["canvas"] == [64, 32]
+
+
+def test_names_at_the_top_differ() -> None:
+    names = re.findall(r"^(?:async )?(?:function\*?|class|const|let) (\w+)", script(), re.MULTILINE)
+    assert {name: count for name, count in Counter(names).items() if count > 1} == {}
+
+
+def test_files_stand_behind_what_they_import() -> None:
+    for at, name in enumerate(MODULES):
+        needed = re.findall(r'from "\./(\w+)\.js"', web(f"{name}.js"))
+        assert not set(needed) & set(MODULES[at:]), name
