@@ -212,10 +212,7 @@ class Client:
         at = -1
         for _ in range(occurrence + 1):
             at = self.texts[uri].index(word, at + 1)
-        return {
-            "textDocument": {"uri": uri},
-            "position": self.position(self.texts[uri], at + shift),
-        }
+        return {"textDocument": {"uri": uri}, "position": self.position(self.texts[uri], at + shift)}
 
     def shown(self, uri: str, place: Json) -> str:
         """The text of a range."""

@@ -75,10 +75,7 @@ def test_what_strangers_wrote_is_inert(chromium: Any, tmp_path: Path) -> None:
     [
         ("HTMLCanvasElement.prototype.getContext = () => null", "no WebGL2"),
         ("delete globalThis.DecompressionStream", "cannot unpack"),
-        (
-            "WebGL2RenderingContext.prototype.getProgramParameter = () => false",
-            "the shader does not compile",
-        ),
+        ("WebGL2RenderingContext.prototype.getProgramParameter = () => false", "the shader does not compile"),
     ],
 )
 def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, broken: str, why: str) -> None:
