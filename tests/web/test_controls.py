@@ -70,6 +70,7 @@ def test_controls_set_params(controls: Any) -> None:
         ("#param-list", "[1, [2, 3]]", "list", [1, [2, 3]]),
         ("#param-list", "alert(1)", "list", [1, [0.5, 2]]),
     ):
+        ask(controls, "viewer.reset()")
         assert put(controls, selector, value)[name] == expected, (selector, value)
 
 
