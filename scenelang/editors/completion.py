@@ -371,8 +371,8 @@ class _Maker:
         elif cursor.inside == "number":
             typed = self.document.text[cursor.start : cursor.offset]
             number = re.match(r"([0-9]++\.?[0-9]*+|\.[0-9]++)(.+)", typed)
-            for unit in UNITS if number is not None else ():
-                if unit.startswith(number[2]):
+            for unit in UNITS:
+                if number is not None and unit.startswith(number[2]):
                     yield Item(f"{number[1]}{unit}", Kind.Unit)
         elif cursor.inside == "colour":
             return

@@ -351,13 +351,13 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
                 return Box((node.geometry, *lines), fill, leaf=True), []
             case schema.Chain():
                 links = enumerate(node.children)
-                below = [(link.op if at else "", (link.node, inner)) for at, link in links]
+                below = [(str(link.op) if at else "", (link.node, inner)) for at, link in links]
             case _:
                 below = [("", (each, inner)) for each in node.children]
         return Box((node.op if isinstance(node, schema.Boolean) else node.kind, *lines)), below
 
     model = () if scene.model is None else (f"model {scene.model}",)
-    nodes = [("", (node, None)) for node in scene.nodes]
+    nodes: list[tuple[str, Child]] = [("", (node, None)) for node in scene.nodes]
     return _draw_tree((_sized("scene", scene.canvas), *model), nodes, look, most)
 
 
@@ -464,7 +464,7 @@ def _written(name: str) -> dict[str, Any]:
     return json.loads(files("scenelang").joinpath(f"editors/schemas/{name}.json").read_text("utf-8"))  # type: ignore[no-any-return]
 
 
-SCHEMAS: Final = {
+SCHEMAS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
     "scene": scene_schema,
     "diagnostics": partial(_written, "diagnostics"),
     "manifest": partial(_written, "manifest"),

@@ -501,12 +501,13 @@ def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any
         allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
         if isinstance(allowed, Vec):
             data["choices"] = _json(allowed)
-        elif isinstance(allowed, RangeValue) and allowed.step is None:
-            data |= {"low": allowed.start, "high": allowed.stop}
-            data |= {"exclusive": True} if allowed.exclusive else {}
-        elif isinstance(allowed, RangeValue):  # it may go downwards, and need not reach its end
+        elif isinstance(allowed, RangeValue) and allowed.step is not None:
+            # it may go downwards, and need not reach its end
             low, high = sorted((allowed.start, allowed.at(max(0, allowed.count() - 1))))
             data |= {"low": low, "high": high, "step": abs(allowed.step)}
+        elif isinstance(allowed, RangeValue):
+            data |= {"low": allowed.start, "high": allowed.stop}
+            data |= {"exclusive": True} if allowed.exclusive else {}
     if isinstance(value, Angle | Time):
         units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.Number))
         data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")

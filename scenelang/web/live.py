@@ -22,6 +22,7 @@ from scenelang.web.folder import (
     Changed,
     Files,
     Folder,
+    JobFailed,
     Journal,
     Json,
     Refused,
@@ -32,7 +33,7 @@ from scenelang.web.folder import (
     whole_of,
     wishes,
 )
-from scenelang.web.pool import JobFailed, Pool
+from scenelang.web.pool import Pool
 
 log = logging.getLogger("scenelang.play")
 EXAMPLES: Final = files("scenelang").joinpath("web/editor/examples")  # scenes that come with the page

@@ -120,7 +120,7 @@ class Guard:
         if len(host) != 1 or not self._is_here(host[0]) or site not in (None, "same-origin", "none"):
             return False
         if not origin:
-            return scope["type"] != "websocket"
+            return bool(scope["type"] != "websocket")
         return [one.lower() for one in origin] == [f"http://{host[0].lower()}"]
 
     def _is_here(self, host: str) -> bool:

@@ -45,8 +45,7 @@ class Server:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.process.poll() is None:
-            self.end(signal.SIGTERM)
+        self.end(signal.SIGTERM)  # which does nothing to one that has ended
 
     def end(self, how: int = signal.SIGINT) -> int:
         """End it; the exit code."""
