@@ -22,7 +22,8 @@ from playwright.sync_api import sync_playwright
 
 from lab.about import about, write_json
 from tests.browser import ARGUMENTS, _path
-from tests.play.page import Page, served
+from tests.play.client import Server
+from tests.play.page import Page
 
 WATCH = """() => {
   const still = document.getElementById("still");
@@ -48,10 +49,10 @@ def main(scene: Path, keys: int, out: Path | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(shutil.copy(scene, folder))
         load = os.getloadavg()[0]
-        with served(copy, Path(folder, "state")) as server, sync_playwright() as playwright:
+        with Server(copy, Path(folder, "state")) as server, sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=_path(), args=list(ARGUMENTS))
             page = Page(browser.new_page(viewport={"width": 1280, "height": 800}))
-            page.page.goto(server.address)
+            page.page.goto(server.url)
             page.picture()
             page.knows()
             page.page.evaluate(WATCH)

@@ -15,12 +15,10 @@ from lsprotocol import types
 
 from scenelang.assets.element import told
 from scenelang.assets.records import Record
-from scenelang.compiler.chain import merged
-from scenelang.compiler.graph import Move
 from scenelang.compiler.lower import step_of
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.compiler.spaces import SPACES, Refusal, Space
-from scenelang.compiler.steps import Affine, Rows, Step, Warp, composed
+from scenelang.compiler.steps import Affine, Step, Warp
 from scenelang.editors.context import Cursor, cursor_at, find_callee, word_of
 from scenelang.editors.workspace import Document, Workspace, scenes_below, width
 from scenelang.language import library, tree, words
@@ -29,7 +27,7 @@ from scenelang.language.resolve import Names, Symbol, Use
 from scenelang.language.tables import tables
 from scenelang.language.tree import walk
 from scenelang.language.values import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
-from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, TRANSFORMS, UNITS
+from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, UNITS
 
 COLOURED: Final = ("color", "background", "light", "ground")
 """Words with an argument `c` or `color`."""
@@ -66,7 +64,9 @@ _KINDS: Final = {
 }
 
 
-def semantic_tokens(docs: Workspace, document: Document, place: types.Range | None = None) -> list[int]:
+def semantic_tokens(
+    docs: Workspace, document: Document, place: types.Range | None = None
+) -> types.SemanticTokens:
     """The tokens of a text or of a range, encoded as the protocol wants them."""
     low, high = 0, len(document.text)
     if place is not None:
@@ -80,7 +80,7 @@ def semantic_tokens(docs: Workspace, document: Document, place: types.Range | No
         data += (at.line - line, at.character - column if at.line == line else at.character)
         data += (length, TYPES.index(kind), modifiers)
         line, column = at.line, at.character
-    return data
+    return types.SemanticTokens(data)
 
 
 def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tuple[int, int, str, int]]:
@@ -265,57 +265,25 @@ def show_value(value: Any) -> str | None:
     return "none" if value is None else None
 
 
-def show_matrix(rows: Rows, space: Space) -> str:
-    """The 3 × 3 matrix of a map of the plane, or the 4 × 4 one of space."""
-    table = [[rows[at] for at in row] for row in space.shown]
-    table.append([0.0] * space.dimension + [1.0])
-    cells = [[f"{value + 0.0:.4g}" for value in row] for row in table]
-    width = max(len(cell) for row in cells for cell in row)
-    return "\n".join("[ " + "  ".join(cell.rjust(width) for cell in row) + " ]" for row in cells)
-
-
-def show_warp(warp: Warp) -> str:
-    """The formula of a warp's inverse at a point."""
-    terms = []
-    if warp.twirl:
-        terms.append(f"{show(warp.twirl)} |p|")
-    for factor, name in zip(warp.bend, ("p.x", "p.y"), strict=True):
-        if factor:
-            terms.append(f"{show(factor)} {name}")
-    angle = " + ".join(terms) or "0"
-    return f"p → R({angle}) p"
-
-
-def show_transform(node: Any, space: Space) -> str | None:
-    """The matrix or the formula of a geometry transform; None for what is neither."""
-    if node.kind not in TRANSFORMS:
-        return None
-    return next(_shown(_steps((node,), space), space), None)
-
-
-def show_chain(transforms: tuple[Any, ...], space: Space) -> list[str]:
-    """A chain of transforms after composing its neighbouring affine maps: matrices and formulas in order."""
-    return list(_shown([move.step for move in merged(map(Move, _steps(transforms, space)))], space))
-
-
-def show_stretch(transforms: tuple[Any, ...], space: Space) -> str:
-    """The least and the greatest scale of a chain's affine maps."""
-    low, high = space.stretches(composed(_steps(transforms, space)))
-    return show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
-
-
-def _steps(transforms: Iterable[Any], space: Space) -> list[Step]:
+def steps_of(transforms: Iterable[Any], space: Space) -> list[Step]:
     """The steps of transforms, without those that have none."""
     result = [step_of(transform, space) for transform in transforms]
     return [step for step in result if not isinstance(step, Refusal)]
 
 
-def _shown(steps: Iterable[Step], space: Space) -> Iterator[str]:
+def show_steps(steps: Iterable[Step], space: Space) -> Iterator[str]:
+    """The matrix of each affine step, and the formula of each warp's inverse at a point."""
     for step in steps:
         if isinstance(step, Affine):
-            yield show_matrix(step.rows, space)
+            table = [[step.rows[at] for at in row] for row in space.shown]
+            table.append([0.0] * space.dimension + [1.0])
+            cells = [[f"{value + 0.0:.4g}" for value in row] for row in table]
+            width = max(len(cell) for row in cells for cell in row)
+            yield "\n".join("[ " + "  ".join(cell.rjust(width) for cell in row) + " ]" for row in cells)
         elif isinstance(step, Warp):
-            yield show_warp(step)
+            factors = (step.twirl, "|p|"), (step.bend[0], "p.x"), (step.bend[1], "p.y")
+            angle = " + ".join(f"{show(factor)} {name}" for factor, name in factors if factor)
+            yield f"p → R({angle or '0'}) p"
 
 
 Kind = types.CompletionItemKind
@@ -324,46 +292,15 @@ _MOST_FILES: Final = 2000
 
 
 class Item(Record):
-    """A proposal.
-
-    Args:
-        text: inserted in place of the label.
-        rank: one letter by which proposals are sorted, the likeliest first.
-        about: Markdown.
-        snippet: whether ``text`` has placeholders.
-    """
+    """A proposal."""
 
     label: str
     kind: Kind
-    text: str = ""
-    rank: str = "m"
+    text: str = ""  # inserted in place of the label, with placeholders in a snippet
+    rank: str = "m"  # by which proposals are sorted, the likeliest first
     detail: str = ""
-    about: str = ""
+    about: str = ""  # Markdown
     snippet: bool = False
-
-
-def units(typed: str) -> Iterator[Item]:
-    """Units that a number may be getting."""
-    number = re.match(r"[0-9]*\.?[0-9]*", typed)
-    if number is None or not number[0] or number[0] == ".":
-        return
-    rest = typed[number.end() :]
-    for unit in UNITS:
-        if rest and unit.startswith(rest):
-            yield Item(f"{number[0]}{unit}", Kind.Unit)
-
-
-def strings(docs: Workspace, document: Document, before: tuple[str, ...]) -> Iterator[Item]:
-    """Contents of a string: names of models, files to import."""
-    if before == ("model",):
-        for manifest in map(load_manifest, available()):
-            yield Item(manifest.name, Kind.Module, about=manifest.summary)
-    elif before == ("import",):
-        yield from (Item(name, Kind.File, rank="a") for name in library.names())
-        folder = document.path.parent if document.path is not None else next(iter(docs.folders), None)
-        for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
-            if path != document.path:
-                yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
 
 
 _HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
@@ -421,7 +358,8 @@ class _Maker:
         dimensions = dimensions_of(document)
         self.geometries = {name for d in dimensions for name in words.LEAVES[d]}
         self.shadings = {name for d in dimensions for name in words.SHADINGS[d]}
-        self.transforms = set(words.TRANSFORMS) - set(words.SOLID_TRANSFORMS if 3 not in dimensions else ())
+        hidden = () if 3 in dimensions else words.SOLID_TRANSFORMS
+        self.transforms = {name: word for name, word in words.TRANSFORMS.items() if name not in hidden}
 
     def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before
@@ -429,9 +367,13 @@ class _Maker:
         if cursor.inside == "comment":
             return
         if cursor.inside == "string":
-            yield from strings(self.docs, self.document, before)
+            yield from self._strings()
         elif cursor.inside == "number":
-            yield from units(self.document.text[cursor.start : cursor.offset])
+            typed = self.document.text[cursor.start : cursor.offset]
+            number = re.match(r"([0-9]++\.?[0-9]*+|\.[0-9]++)(.+)", typed)
+            for unit in UNITS:
+                if number is not None and unit.startswith(number[2]):
+                    yield Item(f"{number[1]}{unit}", Kind.Unit)
         elif cursor.inside == "colour":
             return
         elif last == ".":
@@ -463,6 +405,19 @@ class _Maker:
         elif ".." in before or "..<" in before:
             yield Item("step", Kind.Keyword, "step ")
 
+    def _strings(self) -> Iterator[Item]:
+        """Contents of a string: names of models, files to import."""
+        if self.cursor.before == ("model",):
+            for manifest in map(load_manifest, available()):
+                yield Item(manifest.name, Kind.Module, about=manifest.summary)
+        elif self.cursor.before == ("import",):
+            yield from (Item(name, Kind.File, rank="a") for name in library.names())
+            own = self.document.path
+            folder = own.parent if own is not None else next(iter(self.docs.folders), None)
+            for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
+                if path != own:
+                    yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+
     # ------------------------------------------------------------ statements
 
     def _keyword(self, word: str, rank: str = "p") -> Item:
@@ -474,7 +429,7 @@ class _Maker:
         block = self.cursor.block
         kind = block.kind
         if kind == "material":
-            yield from self._calls(words.OPERATIONS, words.OPERATIONS, "a")
+            yield from _calls(words.OPERATIONS, "a")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
@@ -485,9 +440,9 @@ class _Maker:
             if tree.Model not in given:
                 yield self._keyword("model", "q")
             yield from (self._keyword(word, "q") for word in ("param", "import"))
-            yield from self._calls(words.SETTINGS, words.SETTINGS, "q")
+            yield from _calls(words.SETTINGS, "q")
         if kind == "object":
-            yield from self._calls(words.TRANSFORMS, self.transforms, "a")
+            yield from _calls(self.transforms, "a")
             yield self._keyword("material", "b")
             yield from self._material_values("b")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
@@ -498,13 +453,9 @@ class _Maker:
                 yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
-            yield from self._calls(words.TRANSFORMS, self.transforms, "n")
+            yield from _calls(self.transforms, "n")
             yield self._keyword("material", "n")
             yield from self._material_values("n")
-
-    def _calls(self, known: dict[str, words.Word], offered: Iterable[str], rank: str) -> Iterator[Item]:
-        for name in sorted(offered):
-            yield _item(known[name], Kind.Method, rank)
 
     def _children(self, rank: str) -> Iterator[Item]:
         for name in sorted(self.geometries):
@@ -550,12 +501,12 @@ class _Maker:
 
     def _expressions(self) -> Iterator[Item]:
         callee = find_callee(self.docs, self.document, self.cursor)
-        if callee is not None and self.cursor.call is not None:
+        if callee is not None:
             yield from self._arguments(callee)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind != "module":
                 yield self._symbol(symbol)
-        yield from (_item(word, Kind.Function, "k") for word in words.FUNCTIONS.values())
+        yield from _calls(words.FUNCTIONS, "k", Kind.Function)
         for word in (words.CONSTANTS | words.ANIMATED).values():
             yield Item(word.name, Kind.Constant, "", "l", about=word.text)
         for name in ("true", "false"):
@@ -621,8 +572,9 @@ class _Maker:
                 yield self._symbol(known, statement=statement)
 
 
-def _item(word: words.Word, kind: Kind, rank: str) -> Item:
-    return Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
+def _calls(known: dict[str, words.Word], rank: str, kind: Kind = Kind.Method) -> Iterator[Item]:
+    for _, word in sorted(known.items()):
+        yield Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
 
 
 def _ends_operand(text: str) -> bool:

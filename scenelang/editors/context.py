@@ -41,51 +41,31 @@ _COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 class Call(Record):
-    """A call whose parentheses the cursor is in.
+    """A call whose parentheses the cursor is in."""
 
-    Args:
-        name: the name of the callee, perhaps dotted.
-        start: offset of the name.
-        index: index of the positional argument that the cursor is in.
-        named: the name of the argument it is in, if that has one.
-        given: names of arguments given so far, the cursor's own left out.
-    """
-
-    name: str
-    start: int
-    index: int
-    named: str | None
-    given: frozenset[str]
+    name: str  # of the callee, perhaps dotted
+    start: int  # offset of the name
+    index: int  # of the positional argument that the cursor is in
+    named: str | None  # name of that argument, if it has one
+    given: frozenset[str]  # names of the other arguments so far
 
 
 class Block(Record):
-    """A block around the cursor.
+    """A block around the cursor."""
 
-    Args:
-        kind: the statements that it may hold.
-        head: the first word of its statement.
-        nested: whether a `for` or `if` lies between it and the cursor.
-    """
-
-    kind: BlockKind
-    head: str
-    nested: bool = False
+    kind: BlockKind  # the statements that it may hold
+    head: str  # first word of its statement
+    nested: bool = False  # whether a `for` or `if` lies between it and the cursor
 
 
 class Cursor(Record):
-    """The tokens around an offset, and the call and the block that it is in.
-
-    Args:
-        start, end: the word that the cursor is in or behind; equal to ``offset`` where there is none.
-        inside: ``comment``, ``string``, ``number``, ``colour`` or ``code``.
-        before: the tokens of the statement before that word, as text.
-    """
+    """The tokens around an offset, and the call and the block that it is in."""
 
     offset: int
-    start: int
+    start: int  # of the word that the cursor is in or behind; `offset` where there is none
     end: int
     inside: Literal["comment", "string", "number", "colour", "code"]
-    before: tuple[str, ...]
+    before: tuple[str, ...]  # tokens of the statement before that word
     call: Call | None
     block: Block
 
@@ -144,20 +124,15 @@ def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset())
             inside = "colour"
         if inside != "code" or text[:1].isalpha() or text[:1] == "_":
             start, end, index = read.starts[token], read.ends[token], token
-    elif _in_comment(read, index, offset):
-        inside = "comment"
+    else:
+        gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
+        *_, last = [None, *_COMMENTS.finditer(gap)]
+        closes = "\n" if last is not None and last[0][1] == "/" else "*/"
+        if last is not None and last.end() == len(gap) and not last[0][2:].endswith(closes):
+            inside = "comment"
     head = read.head(index)
     before = tuple(read.text(at) for at in range(head, index))
     return Cursor(offset, start, end, inside, before, _call(read, head, index), _block(read, index, values))
-
-
-def _in_comment(read: _Reader, index: int, offset: int) -> bool:
-    gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
-    result = list(_COMMENTS.finditer(gap))
-    if not result or result[-1].end() < len(gap):
-        return False
-    comment = result[-1][0]
-    return not (comment.endswith("\n") if comment[1] == "/" else comment[2:].endswith("*/"))
 
 
 def _call(read: _Reader, head: int, index: int) -> Call | None:
@@ -293,10 +268,11 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
 def word_of(symbol: Symbol) -> Word:
     """A definition as a word: its first line, the comment above it, its parameters."""
     node = symbol.node
+    called = f"{symbol.name}({', '.join(_short(p.node.span.text) for p in symbol.params)})"
     if isinstance(node, tree.Module):
-        head = f"module {_called(symbol)}"
+        head = f"module {called}"
     elif isinstance(node, tree.Fn):
-        head = f"fn {_called(symbol)} = {_short(node.body.span.text)}"
+        head = f"fn {called} = {_short(node.body.span.text)}"
     elif isinstance(node, tree.For):
         head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
     elif isinstance(node, tree.Parameter):
@@ -304,11 +280,6 @@ def word_of(symbol: Symbol) -> Word:
     else:
         head = _short(node.span.text)
     return Word(symbol.name, head, comment_above(symbol), tuple(p.name for p in symbol.params))
-
-
-def _called(symbol: Symbol) -> str:
-    params = ", ".join(_short(p.node.span.text) for p in symbol.params)
-    return f"{symbol.name}({params})"
 
 
 def _short(text: str) -> str:

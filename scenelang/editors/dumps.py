@@ -1,26 +1,26 @@
 """Trees, graphs and Programs as data, text or drawings, and the JSON Schemas of scenelang's files.
 
-Large drawings are cut: nodes nearest the top come first, and a box says how many more there are.
-
-The Scene's schema is made from the pydantic model. It leaves out checks that need code: that a matrix is not
-singular, that numbers fit into float64, and how deep nodes may nest.
+The Scene's schema leaves out checks that need code: that a matrix is not singular, that numbers fit into
+float64, and how deep nodes may nest.
 """
 
 from __future__ import annotations
 
 import difflib
+import json
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, fields
+from functools import partial
+from importlib.resources import files
 from math import degrees
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
-from scenelang.compiler.manifest import OPTIONAL
 from scenelang.compiler.spaces import (
     HORIZON,
     PLANE,
@@ -54,14 +54,11 @@ def _data(value: Any) -> Any:
         return [_data(item) for item in value]
     if isinstance(value, Span):
         start, end = value.locate()
-        return {"start": _position(start), "end": _position(end)}
+        names = ("line", "column")
+        return {"start": dict(zip(names, start, strict=True)), "end": dict(zip(names, end, strict=True))}
     if not hasattr(value, "__dataclass_fields__"):
         return value
     return {"node": type(value).__name__, **{f.name: _data(getattr(value, f.name)) for f in fields(value)}}
-
-
-def _position(place: tuple[int, int]) -> dict[str, int]:
-    return {"line": place[0], "column": place[1]}
 
 
 def tree_text(file: tree.File) -> str:
@@ -104,19 +101,11 @@ def _word(name: str, value: Any) -> str:
 
 
 def dump(graph: Graph) -> str:
-    """One line for each node, indented by depth, moves after it from the leaf outwards.
-
-    Example::
-
-        scene 256x256
-          square #d33333  [0.8 0 -0.2; 0 0.8 0]
-          smooth pentagon #ffffff  warp(0.6; 0.2 0) [0.5 0 0; 0 0.5 0]
-    """
+    """One line for each node, indented by depth, with its moves from the leaf outwards."""
     width, height = graph.canvas
     lines = [f"{graph.root.kind} {width}x{height}"]
-    lines += [] if graph.stage is None else [f"  {line}" for line in stage_text(graph.stage)]
-    stack: list[tuple[Link, int, bool]] = []
-    _push(stack, graph.root, 1)
+    lines += [f"  {line}" for line in stage_text(graph.stage)]
+    stack = [(link, 1, at == 0) for at, link in enumerate(graph.root.links)][::-1]
     while stack:
         link, depth, first = stack.pop()
         word = "" if first or link.op == "union" else f"{op_text(link)} "
@@ -129,12 +118,8 @@ def dump(graph: Graph) -> str:
         moves = " ".join(move_text(move, graph.space) for move in node.moves)
         lines.append(f"{'  ' * depth}{word}{name}" + (f"  {moves}" if moves else ""))
         if isinstance(node, Fold):
-            _push(stack, node, depth + 1)
+            stack += [(link, depth + 1, at == 0) for at, link in enumerate(node.links)][::-1]
     return "\n".join(lines) + "\n"
-
-
-def _push(stack: list[tuple[Link, int, bool]], fold: Fold, depth: int) -> None:
-    stack.extend((fold.links[at], depth, at == 0) for at in range(len(fold.links) - 1, -1, -1))
 
 
 def look_text(look: Look, space: Space) -> str:
@@ -166,8 +151,10 @@ def op_text(link: Link) -> str:
     return f"{link.op}({link.k:g})" if link.k else link.op
 
 
-def stage_text(stage: Stage) -> list[str]:
-    """A stage as the statements that set it, colours as they are written."""
+def stage_text(stage: Stage | None) -> list[str]:
+    """A stage as the statements that set it, colours as they are written; none without a stage."""
+    if stage is None:
+        return []
     camera, light, ground = stage.camera, stage.light, stage.ground
 
     def point(p: Triple) -> str:
@@ -191,24 +178,16 @@ def hex_text(rgb: tuple[float, float, float]) -> str:
 
 
 def graph_data(graph: Graph) -> dict[str, Any]:
-    """A graph: leaves and folds with their moves, nearest the leaf first.
-
-    An affine move is the upper three rows of its matrix; the others are their fields. Solids have a stage,
-    and linear colours.
-    """
+    """A graph: leaves and folds with their moves, nearest the leaf first, affine ones as matrices."""
     with deep_stack():
         root = _node(graph.root)
     return {
         "canvas": list(graph.canvas),
         "background": None if graph.background is None else list(graph.background),
         "dimension": graph.space.dimension,
-        **_staged(graph.stage),
+        **({} if graph.stage is None else {"stage": stage_data(graph.stage)}),
         "root": root,
     }
-
-
-def _staged(stage: Stage | None) -> dict[str, Any]:
-    return {} if stage is None else {"stage": stage_data(stage)}
 
 
 def _node(node: Node) -> dict[str, Any]:
@@ -253,7 +232,7 @@ def program_data(program: Program) -> dict[str, Any]:
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),
-        **_staged(program.stage),
+        **({} if program.stage is None else {"stage": stage_data(program.stage)}),
         "model": program.model,
         "weights": program.weights,
         "digest": program.digest(),
@@ -266,7 +245,7 @@ def program_table(program: Program) -> str:
     width, height = program.canvas
     head = f"program {width}x{height}, model {program.model}, weights {program.weights[:12]}"
     lines = [f"{head}, digest {program.digest()[:12]}"]
-    lines += [] if program.stage is None else stage_text(program.stage)
+    lines += stage_text(program.stage)
     rows = [("row", "token", "object", "bounds", "place")]
     for at, (name, token, bounds, place) in enumerate(
         zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
@@ -296,10 +275,7 @@ def common_start(left: Sequence[str], right: Sequence[str]) -> int:
 
 
 def changes(before: str, after: str, old: str, new: str) -> str:
-    """The diff of two dumps; empty where nothing changed.
-
-    Comparing line by line takes quadratic time, so only the size of very large changes is given.
-    """
+    """The diff of two dumps; of very large changes, which take quadratic time, only the size."""
     if before == after:
         return ""
     a, b = before.splitlines(), after.splitlines()
@@ -319,75 +295,74 @@ _MOST_LINES: Final = 12
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A node: its lines of text, its fill colour, and whether it is a leaf."""
+class Box(NamedTuple):
+    """A node of a drawing."""
 
     lines: tuple[str, ...]
     fill: str | None = None
-    leaf: bool = False
+    leaf: bool = False  # with round corners
+    parent: int | None = None  # number of the box whose arrow leads here
+    word: str = ""  # on that arrow
 
 
-@dataclass(frozen=True, slots=True)
-class Arrow:
-    """An arrow from box to box, by their numbers, with a word on it."""
+class Drawing(NamedTuple):
+    """Boxes, from top to bottom or from left to right."""
 
-    start: int
-    end: int
-    word: str = ""
-
-
-@dataclass(slots=True)
-class Drawing:
-    """Boxes and arrows, from top to bottom or from left to right."""
-
-    boxes: list[Box] = field(default_factory=list)
-    arrows: list[Arrow] = field(default_factory=list)
+    boxes: list[Box]
     sideways: bool = False
 
-    def add(self, box: Box, parent: int | None = None, word: str = "") -> int:
-        """Add a box below another one; return its number."""
-        self.boxes.append(box)
-        if parent is not None:
-            self.arrows.append(Arrow(parent, len(self.boxes) - 1, word))
-        return len(self.boxes) - 1
+
+def _draw_tree(
+    head: tuple[str, ...],
+    nodes: Sequence[tuple[str, T]],
+    look: Callable[[T], tuple[Box, Sequence[tuple[str, T]]]],
+    most: int,
+) -> Drawing:
+    """A tree, level by level: its first box, its nodes with their words, and each one's box and children."""
+    boxes = [Box(head)]
+    todo = deque([(0, nodes)])
+    while todo:
+        parent, inner = todo.popleft()
+        room = max(0, min(_MOST_CHILDREN, most - len(boxes)))
+        if len(inner) > room:
+            boxes.append(Box((f"{len(inner) - room:,} more",), parent=parent))
+        for word, node in inner[:room]:
+            box, below = look(node)
+            todo.append((len(boxes), below))
+            boxes.append(box._replace(parent=parent, word=word))
+    return Drawing(boxes)
 
 
 def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
     """The tree of a scene with its transforms, materials and boolean words."""
-    drawn = Drawing()
-    width, height = scene.canvas
     manifest = find_model(scene, Diagnostics())
     space = SPACES[manifest.dimension if manifest is not None else 2]
+    Child = tuple[schema.SceneNode, schema.Material | None]
+
+    def look(child: Child) -> tuple[Box, list[tuple[str, Child]]]:
+        node, outer = child
+        inner = node.material or outer
+        own = [] if node.material is None else [material(node.material)]
+        lines = _short([_rounded(text) for text in (*own, *map(transform, node.transforms))])
+        match node:
+            case schema.Object():
+                ops = () if inner is None else map(space.inked, inner.ops)
+                fill = None if inner is None else hex_text(space.written(coloured(colour_steps(ops))))
+                return Box((node.geometry, *lines), fill, leaf=True), []
+            case schema.Chain():
+                links = enumerate(node.children)
+                below = [(str(link.op) if at else "", (link.node, inner)) for at, link in links]
+            case _:
+                below = [("", (each, inner)) for each in node.children]
+        return Box((node.op if isinstance(node, schema.Boolean) else node.kind, *lines)), below
+
     model = () if scene.model is None else (f"model {scene.model}",)
-    top = drawn.add(Box((f"scene {width} x {height}", *model)))
-    Child = tuple[str, schema.SceneNode, schema.Material | None]
-    todo: deque[tuple[int, list[Child]]] = deque([(top, [("", node, None) for node in scene.nodes])])
-    while todo:
-        parent, children = todo.popleft()
-        for word, node, outer in _some(drawn, parent, children, most):
-            inner = node.material or outer
-            number = drawn.add(_scene_box(node, inner, space), parent, word)
-            if not isinstance(node, schema.Object) and node.children:
-                todo.append((number, [(*child, inner) for child in _children(node)]))
-    return drawn
+    nodes: list[tuple[str, Child]] = [("", (node, None)) for node in scene.nodes]
+    return _draw_tree((_sized("scene", scene.canvas), *model), nodes, look, most)
 
 
-def _children(node: schema.Group | schema.Boolean | schema.Chain) -> Iterable[tuple[str, schema.SceneNode]]:
-    if isinstance(node, schema.Chain):
-        return [("" if at == 0 else link.op, link.node) for at, link in enumerate(node.children)]
-    return [("", child) for child in node.children]
-
-
-def _scene_box(node: schema.SceneNode, inner: schema.Material | None, space: Space) -> Box:
-    steps = [_rounded(transform(t)) for t in node.transforms]
-    own = [] if node.material is None else [_rounded(material(node.material))]
-    if isinstance(node, schema.Object):
-        ops = () if inner is None else map(space.inked, inner.ops)
-        fill = None if inner is None else hex_text(space.written(coloured(colour_steps(ops))))
-        return Box((node.geometry, *_short([*own, *steps])), fill, leaf=True)
-    name = node.op if isinstance(node, schema.Boolean) else node.kind
-    return Box((name, *_short([*own, *steps])))
+def _sized(kind: str, canvas: tuple[int, int]) -> str:
+    return f"{kind} {canvas[0]} x {canvas[1]}"
 
 
 def _rounded(statement: str) -> str:
@@ -397,80 +372,56 @@ def _rounded(statement: str) -> str:
 
 def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
     """A graph after `lower` or any pass."""
-    drawn = Drawing()
-    width, height = graph.canvas
-    stage = () if graph.stage is None else stage_text(graph.stage)
-    top = drawn.add(Box((f"scene {width} x {height}", *stage)))
-    todo: deque[tuple[int, Fold]] = deque([(top, graph.root)])
-    while todo:
-        parent, fold = todo.popleft()
-        links = [("" if at == 0 else op_text(link), link.node) for at, link in enumerate(fold.links)]
-        for word, node in _some(drawn, parent, links, most):
-            number = drawn.add(_graph_box(node, graph.space), parent, word)
-            if isinstance(node, Fold):
-                todo.append((number, node))
-    return drawn
 
+    def links(fold: Fold) -> list[tuple[str, Node]]:
+        return [(op_text(link) if at else "", link.node) for at, link in enumerate(fold.links)]
 
-def _graph_box(node: Node, space: Space) -> Box:
-    moves = _short([move_text(move, space) for move in node.moves])
-    if isinstance(node, Leaf):
-        texture = () if node.look.element is None else (look_text(node.look, space),)
-        rgb = hex_text(space.written(node.look.colour()))
-        return Box((node.geometry, *texture, *moves), rgb, leaf=True)
-    return Box((node.kind, *moves))
+    def look(node: Node) -> tuple[Box, list[tuple[str, Node]]]:
+        moves = _short([move_text(move, graph.space) for move in node.moves])
+        if isinstance(node, Fold):
+            return Box((node.kind, *moves)), links(node)
+        texture = () if node.look.element is None else (look_text(node.look, graph.space),)
+        rgb = hex_text(graph.space.written(node.look.colour()))
+        return Box((node.geometry, *texture, *moves), rgb, leaf=True), []
+
+    return _draw_tree(
+        (_sized("scene", graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
+    )
 
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
     """The stream of a Program: each object and the token that joins it to what came before."""
-    drawn = Drawing(sideways=True)
-    width, height = program.canvas
-    stage = () if program.stage is None else stage_text(program.stage)
-    last = drawn.add(Box((f"program {width} x {height}", f"model {program.model}", *stage)))
-    tokens = token_names(program)
+    head = (_sized("program", program.canvas), f"model {program.model}", *stage_text(program.stage))
+    boxes, tokens = [Box(head)], token_names(program)
     for at, name in enumerate(program.objects[:most]):
         place = program.places[at]
         where = () if place is None else (f"line {place.line}",)
-        last = drawn.add(Box((name, f"row {at}", *where), leaf=True), last, tokens[at])
+        boxes.append(Box((name, f"row {at}", *where), leaf=True, parent=at, word=tokens[at]))
     if len(program) > most:
-        drawn.add(Box((f"{len(program) - most:,} more",)), last)
-    return drawn
-
-
-def _some(drawn: Drawing, parent: int, children: Sequence[T], most: int) -> Sequence[T]:
-    """The children to draw; one box counts the others."""
-    room = max(0, min(_MOST_CHILDREN, most - len(drawn.boxes)))
-    left = len(children) - room
-    if left <= 0:
-        return children
-    drawn.add(Box((f"{left:,} more",)), parent)
-    return children[:room]
+        boxes.append(Box((f"{len(program) - most:,} more",), parent=most))
+    return Drawing(boxes, sideways=True)
 
 
 def _short(lines: list[str]) -> list[str]:
-    if len(lines) <= _MOST_LINES:
-        return lines
-    return [*lines[:_MOST_LINES], f"{len(lines) - _MOST_LINES:,} more"]
+    more = len(lines) - _MOST_LINES
+    return lines if more <= 0 else [*lines[:_MOST_LINES], f"{more:,} more"]
 
 
 def to_mermaid(drawn: Drawing) -> str:
-    """Text for Mermaid, as Markdown pages of code hosts draw it."""
-    lines = [f"flowchart {'LR' if drawn.sideways else 'TB'}"]
+    """Text for Mermaid, as Markdown pages of code hosts draw it; special characters by their numbers."""
+
+    def escaped(text: str) -> str:
+        return "".join(c if c.isalnum() or c in " .,:+-_=()[]" else f"#{ord(c)};" for c in text)
+
+    lines, arrows, styles = [f"flowchart {'LR' if drawn.sideways else 'TB'}"], [], []
     for number, box in enumerate(drawn.boxes):
-        text = "<br/>".join(_for_mermaid(line) for line in box.lines)
+        text = "<br/>".join(map(escaped, box.lines))
         lines.append(f'  n{number}("{text}")' if box.leaf else f'  n{number}["{text}"]')
-    for arrow in drawn.arrows:
-        word = f"|{arrow.word}|" if arrow.word else ""
-        lines.append(f"  n{arrow.start} -->{word} n{arrow.end}")
-    for number, box in enumerate(drawn.boxes):
+        if box.parent is not None:
+            arrows.append(f"  n{box.parent} -->{f'|{box.word}|' if box.word else ''} n{number}")
         if box.fill is not None:
-            lines.append(f"  style n{number} fill:{box.fill},color:{_ink(box.fill)}")
-    return "\n".join(lines) + "\n"
-
-
-def _for_mermaid(text: str) -> str:
-    """Text for Mermaid, its special characters written by their numbers."""
-    return "".join(c if c.isalnum() or c in " .,:+-_=()[]" else f"#{ord(c)};" for c in text)
+            styles.append(f"  style n{number} fill:{box.fill},color:{_ink(box.fill)}")
+    return "\n".join([*lines, *arrows, *styles]) + "\n"
 
 
 def to_dot(drawn: Drawing) -> str:
@@ -481,6 +432,7 @@ def to_dot(drawn: Drawing) -> str:
         '  node [shape=box, fontname="Helvetica", fontsize=10];',
         '  edge [fontname="Helvetica", fontsize=9];',
     ]
+    arrows = []
     for number, box in enumerate(drawn.boxes):
         text = "\\n".join(line.replace("\\", "\\\\").replace('"', '\\"') for line in box.lines)
         look = [f'label="{text}"']
@@ -488,10 +440,10 @@ def to_dot(drawn: Drawing) -> str:
             fill = box.fill or "#ffffff"
             look += ['style="rounded,filled"', f'fillcolor="{fill}"', f'fontcolor="{_ink(fill)}"']
         lines.append(f"  n{number} [{', '.join(look)}];")
-    for arrow in drawn.arrows:
-        word = f' [label="{arrow.word}"]' if arrow.word else ""
-        lines.append(f"  n{arrow.start} -> n{arrow.end}{word};")
-    return "\n".join([*lines, "}"]) + "\n"
+        if box.parent is not None:
+            word = f' [label="{box.word}"]' if box.word else ""
+            arrows.append(f"  n{box.parent} -> n{number}{word};")
+    return "\n".join([*lines, *arrows, "}"]) + "\n"
 
 
 def _ink(fill: str) -> str:
@@ -500,117 +452,24 @@ def _ink(fill: str) -> str:
     return "#000000" if 0.2126 * red + 0.7152 * green + 0.0722 * blue > 120 else "#ffffff"
 
 
-_DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
-
-
 def scene_schema() -> dict[str, Any]:
     """The schema of a Scene, as `Scene.from_json` reads and `Scene.to_json` writes it."""
     model = Scene.model_json_schema()
     described = {"title": "Scene", "description": model.pop("description", ""), **model}
-    return _plain(_headed("scene", described))  # type: ignore[no-any-return]
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": "urn:scenelang:schema:scene:1"}
+    return _plain({**head, **described})  # type: ignore[no-any-return]
 
 
-def diagnostics_schema() -> dict[str, Any]:
-    """The schema of the output of ``scenelang check --format json``."""
-    number = {"type": "integer", "minimum": 1}
-    position = {
-        "description": "from 1, in code points",
-        "type": ["object", "null"],
-        "properties": {"line": number, "column": number},
-        "required": ["line", "column"],
-        "additionalProperties": False,
-    }
-    place = {
-        "file": {"description": "as the user named it", "type": ["string", "null"]},
-        "start": {"$ref": "#/$defs/position"},
-        "end": {"$ref": "#/$defs/position", "description": "exclusive"},
-    }
-    edit = _object({**place, "replacement": {"description": "instead of the text there", "type": "string"}})
-    fix = _object(
-        {"message": {"type": "string"}, "edits": {"type": "array", "items": edit}},
-        type=["object", "null"],
-        description="a change that is safe to apply unseen",
-    )
-    diagnostic = _object(
-        {
-            "code": {"description": "stable; `scenelang explain CODE`", "pattern": "^[EW]\\d{4}$"},
-            "severity": {"enum": ["error", "warning"]},
-            "message": {"type": "string"},
-            **place,
-            "labels": {
-                "description": "further places",
-                "type": "array",
-                "items": _object({"message": {"type": "string"}, **place}),
-            },
-            "help": {"type": ["string", "null"]},
-            "fix": fix,
-        }
-    )
-    whole = _object(
-        {"version": {"const": 1}, "diagnostics": {"type": "array", "items": diagnostic}},
-        title="Diagnostics",
-        description="What is wrong with scenes.",
-    )
-    return _headed("diagnostics", {**whole, "$defs": {"position": position}})
+def _written(name: str) -> dict[str, Any]:
+    return json.loads(files("scenelang").joinpath(f"editors/schemas/{name}.json").read_text("utf-8"))  # type: ignore[no-any-return]
 
 
-def manifest_schema() -> dict[str, Any]:
-    """The schema of a model's ``manifest.json``."""
-    word = {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
-    words = {"type": "array", "items": word, "uniqueItems": True}
-    pair = {"type": "array", "prefixItems": [{"type": "number"}] * 2, "minItems": 2, "maxItems": 2}
-    limit = {"type": "integer", "minimum": 0, "exclusiveMaximum": 1 << 31}
-    side = {"type": "integer", "minimum": 1, "maximum": 8192}
-    size = {"type": "array", "prefixItems": [side] * 2, "minItems": 2, "maxItems": 2}
-    whole = _object(
-        {
-            "format": {"const": 1},
-            "name": {"description": 'as in `model "name";`', "type": "string", "pattern": '^[^"\\\\]+$'},
-            "summary": {"description": "one line for people", "type": "string"},
-            "dimension": {"enum": [2, 3]},
-            "renderer": word,
-            "lifting": word,
-            "geometries": {**words, "minItems": 1, "description": "in the order of the learned codes"},
-            "materials": {**words, "minItems": 1, "description": "likewise, the default first"},
-            "limits": {"type": "object", "additionalProperties": limit},
-            "trained": {
-                "description": "ranges, beyond which is a warning",
-                "type": "object",
-                "additionalProperties": pair,
-            },
-            "measured": {"description": "figures of its evaluation", "type": "object"},
-            "set": {"description": "the scenes it was trained on; by default its name", "type": "string"},
-            "sizes": {
-                "description": "canvases (width, height) that it draws; any within its limits if none",
-                "type": "array",
-                "items": size,
-            },
-            "any_blend": {"description": "whether it blends over any width", "type": "boolean"},
-            "white": {"description": "whether it draws over white alone", "type": "boolean"},
-        },
-        optional=OPTIONAL,
-        title="Manifest",
-        description="What a model states about itself.",
-    )
-    return _headed("manifest", whole)
-
-
-SCHEMAS: Final = {"scene": scene_schema, "diagnostics": diagnostics_schema, "manifest": manifest_schema}
-
-
-def _headed(name: str, schema: dict[str, Any]) -> dict[str, Any]:
-    return {"$schema": _DRAFT, "$id": f"urn:scenelang:schema:{name}:1", **schema}
-
-
-def _object(properties: dict[str, Any], *, optional: tuple[str, ...] = (), **further: Any) -> dict[str, Any]:
-    """An object that has these properties, but for those that are optional, and no others."""
-    return {
-        "type": "object",
-        **further,
-        "properties": properties,
-        "required": [name for name in properties if name not in optional],
-        "additionalProperties": False,
-    }
+SCHEMAS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
+    "scene": scene_schema,
+    "diagnostics": partial(_written, "diagnostics"),
+    "manifest": partial(_written, "manifest"),
+}
+"""Schemas of a Scene, of the output of ``scenelang check --format json`` and of a model's manifest."""
 
 
 def _plain(value: Any) -> Any:

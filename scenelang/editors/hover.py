@@ -8,18 +8,20 @@ from typing import Any, Final
 
 from lsprotocol import types
 
-from scenelang.assets import element as groups
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, told
+from scenelang.compiler.chain import merged
+from scenelang.compiler.graph import Move
 from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.steps import composed
 from scenelang.editors import completion
 from scenelang.editors.completion import space_of
 from scenelang.editors.context import find_symbol, path_to, word_of
-from scenelang.editors.server import Settings
-from scenelang.editors.workspace import Document, Seen, Workspace
+from scenelang.editors.workspace import Document, Seen, Settings, Workspace
 from scenelang.language import scene_text as to_nsg
 from scenelang.language import tree, words
 from scenelang.language.resolve import Symbol, Use
 from scenelang.language.tree import walk
+from scenelang.language.values import show
 from scenelang.language.words import word_for_call
 
 _TABLES: Final = {
@@ -33,21 +35,16 @@ _TABLES: Final = {
 def hover(
     docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
 ) -> types.Hover | None:
-    """The hover at an offset.
-
-    Args:
-        picture: gives an element's picture in Markdown.
-    """
+    """The hover at an offset; ``picture`` gives an element's picture in Markdown."""
     use = document.names.at(offset)
     if use is not None:
         text = _elements(docs, document, use, picture) or _use(docs, document, use)
         return _answer(document, use.start, use.end, text) if text else None
-    path = path_to(document.file, offset)
-    for node in reversed(path):
-        keyword = _keyword(node, offset)
-        if keyword is not None:
-            start, end, word = keyword
-            return _answer(document, start, end, _word(words.KEYWORDS[word]) + _node_facts(document, node))
+    for node in reversed(path_to(document.file, offset)):
+        start, head = node.span.start, re.match(r"[a-z]+", node.span.text)
+        if head is not None and head[0] in words.RESERVED and offset <= start + len(head[0]):
+            text = _word(words.KEYWORDS[head[0]]) + _node_facts(document, node)
+            return _answer(document, start, start + len(head[0]), text)
     return None
 
 
@@ -63,18 +60,6 @@ def _code(text: str) -> str:
 def _word(word: words.Word) -> str:
     about = [f"- `{name}`: {line}" for name, line in word.notes.items()]
     return "\n\n".join([_code(word.head), word.text, *(["\n".join(about)] if about else [])])
-
-
-def _keyword(node: Any, offset: int) -> tuple[int, int, str] | None:
-    """The keyword that heads a node, if the cursor is on it."""
-    start = node.span.start
-    head = re.match(r"[a-z]+", node.span.text)
-    word = head[0] if head is not None else ""
-    heads = word in words.RESERVED
-    return (start, start + len(word), word) if heads and offset <= start + len(word) else None
-
-
-# ---------------------------------------------------------------- names
 
 
 def _use(docs: Workspace, document: Document, use: Use) -> str | None:
@@ -101,7 +86,11 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             except KeyError:
                 return None
         case "argument":
-            return _argument(use)
+            word = word_for_call(use.callee.text, use.callee.role == "operation") if use.callee else None
+            if word is None or text not in word.params:
+                return None
+            line = word.notes.get(text)
+            return f"{_code(word.head)}\n\n`{text}`: {line}" if line else _code(word.head)
         case "path":
             library = docs.imported(document, text)
             return f"`{library.path}`" if library is not None else "no such file"
@@ -118,25 +107,20 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     if zoo is None:
         return ""
     result = [element for element in zoo.elements if element.name == name and element.material == worn]
-    told = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
+    parts = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
-        told.append(f"```text\n{name}(): {groups.told(zoo.groups[name])}\n```")
-    return "\n\n".join(told)
-
-
-def _argument(use: Use) -> str | None:
-    word = words.word_for_call(use.callee.text, use.callee.role == "operation") if use.callee else None
-    if word is None or use.text not in word.params:
-        return None
-    about = word.notes.get(use.text)
-    return f"{_code(word.head)}\n\n`{use.text}`: {about}" if about else _code(word.head)
+        parts.append(f"```text\n{name}(): {told(zoo.groups[name])}\n```")
+    return "\n\n".join(parts)
 
 
 def _definition(document: Document, where: Document, symbol: Symbol) -> str:
     word = word_of(symbol)
     parts = [_code(word.head), *([word.text] if word.text else [])]
     seen = seen_at(document, where, symbol.span.start, symbol.span.end)
-    line = describe_values(seen)
+    shown = [completion.show_value(value) for value in seen.values] if seen is not None else []
+    known = list(dict.fromkeys(text for text in shown if text is not None))
+    line = "= " + ", ".join(f"`{text}`" for text in known) if known else ""
+    line += ", …" if seen is not None and seen.count > len(seen.values) and len(known) > 1 else ""
     node = symbol.node
     value = node.value if isinstance(node, tree.Let) else getattr(node, "default", None)
     if line and not (value is not None and line == f"= `{value.span.text}`"):  # it stands there
@@ -157,20 +141,6 @@ def seen_at(document: Document, where: Document, start: int, end: int) -> Seen |
             return None
         start, end = old_start, old_end
     return checked.seen.get((where.source.name, start, end))
-
-
-def describe_values(seen: Seen | None) -> str:
-    """The values of a name in a line; empty where none is known."""
-    if seen is None:
-        return ""
-    shown = list(dict.fromkeys(text for v in seen.values if (text := completion.show_value(v)) is not None))
-    if not shown:
-        return ""
-    more = ", …" if seen.count > len(seen.values) and len(shown) > 1 else ""
-    return "= " + ", ".join(f"`{text}`" for text in shown) + more
-
-
-# ---------------------------------------------------------------- what the model offers
 
 
 def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
@@ -209,10 +179,10 @@ def _transform_facts(document: Document, use: Use) -> str:
     node = next(_calls(document, use), None)
     seen = seen_at(document, document, node.span.start, node.span.end) if node is not None else None
     values = seen.values if seen is not None else []
-    parts = []
+    parts, space = [], space_of(document)
     for item in values[:2]:
-        shown = completion.show_transform(item, space_of(document))
-        if shown is not None:
+        steps = completion.steps_of((item,), space) if item.kind in words.TRANSFORMS else ()
+        if (shown := next(completion.show_steps(steps, space), None)) is not None:
             parts.append(f"`{to_nsg.transform(item)}`\n\n```text\n{shown}\n```")
     more = "\n\n…" if len(values) > 2 else ""
     return "\n\n---\n\n" + "\n\n".join(parts) + more if parts else ""
@@ -228,12 +198,15 @@ def _node_facts(document: Document, node: Any) -> str:
         return ""
     space = space_of(document)
     item = created[0]
-    steps = completion.show_chain(item.transforms, space)
+    steps = completion.steps_of(item.transforms, space)
+    low, high = space.stretches(composed(steps))
+    stretch = show(low) if abs(low - high) < 1e-9 * max(high, 1.0) else f"{show(low)} to {show(high)}"
+    merged_steps = (move.step for move in merged(map(Move, steps)))
     chain = "\n".join(to_nsg.transform(t) for t in item.transforms)
     times = f" (the first of {seen.count})" if seen.count > 1 else ""
-    composed = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in steps)
-    stretch = completion.show_stretch(item.transforms, space)
-    return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{composed}\n\nscales by {stretch}"
+    shown = completion.show_steps(merged_steps, space)
+    whole = "\n\nthen\n\n".join(f"```text\n{step}\n```" for step in shown)
+    return f"\n\n---\n\ntransforms{times}:\n{_code(chain)}\ncomposed:\n\n{whole}\n\nscales by {stretch}"
 
 
 _LONGEST: Final = 28

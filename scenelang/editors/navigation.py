@@ -12,7 +12,7 @@ from lsprotocol import types
 from scenelang.editors.context import path_to
 from scenelang.editors.workspace import Document, Workspace, uri_of
 from scenelang.language import library, tree
-from scenelang.language.resolve import Scope, Symbol, Use
+from scenelang.language.resolve import Symbol, Use
 from scenelang.language.tree import walk
 from scenelang.language.words import LANGUAGE, RESERVED, STAGE
 
@@ -40,17 +40,13 @@ def definition(docs: Workspace, document: Document, offset: int) -> types.Locati
     return types.Location(where.uri, where.lines.span(symbol.span))
 
 
-def _uses(docs: Workspace, document: Document, offset: int) -> list[tuple[Document, Use]]:
-    use = document.names.at(offset)
-    result = docs.definition(document, use) if use is not None else None
-    return list(docs.uses(*result)) if result is not None else []
-
-
 def references(docs: Workspace, document: Document, offset: int, declaration: bool) -> list[types.Location]:
     """All uses of the definition that the name at an offset means."""
+    use = document.names.at(offset)
+    result = docs.definition(document, use) if use is not None else None
     return [
         types.Location(where.uri, where.lines.range(use.start, use.end))
-        for where, use in _uses(docs, document, offset)
+        for where, use in (docs.uses(*result) if result is not None else ())
         if declaration or not use.defines
     ]
 
@@ -74,15 +70,8 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
     return [types.DocumentHighlight(place(u.start, u.end), write if u.defines else read) for u in same]
 
 
-# ---------------------------------------------------------------- rename
-
-
 def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
-    """The name at an offset, where it may be changed.
-
-    Raises:
-        Refused: it belongs to the language or to a model.
-    """
+    """The name at an offset; raises `Refused` where it belongs to the language or to a model."""
     use = document.names.at(offset)
     if use is None:
         return None
@@ -96,10 +85,7 @@ def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.Pr
 def rename(
     docs: Workspace, document: Document, offset: int, new: str, versioned: bool
 ) -> types.WorkspaceEdit | None:
-    """Rename a definition and all its uses, in all files.
-
-    Args:
-        versioned: whether the client supports edits of a version of a document.
+    """Rename a definition and all its uses, in all files, in versioned edits where the client takes them.
 
     Raises:
         Refused: the new name is not a name, or would mean something else somewhere.
@@ -112,7 +98,12 @@ def rename(
     _check_owner(where, use)
     if new == symbol.name:
         return None
-    _check_name(new, symbol)
+    if not _NAME.fullmatch(new):
+        raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
+    if new in RESERVED:
+        raise Refused(f"`{new}` is a keyword")
+    if symbol.kind == "module" and new in LANGUAGE:
+        raise Refused(f"`{new}` is a word of the language and names no module")
     places = list(docs.uses(where, symbol))
     for other, place in places:
         _check_place(other, place, symbol, new)
@@ -133,27 +124,17 @@ def _check_owner(where: Document, use: Use) -> None:
         raise Refused(f"`{use.text}` belongs to the library that ships")
 
 
-def _check_name(new: str, symbol: Symbol) -> None:
-    if not _NAME.fullmatch(new):
-        raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
-    if new in RESERVED:
-        raise Refused(f"`{new}` is a keyword")
-    if symbol.kind == "module" and new in LANGUAGE:
-        raise Refused(f"`{new}` is a word of the language and names no module")
-
-
 def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
     """Raise `Refused` where the new name already means something else at a place to rename."""
     if place.role in ("member", "argument"):
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
-    inner: Scope | None = scope
-    while inner is not None:
-        taken = inner.symbols.get(new)
-        if taken is not None:
+    for inner in scope.outwards():
+        if (taken := inner.symbols.get(new)) is not None:
             line = taken.span.locate()[0][0]
             raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
-        inner = None if inner is symbol.scope else inner.parent
+        if inner is symbol.scope:
+            return
 
 
 def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
@@ -171,9 +152,6 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
             raise Refused(f"`{new}` in line {line} of {where.name} would mean this")
-
-
-# ---------------------------------------------------------------- links
 
 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
@@ -275,9 +253,6 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
                 if len(result) >= 500:
                     return result
     return result
-
-
-# ---------------------------------------------------------------- folding
 
 
 def folding(document: Document) -> list[types.FoldingRange]:

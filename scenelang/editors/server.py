@@ -1,4 +1,4 @@
-"""The language server: one client's session, its checks, diagnostics, fixes and formatting.
+"""The language server: one client's session, its checks, diagnostics, fixes, formatting, and its answers.
 
 Syntax is checked at once, in the loop that reads messages. Evaluation waits until the typing pauses and runs
 on a thread of its own; its result is dropped where the text has changed meanwhile.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import re
 import sys
 import threading
 from base64 import b64encode
@@ -18,20 +17,21 @@ from difflib import SequenceMatcher
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 from lsprotocol import types
-from pygls.exceptions import JsonRpcException, JsonRpcInvalidRequest
+from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
 from scenelang.assets.element import Element
-from scenelang.assets.records import Record
+from scenelang.editors import completion, context, hover, navigation
 from scenelang.editors.workspace import (
     Checked,
     Document,
     Lines,
+    Settings,
     Superseded,
     Workspace,
     check,
@@ -42,6 +42,7 @@ from scenelang.editors.workspace import (
 from scenelang.language import pages, tree
 from scenelang.language.diagnostics import Diagnostic, Span, apply_fixes
 from scenelang.language.pages import CODES
+from scenelang.language.reports import SceneError
 
 
 def to_location(span: Span, document: Document) -> types.Location:
@@ -68,9 +69,11 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         place = document.lines.span(d.span)
     else:
         here = next((label.span for label in d.labels if label.span.source.name == name), None)
-        where = here or _import_of(d.span.source.name, document)
-        if where is None:
+        imports = [stmt.path for stmt in document.file.statements if isinstance(stmt, tree.Import)]
+        named = [path for path in imports if d.span.source.name.endswith(Path(path.value).name)]
+        if here is None and not imports:
             return None
+        where = here or [*named, *imports][0].span
         place = document.lines.span(where)
         message = f"in `{Path(d.span.source.name).name}`: {message}"
         related.insert(0, types.DiagnosticRelatedInformation(to_location(d.span, document), d.message))
@@ -86,15 +89,6 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
         tags=[types.DiagnosticTag.Unnecessary] if d.code == "W0201" else None,
         related_information=related or None,
     )
-
-
-def _import_of(name: str, document: Document) -> Span | None:
-    """The import statement that brings a file, or the first one where it is brought by another."""
-    imports = [stmt for stmt in document.file.statements if isinstance(stmt, tree.Import)]
-    for stmt in imports:
-        if name.endswith(Path(stmt.path.value).name):
-            return stmt.path.span
-    return imports[0].path.span if imports else None
 
 
 @cache
@@ -114,31 +108,27 @@ def code_actions(
     document: Document, place: types.Range, only: Sequence[str] | None
 ) -> list[types.CodeAction]:
     """Code actions for the mistakes in a range: of the kinds asked for, or of all."""
-    lines = document.lines
+
+    def wanted(kind: str) -> bool:  # `source` asks for `source.fixAll` too
+        prefixes = [f"{getattr(asked, 'value', asked)}." for asked in only or ()]
+        return not only or kind in only or kind.startswith(tuple(prefixes))
+
+    lines, actions = document.lines, []
     start, end = lines.offset(place.start), lines.offset(place.end)
+    first, last = lines.position(start).line, lines.position(end).line
     result = [*document.syntax, *document.semantic]
-    here = [
-        d
-        for d in result
-        if d.span is not None
-        and d.span.source.name == document.source.name
-        and lines.position(d.span.start).line <= lines.position(end).line
-        and lines.position(d.span.end).line >= lines.position(start).line
-    ]
-    actions = []
-    if _wants(only, types.CodeActionKind.QuickFix):
-        near = [d for d in here if d.span is not None and d.span.start <= end and d.span.end >= start]
-        actions += [_quick(document, d, d in near) for d in here if _is_ours(document, d)]
-    if _wants(only, FIX_ALL):
-        actions += _fix_all(document, result)
+    for d in result if wanted(types.CodeActionKind.QuickFix) else ():
+        if d.span is None or d.span.source.name != document.source.name or not _is_ours(document, d):
+            continue
+        if lines.position(d.span.start).line <= last and lines.position(d.span.end).line >= first:
+            actions.append(_quick(document, d, d.span.start <= end and d.span.end >= start))
+    if wanted(FIX_ALL):
+        text, done = apply_fixes(document.text, [d for d in result if _is_ours(document, d)])
+        if done and text != document.text:
+            title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
+            edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
+            actions.append(types.CodeAction(title, kind=FIX_ALL, edit=edit))
     return actions
-
-
-def _wants(only: Sequence[str] | None, kind: str) -> bool:
-    """True where a kind is asked for; `source` asks for `source.fixAll` too."""
-    if not only:
-        return True
-    return any(kind == asked or kind.startswith(f"{getattr(asked, 'value', asked)}.") for asked in only)
 
 
 def _is_ours(document: Document, d: Diagnostic) -> bool:
@@ -156,34 +146,6 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
         is_preferred=preferred,
         edit=types.WorkspaceEdit(changes={document.uri: edits}),
     )
-
-
-def _fix_all(document: Document, diagnostics: Sequence[Diagnostic]) -> list[types.CodeAction]:
-    text, done = apply_fixes(document.text, [d for d in diagnostics if _is_ours(document, d)])
-    if not done or text == document.text:
-        return []
-    title = f"Fix all {len(done)} mistakes with a safe fix" if len(done) > 1 else "Fix the mistake"
-    edit = types.WorkspaceEdit(changes={document.uri: text_edits(document, text)})
-    return [types.CodeAction(title, kind=FIX_ALL, edit=edit)]
-
-
-# ---------------------------------------------------------------- formatting
-
-
-def formatted(document: Document, place: types.Range | None = None) -> list[types.TextEdit]:
-    """Edits that format a text, or the statements that a range touches.
-
-    Raises:
-        SceneError: the text has syntax errors.
-    """
-    from scenelang.language.formatting import format_range, format_text
-
-    text, name = document.text, document.source.name
-    if place is None:
-        return text_edits(document, format_text(text, name=name))
-    low, high = document.lines.offset(place.start), document.lines.offset(place.end)
-    start, end, new = format_range(text, low, high, name=name)
-    return text_edits(document, text[:start] + new + text[end:])
 
 
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
@@ -208,76 +170,7 @@ def text_edits(document: Document, text: str) -> list[types.TextEdit]:
 
 log = logging.getLogger("scenelang.lsp")
 _DEEP: Final = 10_000  # trees are up to 200 levels deep, walks take a few calls a level
-MAX_PAUSE_MS: Final = 60_000
 MAX_DRAWN: Final = 100  # thumbnails that are cached
-_LENGTH: Final = re.compile(rb"Content-Length: *(\d+)\r\n\Z")
-_MOST_DIGITS: Final = 8  # below 100 MB: the largest text there may be, each character escaped
-_CHUNK: Final = 1 << 16
-_LONGEST: Final = 64  # bytes of a header that counts
-
-
-class Settings(Record):
-    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
-
-    Args:
-        debounce_ms: pause in typing after which a scene is evaluated.
-        model: draw with this model instead of the scene's.
-        root: the folder that imports cannot leave, instead of the scene's.
-    """
-
-    debounce_ms: float = 200.0
-    model: str | None = None
-    root: Path | None = None
-    value_hints: bool = True
-    argument_hints: bool = True
-
-    @classmethod
-    def read(cls, options: Any) -> Settings:
-        """Read a client's settings; one that is missing, of another type or out of range has its default."""
-        given = options.get("scenelang", options) if isinstance(options, dict) else None
-        if not isinstance(given, dict):
-            return cls()
-        hints = given.get("inlayHints")
-        hints = hints if isinstance(hints, dict) else {}
-        pause, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
-        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0 <= pause <= MAX_PAUSE_MS:
-            pause = cls().debounce_ms
-        return cls(
-            debounce_ms=float(pause),
-            model=model if isinstance(model, str) and model else None,
-            root=Path(root).expanduser() if isinstance(root, str) and root else None,
-            value_hints=hints.get("values") is not False,
-            argument_hints=hints.get("arguments") is not False,
-        )
-
-
-class Incoming:
-    """A stream that skips messages of 100 MB and more, up to the next one's header.
-
-    No JSON holds a line that ends like a header, as newlines in strings are escaped. ``refuse`` is called for
-    each skipped message, from the thread that reads.
-    """
-
-    def __init__(self, stream: BinaryIO, refuse: Callable[[], None]) -> None:
-        self._stream, self._refuse = stream, refuse
-
-    def readline(self) -> bytes:
-        """A line of a header; empty at the end."""
-        line = b""
-        while True:
-            piece = self._stream.readline(_CHUNK)
-            line = line[-_LONGEST:] + piece
-            if not piece or piece.endswith(b"\n"):
-                break
-        length = _LENGTH.search(line)
-        if length is None or len(length[1]) <= _MOST_DIGITS:
-            return line if length is None else length[0]
-        self._refuse()
-        return b"\n"
-
-    def read(self, size: int) -> bytes:
-        """A message."""
-        return self._stream.read(size)
 
 
 def _plain(method: str) -> Any:
@@ -300,12 +193,6 @@ class Protocol(LanguageServerProtocol):
             if "id" in data and "method" in data:
                 self._send_response(data["id"], error=error.to_response_error())
             raise
-
-    @lsp_method(types.INITIALIZE)
-    def lsp_initialize(self, params: types.InitializeParams) -> Any:
-        if self._workspace is not None:
-            raise JsonRpcInvalidRequest("the server is initialized already")
-        return (yield from super().lsp_initialize(params))
 
     lsp_text_document__did_open = _plain(types.TEXT_DOCUMENT_DID_OPEN)
     lsp_text_document__did_change = _plain(types.TEXT_DOCUMENT_DID_CHANGE)
@@ -353,13 +240,6 @@ class Server(LanguageServer):
                 log.exception("cannot draw element %s", element.name)
                 self._drawn[element.digest] = ""
         return self._drawn[element.digest]
-
-    def serve(self, source: BinaryIO, answers: BinaryIO) -> None:
-        """Answer one client until it is gone."""
-        error = {"code": JsonRpcInvalidRequest.CODE, "message": "a message of 100 MB or more"}
-        refused = {"jsonrpc": self.protocol.VERSION, "id": None, "error": error}
-        incoming = Incoming(source, lambda: self.protocol._send_data(refused))
-        self.start_io(incoming, answers)  # type: ignore[arg-type]  # it has what is called
 
     # ------------------------------------------------------------ diagnostics
 
@@ -440,3 +320,201 @@ class Server(LanguageServer):
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Keep trouble in the log: a window that pops up helps nobody."""
         log.error("%s", error)
+
+
+_FAILED: Final = -32803  # the protocol's RequestFailed
+
+
+def _watch_files(server: Server, params: types.InitializedParams) -> None:
+    """Ask the client to report scene files that change on the disk."""
+    workspace = server.client_capabilities.workspace
+    watched = workspace.did_change_watched_files if workspace is not None else None
+    if watched is None or not watched.dynamic_registration:
+        return
+    options = types.DidChangeWatchedFilesRegistrationOptions([types.FileSystemWatcher("**/*.nsg")])
+    registration = types.Registration("nsg", types.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
+    server.client_register_capability(types.RegistrationParams([registration]))
+
+
+def _opened(server: Server, params: types.DidOpenTextDocumentParams) -> None:
+    item = params.text_document
+    document = server.docs.put(item.uri, item.text, item.version)
+    server.publish(document)
+    server.schedule(document, 0.0)
+    server.changed(document.path, item.uri)
+
+
+def _changed(server: Server, params: types.DidChangeTextDocumentParams) -> None:
+    document = server.docs.open.get(params.text_document.uri)
+    if document is None:
+        log.warning("change of a document that is not open: %s", params.text_document.uri)
+        return
+    for change in params.content_changes:
+        document.change(change)
+    document.version = params.text_document.version
+    server.publish(document)
+    server.schedule(document)
+    server.changed(document.path, document.uri)
+
+
+def _saved(server: Server, params: types.DidSaveTextDocumentParams) -> None:
+    document = server.docs.open.get(params.text_document.uri)
+    if document is not None:
+        server.schedule(document, 0.0)
+
+
+def _closed(server: Server, params: types.DidCloseTextDocumentParams) -> None:
+    uri = params.text_document.uri
+    document = server.docs.open.pop(uri, None)
+    server.forget(uri)
+    server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
+    if document is not None:
+        server.changed(document.path, uri)
+
+
+def _files_changed(server: Server, params: types.DidChangeWatchedFilesParams) -> None:
+    for change in params.changes:
+        path = path_of(change.uri)
+        if path is not None:
+            server.changed(path.resolve())
+            server.changed(path)
+
+
+def _configured(server: Server, params: types.DidChangeConfigurationParams) -> None:
+    server.settings = Settings.read(params.settings)
+    for document in server.docs.open.values():
+        server.schedule(document, 0.0)
+
+
+def _folders_changed(server: Server, params: types.DidChangeWorkspaceFoldersParams) -> None:
+    gone = {path_of(folder.uri) for folder in params.event.removed}
+    new = [path_of(folder.uri) for folder in params.event.added]
+    left = [folder for folder in server.docs.folders if folder not in gone]
+    server.docs.folders = [*left, *(path.resolve() for path in new if path is not None)]
+
+
+def _completion(server: Server, document: Document, offset: int) -> types.CompletionList:
+    text = server.client_capabilities.text_document
+    item = text.completion.completion_item if text and text.completion else None
+    return completion.complete(server.docs, document, offset, snippets=bool(item and item.snippet_support))
+
+
+def _rename(server: Server, document: Document, params: types.RenameParams) -> types.WorkspaceEdit | None:
+    offset = document.lines.offset(params.position)
+    workspace = server.client_capabilities.workspace
+    known = workspace.workspace_edit if workspace is not None else None
+    versioned = known is not None and bool(known.document_changes)
+    return navigation.rename(server.docs, document, offset, params.new_name, versioned)
+
+
+def _formatted(server: Server, document: Document, place: types.Range | None) -> list[types.TextEdit] | None:
+    """Edits that format a text, or the statements of a range; None for one with syntax errors."""
+    from scenelang.language.formatting import format_range, format_text
+
+    text, name = document.text, document.source.name
+    try:
+        if place is None:
+            return text_edits(document, format_text(text, name=name))
+        low, high = document.lines.offset(place.start), document.lines.offset(place.end)
+        start, end, new = format_range(text, low, high, name=name)
+        return text_edits(document, text[:start] + new + text[end:])
+    except SceneError:
+        message = "not formatted: the file has syntax errors"
+        server.window_log_message(types.LogMessageParams(types.MessageType.Info, message))
+        return None
+
+
+_SESSION: Final[dict[str, Callable[..., Any]]] = {
+    types.INITIALIZE: Server.begin,
+    types.INITIALIZED: _watch_files,
+    types.SHUTDOWN: lambda server, params: setattr(server, "was_shut_down", True),
+    types.TEXT_DOCUMENT_DID_OPEN: _opened,
+    types.TEXT_DOCUMENT_DID_CHANGE: _changed,
+    types.TEXT_DOCUMENT_DID_SAVE: _saved,
+    types.TEXT_DOCUMENT_DID_CLOSE: _closed,
+    types.WORKSPACE_DID_CHANGE_WATCHED_FILES: _files_changed,
+    types.WORKSPACE_DID_CHANGE_CONFIGURATION: _configured,
+    types.WORKSPACE_DID_CHANGE_WORKSPACE_FOLDERS: _folders_changed,
+    types.WORKSPACE_SYMBOL: lambda server, params: navigation.workspace_symbols(server.docs, params.query),
+}
+_AT_PLACE: Final[dict[str, Callable[[Server, Document, int], Any]]] = {
+    types.TEXT_DOCUMENT_COMPLETION: _completion,
+    types.TEXT_DOCUMENT_SIGNATURE_HELP: lambda s, d, at: context.signature_help(s.docs, d, at),
+    types.TEXT_DOCUMENT_HOVER: lambda s, d, at: hover.hover(s.docs, d, at, s.thumbnail),
+    types.TEXT_DOCUMENT_DEFINITION: lambda s, d, at: navigation.definition(s.docs, d, at),
+    types.TEXT_DOCUMENT_PREPARE_RENAME: lambda s, d, at: navigation.prepare_rename(s.docs, d, at),
+}
+_OF_FILE: Final[dict[str, Callable[[Server, Document, Any], Any]]] = {
+    types.TEXT_DOCUMENT_RENAME: _rename,
+    types.TEXT_DOCUMENT_FORMATTING: lambda s, d, p: _formatted(s, d, None),
+    types.TEXT_DOCUMENT_RANGE_FORMATTING: lambda s, d, p: _formatted(s, d, p.range),
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: lambda s, d, p: completion.semantic_tokens(s.docs, d),
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE: lambda s, d, p: completion.semantic_tokens(s.docs, d, p.range),
+}
+_LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
+    types.TEXT_DOCUMENT_REFERENCES: lambda s, d, p: navigation.references(
+        s.docs, d, d.lines.offset(p.position), p.context.include_declaration
+    ),
+    types.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT: lambda s, d, p: navigation.highlights(
+        s.docs, d, d.lines.offset(p.position)
+    ),
+    types.TEXT_DOCUMENT_SELECTION_RANGE: lambda s, d, p: [
+        navigation.selection(d, d.lines.offset(place)) for place in p.positions
+    ],
+    types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: navigation.document_symbols(d),
+    types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: navigation.folding(d),
+    types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: completion.colours(d),
+    types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: completion.presentations(d, p.color, p.range),
+    types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: code_actions(d, p.range, p.context.only),
+    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hover.inlay_hints(s.docs, d, p.range, s.settings),
+    types.TEXT_DOCUMENT_DOCUMENT_LINK: lambda s, d, p: navigation.links(s.docs, d),
+}
+_OPTIONS: Final = {
+    types.TEXT_DOCUMENT_DID_SAVE: types.SaveOptions(include_text=False),
+    types.TEXT_DOCUMENT_COMPLETION: types.CompletionOptions(trigger_characters=[*'.(,="/']),
+    types.TEXT_DOCUMENT_SIGNATURE_HELP: types.SignatureHelpOptions(
+        trigger_characters=["(", ","], retrigger_characters=["=", ")"]
+    ),
+    types.TEXT_DOCUMENT_CODE_ACTION: types.CodeActionOptions([types.CodeActionKind.QuickFix, FIX_ALL]),
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: completion.LEGEND,
+    types.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE: completion.LEGEND,
+    types.TEXT_DOCUMENT_INLAY_HINT: types.InlayHintOptions(resolve_provider=False),
+}
+
+
+def _answer(server: Server, method: str, params: Any) -> Any:
+    if method in _SESSION:
+        return _SESSION[method](server, params)
+    document = server.docs.get(params.text_document.uri)
+    if document is None:
+        return [] if method in _LISTS else None
+    if method in _AT_PLACE:
+        return _AT_PLACE[method](server, document, document.lines.offset(params.position))
+    return (_LISTS.get(method) or _OF_FILE[method])(server, document, params)
+
+
+def _handler(method: str) -> Callable[[Server, Any], Any]:
+    """The handler of a method for pygls; a failure leaves the editor without an answer and is logged."""
+
+    def handle(ls: Server, params: Any) -> Any:
+        try:
+            return _answer(ls, method, params)
+        except navigation.Refused as reason:
+            raise JsonRpcException(str(reason), _FAILED) from None
+        except JsonRpcException:
+            raise
+        except Exception as error:
+            log.exception("internal error in %s", method)
+            message = f"internal error in {method}: {error!r}"
+            ls.window_log_message(types.LogMessageParams(types.MessageType.Error, message))
+            return [] if method in _LISTS else None
+
+    return handle
+
+
+def make_server(draw: Callable[[Element], bytes] | None = None) -> Server:
+    """A server with all its features; ``draw`` makes a small PNG of an element."""
+    server = Server(draw)
+    for method in (*_SESSION, *_AT_PLACE, *_OF_FILE, *_LISTS):
+        server.feature(method, _OPTIONS.get(method))(_handler(method))
+    return server

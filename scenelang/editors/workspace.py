@@ -1,13 +1,7 @@
 """Documents of the client, their imports and positions, and the check that runs in the background.
 
-The protocol counts lines, ended by LF, CRLF or CR, and columns in code units of an encoding that client and
-server agree on; everything here counts code points of the whole text.
-
-A check does not touch a `Document`: it gets its input when it begins and returns one value, so that it may
-run while the user edits.
-
-An open buffer stands for its file, which need not be on the disk yet. Files that are not open are read when
-they are needed, and again when they have changed.
+Offsets count code points of the whole text. A check does not touch a `Document`: it gets its input when it
+begins and returns one value, so that it may run while the user edits. An open buffer stands for its file.
 """
 
 from __future__ import annotations
@@ -25,6 +19,7 @@ from typing import Any, Final, Literal
 from lsprotocol import types
 from pygls.uris import from_fs_path, to_fs_path
 
+from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.compiler.check import check_compiles, check_frames
@@ -126,15 +121,6 @@ def width(text: str, encoding: Encoding) -> int:
     return len(text) + sum(character > "\uffff" for character in text)
 
 
-def applied(lines: Lines, change: types.TextDocumentContentChangeEvent) -> tuple[str, Edit]:
-    """The text after one change, and what changed."""
-    text = lines.text
-    if not isinstance(change, types.TextDocumentContentChangePartial):
-        return change.text, difference(text, change.text)
-    start, end = sorted((lines.offset(change.range.start), lines.offset(change.range.end)))
-    return text[:start] + change.text + text[end:], Edit(start, end, start + len(change.text))
-
-
 MAX_SEEN: Final = 4  # values and nodes that are recorded of one place
 
 
@@ -144,12 +130,7 @@ class Superseded(Exception):
 
 @dataclass(slots=True)
 class Seen:
-    """Values or nodes of one place during an evaluation.
-
-    Args:
-        values: the first few of the first frame, in order, each once.
-        count: the number of all.
-    """
+    """The first few values or nodes of one place in an evaluation, each once, and the number of all."""
 
     values: list[Any] = field(default_factory=list)
     count: int = 0
@@ -157,20 +138,13 @@ class Seen:
 
 @dataclass(slots=True)
 class Checked:
-    """The result of a check.
-
-    Args:
-        diagnostics: mistakes and warnings of evaluation and compiler, without those of syntax.
-        wanted: the files that it imports, also those that are not there.
-        seen: by file name, start and end: values of names, nodes of statements.
-        manifest: the model that draws it, where that is known.
-    """
+    """The result of a check."""
 
     source: SourceFile
-    diagnostics: list[Diagnostic]
-    wanted: frozenset[Path]
-    seen: dict[tuple[str, int, int], Seen]
-    manifest: Manifest | None = None
+    diagnostics: list[Diagnostic]  # of evaluation and compiler
+    wanted: frozenset[Path]  # the files that it imports, also those that are not there
+    seen: dict[tuple[str, int, int], Seen]  # by file name, start and end
+    manifest: Manifest | None = None  # the model that draws it, where that is known
 
 
 def check(
@@ -182,19 +156,14 @@ def check(
     parsed: bool,
     stop: threading.Event,
 ) -> Checked:
-    """Evaluate a scene and run the compiler's checks.
+    """Evaluate a scene and run the compiler's checks; raises `Superseded` where ``stop`` was set meanwhile.
 
     Args:
-        file: the tree.
-        path: its file, if it has one.
+        file, path: the tree, and its file if it has one.
         root: the folder that imports cannot leave; by default the file's.
         texts: texts of open files.
         model: draw with this model instead of the scene's.
         parsed: the text has no syntax mistakes.
-        stop: asks it to give up.
-
-    Raises:
-        Superseded: ``stop`` was set meanwhile.
     """
     result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
@@ -229,6 +198,43 @@ def check(
     return Checked(file.span.source, in_file_order(result.items), wanted, seen, manifest)
 
 
+MAX_PAUSE_MS: Final = 60_000
+
+
+class Settings(Record):
+    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+
+    Args:
+        debounce_ms: pause in typing after which a scene is evaluated.
+        model: draw with this model instead of the scene's.
+        root: the folder that imports cannot leave, instead of the scene's.
+    """
+
+    debounce_ms: float = 200.0
+    model: str | None = None
+    root: Path | None = None
+    value_hints: bool = True
+    argument_hints: bool = True
+
+    @classmethod
+    def read(cls, options: Any) -> Settings:
+        """Read a client's settings; one that is missing, of another type or out of range has its default."""
+        given = options.get("scenelang", options) if isinstance(options, dict) else None
+        given = given if isinstance(given, dict) else {}
+        hints = given.get("inlayHints")
+        hints = hints if isinstance(hints, dict) else {}
+        pause, model, root = given.get("debounceMs"), given.get("model"), given.get("root")
+        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0 <= pause <= MAX_PAUSE_MS:
+            pause = cls().debounce_ms
+        return cls(
+            debounce_ms=float(pause),
+            model=model if isinstance(model, str) and model else None,
+            root=Path(root).expanduser() if isinstance(root, str) and root else None,
+            value_hints=hints.get("values") is not False,
+            argument_hints=hints.get("arguments") is not False,
+        )
+
+
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
 MAX_TEXT: Final = 2_000_000
 """Characters of a text that is parsed; its tree, tokens and places take a hundred times as many bytes."""
@@ -236,25 +242,16 @@ MAX_TEXT: Final = 2_000_000
 
 @dataclass(eq=False)
 class Document:
-    """A text with its tree and what is known about it.
-
-    Args:
-        uri: its address for the client.
-        path: its resolved file; None for a buffer that has none.
-        version: the client's number of this text; None for a file that is not open.
-        checked: the last evaluation that ended, perhaps of an older text.
-        edits: the edits since that.
-        semantic: its diagnostics, at their current places.
-    """
+    """A text with its tree and what is known about it."""
 
     uri: str
-    path: Path | None
+    path: Path | None  # resolved; None for a buffer that has none
     source: SourceFile
-    version: int | None = None
+    version: int | None = None  # the client's number of this text; None for a file that is not open
     encoding: Encoding = "utf-16"
-    checked: Checked | None = None
-    edits: list[Edit] = field(default_factory=list)
-    semantic: list[Diagnostic] = field(default_factory=list)
+    checked: Checked | None = None  # of the last evaluation that ended, perhaps of an older text
+    edits: list[Edit] = field(default_factory=list)  # since that
+    semantic: list[Diagnostic] = field(default_factory=list)  # of that, at their current places
 
     @property
     def name(self) -> str:
@@ -307,7 +304,12 @@ class Document:
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
-        text, edit = applied(self.lines, change)
+        if isinstance(change, types.TextDocumentContentChangePartial):
+            start, end = sorted((self.lines.offset(change.range.start), self.lines.offset(change.range.end)))
+            text = self.text[:start] + change.text + self.text[end:]
+            edit = Edit(start, end, start + len(change.text))
+        else:
+            text, edit = change.text, difference(self.text, change.text)
         source = SourceFile(self.source.name, text)
         self.source = source
         self.edits.append(edit)

@@ -1,14 +1,8 @@
 """Parts of a page: its script, the blob of arrays, elements, and the rows of a Program.
 
-The files of ``viewer/`` are ES modules for the sake of editors and tests. A page gets them one after the
-other in one scope, without imports and exports, so names at their top level differ across all of them.
-
-Arrays lie in one blob. The data names an array as ``[kind, offset, count]``: a kind of `KINDS`, an offset in
-bytes into the blob, a multiple of 4, and a count of numbers. Pyramids of elements are unfolded by the page
-(``viewer/grids.js``), as their steps, deflated, are a fifth of the grid.
-
-Rows of a Program never change; those of a scene with params are made by the page's evaluator
-(``viewer/graph.js``).
+The files of ``viewer/`` are ES modules; a page gets them one after the other in one scope, so names at their
+top level differ across all of them. The data names an array in the blob as ``[kind, offset, count]``: a kind
+of `KINDS`, bytes, a multiple of 4, and a count of numbers.
 """
 
 from __future__ import annotations
@@ -96,11 +90,7 @@ def packed(data: bytes) -> str:
 
 
 def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
-    """Entries of a view's ``shapes`` for the geometries among elements.
-
-    Raises:
-        ProgramError: one is damaged.
-    """
+    """Entries of a view's ``shapes`` for the geometries among elements; raises `ProgramError`."""
     return [_shape(element, store) for element in elements if not element.material]
 
 
@@ -178,11 +168,6 @@ Step = list[Any]
 def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_codes: np.ndarray) -> list[Row]:
     """Rows of a Program as JSON data, see docs/architecture.md.
 
-    Args:
-        program: compiled for the manifest's model.
-        codes: (geometries, C) of its weights.
-        material_codes: (materials, .) likewise.
-
     Raises:
         ProgramError: a vector is not one that a scene compiles to.
     """
@@ -190,7 +175,10 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     parts = layout.unpack(program.vectors)
     forms = [at for at, element in enumerate(program.elements) if not element.material]
     paints = [element for element in program.elements if element.material]
-    scales = _scales(program, layout)
+    if layout.dimension == 2:  # world distances per leaf distance
+        scales = Frames(program.vectors, layout).scale.tolist()
+    else:
+        scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
     rows = []
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
@@ -240,13 +228,6 @@ def _index(known: np.ndarray, code: np.ndarray) -> int:
     if not len(result):
         raise ProgramError("codes that are not the model's")
     return int(result[0])
-
-
-def _scales(program: Program, layout: Layout) -> list[float]:
-    """World distances per leaf distance."""
-    if layout.dimension == 2:
-        return list(Frames(program.vectors, layout).scale.tolist())
-    return [read_solid_frame(vector, layout).scale for vector in program.vectors]
 
 
 def _row_steps(v: np.ndarray, layout: Layout) -> list[Step]:

@@ -25,7 +25,7 @@ from scenelang.assets.element import credit_of
 from scenelang.assets.files import write_output
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
-from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError, load_program
 from scenelang.compiler.spaces import encoded
 from scenelang.drawing.neural.files import load_arrays
@@ -72,12 +72,18 @@ def alternative(data: dict[str, Any]) -> str:
     around = np.append(groups.joins, UNION)[groups.path]
     joins = np.column_stack([around, groups.tokens])  # of rows and of the groups that they are in
     holes, drawn = (joins == SUBTRACT).any(1), (joins <= SMOOTH).all(1)
-    parts = _counted(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
+    counts = Counter(shapes[rows[at]["shape"]] for at in np.flatnonzero(~holes))
+    several = {name: f"{n:,} {_PLURALS.get(name, f'{name}s')}" for name, n in counts.most_common(MOST)}
+    one = {name: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for name, n in counts.items() if n == 1}
+    parts = _listed([one.get(name, text) for name, text in several.items()], len(counts))
     said = f"A {'3D scene' if solid else 'picture'} of {parts}" if parts else "An empty picture"
     if count := int(holes.sum()):
         said += f", with {count:,} cut-outs" if count > 1 else ", with a cut-out"
-    plain = [rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0]
-    colours = Counter(colour_name(_colour(data, row)) for row in plain)
+    colours: Counter[str] = Counter()
+    for row in (rows[at] for at in np.flatnonzero(drawn) if rows[at]["paint"] < 0):
+        albedo = data["materials"][row["material"]]["albedo"]
+        r, g, b = (a * c for a, c in zip(albedo, row["colour"], strict=True))
+        colours[colour_name(encoded((r, g, b)) if solid else (r, g, b))] += 1
     if colours:
         said += f", in {_listed([name for name, _ in colours.most_common(MOST)], len(colours))}"
     stage, background = program["stage"], program["background"]
@@ -111,24 +117,6 @@ def colour_name(rgb: Iterable[float]) -> str:
     return f"light {name}" if light > 0.75 else f"dark {name}" if light < 0.3 else name
 
 
-def _colour(data: dict[str, Any], row: dict[str, Any]) -> Iterable[float]:
-    albedo = data["materials"][row["material"]]["albedo"]
-    colour = [a * c for a, c in zip(albedo, row["colour"], strict=True)]
-    return encoded((colour[0], colour[1], colour[2])) if data["dimension"] == 3 else colour
-
-
-def _counted(names: Iterable[str]) -> str:
-    """``2 squares, a pentagon and a star``."""
-    counts = Counter(names)
-    return _listed([_several(name, n) for name, n in counts.most_common(MOST)], len(counts))
-
-
-def _several(name: str, count: int) -> str:
-    if count == 1:
-        return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-    return f"{count:,} {_PLURALS.get(name, f'{name}s')}"
-
-
 def _listed(names: list[str], count: int) -> str:
     if count > len(names):
         names = [*names, "more"]
@@ -140,12 +128,7 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The content of a page.
-
-    Args:
-        data: JSON data; docs/architecture.md has its parts.
-        blob: the arrays that it names.
-    """
+    """The content of a page: JSON data, see docs/architecture.md, and the arrays that it names."""
 
     data: dict[str, Any]
     blob: bytes = field(repr=False)
@@ -163,14 +146,11 @@ def view_of(
     form: Form | None = None,
     animation: Animation | None = None,
 ) -> View:
-    """The view of a Program; without a form its numbers never change.
+    """The view of a Program that was compiled for a shipped model.
 
     Args:
-        program: compiled for a shipped model.
-        title: of the page.
         source: names and texts of the files that it was compiled from.
-        form: of the scene that it was compiled from.
-        animation: of that scene.
+        form: of the scene that it was compiled from; without one its numbers never change.
 
     Raises:
         ProgramError: it was compiled for other weights, or no page can draw its model.
@@ -185,6 +165,9 @@ def view_of(
     elements = (*form.shapes, *form.paints) if form else program.elements
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
     geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
+    figures = manifest.measured.get("sets", {}).get(manifest.set)  # errors on the scenes of its own set
+    measured = {} if figures is None else {"cap": manifest.measured.get("psnr_cap_db")}
+    measured |= {} if figures is None else {key: figures[key] for key in ("scenes", "psnr", "flip")}
     data: dict[str, Any] = {
         "format": FORMAT,
         "title": title,
@@ -194,7 +177,7 @@ def view_of(
             "name": manifest.name,
             "summary": manifest.summary,
             "weights": digest,
-            "measured": _measured(manifest),
+            "measured": measured,
         },
         "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [
@@ -224,15 +207,6 @@ def view_of(
     return View(data, store.bytes())
 
 
-def _measured(manifest: Manifest) -> dict[str, Any]:
-    """Errors of a model against exact pictures, on the scenes of its own set."""
-    figures = manifest.measured.get("sets", {}).get(manifest.set)
-    if figures is None:
-        return {}
-    cap = manifest.measured.get("psnr_cap_db")
-    return {"cap": cap, **{key: figures[key] for key in ("scenes", "psnr", "flip")}}
-
-
 MOST_TITLE: Final = 200
 _POLICY: Final = (
     "default-src 'none'; script-src '{loader}' '{code}'; style-src '{style}'; img-src data: blob:; "
@@ -246,7 +220,6 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     """An HTML file that draws a view; nothing in it comes from elsewhere, and its policy allows nothing to.
 
     Args:
-        view: what it shows.
         still: a WebP for browsers without WebGL2 or JavaScript.
         embedded: leave out heading, sources and licences, for a frame in another page.
     """
@@ -388,23 +361,18 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]
 def scene_view(
     program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
 ) -> View:
-    """The view of a compiled scene.
-
-    Args:
-        program: compiled from the scene; the page shows it at first.
-        scene: None for a Program from a file.
-        evaluation: of the scene's text, after the run that gave the scene; None for one without text.
-        title: of the page.
-    """
+    """The view of a compiled scene, None for a Program from a file; the evaluation is that of its text."""
     source: list[tuple[str, str]] = []
     form = None
     if evaluation is not None:
         form = form_of(evaluation, load_manifest(program.model), program.elements)
-        first = evaluation.sources[0].name
-        own = [text for text in evaluation.sources if not library.holds(text)]
-        source = [(_shown(text.name, first), text.text) for text in own]
-    elif scene is not None and len(text := scene.to_nsg()) <= _MOST_TEXT:
-        source = [(f"{title or 'scene'}.nsg", text)]
+        folder = os.path.dirname(evaluation.sources[0].name)
+        for text in evaluation.sources:
+            if not library.holds(text):  # a file outside the folder is shown without its path
+                place = os.path.relpath(text.name, folder).replace(os.sep, "/")
+                source.append((Path(text.name).name if place.startswith("../") else place, text.text))
+    elif scene is not None and len(written := scene.to_nsg()) <= _MOST_TEXT:
+        source = [(f"{title or 'scene'}.nsg", written)]
     animation = None if scene is None else scene.animation
     return view_of(program, title=title, source=source, form=form, animation=animation)
 
@@ -419,11 +387,7 @@ def still(program: Program) -> bytes:
 def frame(value: Scene | Program, picture: Image) -> str:
     """The viewer of a Scene or a Program as HTML for a notebook, in a frame that may run scripts alone.
 
-    Args:
-        picture: of the value, for browsers that cannot draw it.
-
-    Returns:
-        The HTML, empty where no page can draw its model.
+    Empty where no page can draw its model. Browsers that cannot draw it show ``picture``.
     """
     program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
     try:
@@ -448,9 +412,3 @@ def _packed(picture: PIL.Image.Image) -> bytes:
         if data.tell() <= _MOST_STILL:
             break
     return data.getvalue()
-
-
-def _shown(name: str, first: str) -> str:
-    """A file's name on a page: its path from the scene's folder; of a file outside it the last part alone."""
-    place = os.path.relpath(name, os.path.dirname(first)).replace(os.sep, "/")
-    return Path(name).name if place.startswith("../") else place

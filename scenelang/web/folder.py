@@ -11,7 +11,7 @@ import re
 import secrets
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
@@ -42,12 +42,7 @@ class JobFailed(Exception):
 
 
 class Answer(Record):
-    """Result of a job.
-
-    Args:
-        data: sent to the page.
-        head: facts for the server.
-    """
+    """Result of a job: what is sent to the page, and facts for the server."""
 
     data: bytes
     head: dict[str, Any] = field(default_factory=dict)
@@ -62,12 +57,7 @@ class Changed(Exception):
 
 
 class Folder:
-    """A folder of scenes.
-
-    Args:
-        path: the folder.
-        root: the folder that imports cannot leave; None for each scene's own.
-    """
+    """A folder of scenes, and the root that imports cannot leave; None for each scene's own folder."""
 
     def __init__(self, path: Path, root: Path | None = None) -> None:
         self.path, self.root = path.resolve(), root.resolve() if root is not None else None
@@ -93,11 +83,7 @@ class Folder:
         return sorted(result, key=lambda name: (name.count("/"), name))[:MOST_FILES]
 
     def place(self, name: str) -> Path:
-        """The path of a file, which need not be there.
-
-        Raises:
-            Refused: the name is not one of a scene, or leads out of the folder.
-        """
+        """The path of a file, which need not be there; raises `Refused` for other names than scenes'."""
         if not fits(name):
             raise Refused(f"`{repr(name[:80])[1:-1]}` is not the name of a scene in this folder")
         path = self.path / name
@@ -110,11 +96,7 @@ class Folder:
         return path
 
     def read(self, name: str) -> tuple[str | None, str | None]:
-        """The text of a file, with ``\\n`` at the end of lines, and its digest; None and None without a file.
-
-        Raises:
-            Refused: it is not text, is too large or cannot be read.
-        """
+        """The text of a file, lines ended by ``\\n``, and its digest; None and None without a file."""
         try:
             data = read_regular(self.place(name), MAX_BYTES)
             text = decode_source(data, name).text
@@ -281,12 +263,7 @@ def state_folder(environment: Mapping[str, str], platform: str) -> Path:
 
 
 class Files:
-    """Files for download, each to be fetched once.
-
-    Args:
-        seconds: time after which they are dropped.
-        most: bytes of all of them; the oldest go first.
-    """
+    """Files for download, each to be fetched once, in some seconds; beyond ``most`` bytes the oldest go."""
 
     def __init__(self, seconds: float = 600.0, most: int = 1 << 29) -> None:
         self._seconds, self._most = seconds, most
@@ -317,15 +294,21 @@ def string_of(message: Json, key: str) -> str:
     return value
 
 
+def choice_of(message: Json, key: str, choices: Collection[str]) -> str:
+    value = string_of(message, key)
+    if value not in choices:
+        raise ValueError(f"`{key}` is `{value[:40]}`")
+    return value
+
+
 def text_of(message: Json) -> str:
     """A scene's text."""
     text = string_of(message, "text")
     try:
-        size = len(text.encode())
+        if len(text.encode()) > MAX_BYTES:
+            raise Refused(f"a text of more than {MAX_BYTES // 1_000_000} MB")
     except UnicodeEncodeError:
         raise Refused("the text has halves of characters") from None
-    if size > MAX_BYTES:
-        raise Refused(f"a text of more than {MAX_BYTES // 1_000_000} MB")
     return text
 
 
@@ -348,14 +331,8 @@ def wishes(message: Json) -> Json:
     params, size = message.get("params") or {}, message.get("size")
     if not isinstance(params, dict):
         raise ValueError("`params` is not an object")
-    if size is not None:
-        if not isinstance(size, list) or len(size) != 2:
-            raise ValueError("`size` is neither null nor two numbers")
-        size = [whole_of({"size": side}, "size", 1, MOST_SIDE) for side in size]
+    if size is not None and (not isinstance(size, list) or len(size) != 2):
+        raise ValueError("`size` is neither null nor two numbers")
+    size = size and [whole_of({"size": side}, "size", 1, MOST_SIDE) for side in size]
     frame = whole_of({"frame": 0, **message}, "frame", 0, 1 << 31)
     return {"params": params, "frame": frame, "size": size}
-
-
-def in_unit(value: Any) -> Any:
-    """A number of radians as a literal of the language; anything else as it is."""
-    return f"{value!r}rad" if isinstance(value, int | float) and not isinstance(value, bool) else value

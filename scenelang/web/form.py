@@ -1,12 +1,9 @@
 """Scenes as forms: their own program as JSON, for the evaluator that runs in a page.
 
-A form is the syntax trees of a scene's files without places and unused names, with names resolved. The scene
-has no mistakes. Words that the page's model does not have are ``["no", why]``, an error only where they run:
-they may stand in a branch that is never taken.
-
-An expression is a number, a boolean, or a list of a word and its operands; a statement is a list likewise; a
-block is a list of statements. ``["g", slot]`` is a variable of a file, and ``["v", hops, slot]`` one of the
-call so many definitions further out. ``viewer/evaluate.js`` runs them.
+A form is the trees of a scene's files, without mistakes, names resolved. An expression is a number, a
+boolean, or a list of a word and its operands; a statement is a list likewise, a block a list of statements.
+``["g", slot]`` is a variable of a file, ``["v", hops, slot]`` one of the call so many definitions further
+out, and ``["no", why]`` a word that the page's model does not have: an error only where it runs.
 """
 
 from __future__ import annotations
@@ -69,28 +66,17 @@ class Scope:
 
 @dataclass(slots=True, eq=False)
 class Bound:
-    """The binding of a name.
+    """The binding of a name."""
 
-    Args:
-        kind: as of `scenelang.language.session.Binding`.
-        scope: the scope of its definition.
-        node: the statement of a fn or module.
-        inside: the names of an imported file.
-        file: that file.
-        at: index of a fn or module in `Writer.calls`, -1 for one that is not called.
-        uses: names of files that it uses.
-        element: the name in a Scene of a geometry from a file of elements.
-    """
-
-    kind: str
-    scope: Scope
+    kind: str  # as of `scenelang.language.session.Binding`
+    scope: Scope  # of its definition
     slot: int = 0
-    node: Any = None
-    inside: Scope | None = None
+    node: Any = None  # the statement of a fn or module
+    inside: Scope | None = None  # the names of an imported file
     file: FileContext | None = None
-    at: int = -1
-    uses: list[Bound] = field(default_factory=list)
-    element: str = ""
+    at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
+    uses: list[Bound] = field(default_factory=list)  # names of files
+    element: str = ""  # the name in a Scene of a geometry from a file of elements
 
 
 @dataclass(slots=True)
@@ -118,26 +104,15 @@ class Lacking(Exception):
 
 
 class Writer:
-    """Writes the statements of a scene's files as forms.
-
-    Args:
-        context: of the scene's file, prepared.
-        manifest: the model that draws the page.
-        elements: those that come first among `shapes` and `paints`.
-
-    Attributes:
-        slots: the number of slots of all files.
-        calls: forms of the fns and modules that are called.
-        params: full name, statement, file and binding of each param.
-        lengths: names of files that ``canvas`` and ``animate`` use.
-        shapes, paints: elements that rows name.
-    """
+    """Writes statements of a scene's files as forms; ``elements`` come first in `shapes` and `paints`."""
 
     def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
-        self.slots = 0
-        self.calls: list[Json] = []
+        self.slots = 0  # of all files
+        self.calls: list[Json] = []  # forms of the fns and modules that are called
         self.uses: list[Bound] = []
+        # full name, statement, file and binding
         self.params: list[tuple[str, nodes.Param, FileContext, Bound]] = []
+        # names of files that these settings use
         self.lengths: dict[str, list[Bound]] = {"canvas": [], "animate": []}
         self.manifest, listed = manifest, list(elements)
         self.files = {file.name: file.zoo for file in context.session.elements.values()}
@@ -145,8 +120,6 @@ class Writer:
         self.textures = load_textures()
         self.shapes = [element for element in listed if not element.material]
         self.paints = [element for element in listed if element.material]
-
-    # ------------------------------------------------------------ blocks and names
 
     def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
         """A block in a scope of its own."""
@@ -166,7 +139,13 @@ class Writer:
         for stmt in statements:
             self.uses = []
             if isinstance(stmt, nodes.Import):
-                lines += self._import(stmt, context, scope)
+                brought, inside = context.scope.names[stmt.alias.text].value, Scope()
+                scope.names[stmt.alias.text] = Bound("import", scope, inside=inside, file=brought)
+                if (imported_tree := context.loader.parsed.get(brought.path)) is not None:
+                    lines += self.file(brought, imported_tree, inside, imported=True)
+                    continue
+                for name, binding in brought.scope.names.items():
+                    inside.names[name] = Bound("element", inside, file=brought, element=binding.value)
             elif isinstance(stmt, nodes.Let | nodes.Param):
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
@@ -181,17 +160,6 @@ class Writer:
             if isinstance(stmt, nodes.Call) and stmt.name.text in self.lengths:
                 self.lengths[stmt.name.text] += self.uses
         return lines
-
-    def _import(self, stmt: nodes.Import, context: FileContext, scope: Scope) -> list[Line]:
-        brought = context.scope.names[stmt.alias.text].value
-        inside = Scope()
-        bound = scope.names[stmt.alias.text] = Bound("import", scope, inside=inside, file=brought)
-        tree = context.loader.parsed.get(brought.path)
-        if tree is not None:
-            return self.file(brought, tree, inside, imported=True)
-        for name, binding in brought.scope.names.items():
-            inside.names[name] = Bound("element", inside, file=bound.file, element=binding.value)
-        return []
 
     def reached(self, roots: Iterable[Bound]) -> set[int]:
         """Identities of all names of files that ``roots`` need; writes the fns and modules among them."""
@@ -272,8 +240,6 @@ class Writer:
         """Arguments, None where one is left out."""
         return [None if value is None else self.expression(value, scope) for value in values]
 
-    # ------------------------------------------------------------ expressions
-
     def expression(self, expr: nodes.Expr, scope: Scope) -> Json:
         """An expression: a number, a boolean, or a word and its operands."""
         match expr:
@@ -291,7 +257,14 @@ class Writer:
                 ends = self.given((expr.start, expr.stop, expr.step), scope)
                 return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]
             case nodes.NameRef():
-                return self._name(expr.name.text, scope)
+                if (bound := scope.find(expr.name.text)) is not None:
+                    return self.value(bound, scope)
+                if expr.name.text in ANIMATED:
+                    return ["t", [*ANIMATED].index(expr.name.text)]
+                constant = CONSTANTS[expr.name.text]
+                if isinstance(constant, Vec):
+                    return ["[", *map(plain, constant.items)]
+                return ["none"] if constant is None else constant
             case nodes.Unary():
                 inner = self.expression(expr.operand, scope)
                 negative = expr.op == "-" and type(inner) in (int, float) and inner
@@ -301,76 +274,51 @@ class Writer:
             case nodes.Conditional():
                 return ["?", *self.given((expr.condition, expr.then, expr.otherwise), scope)]
             case nodes.CallExpr():
-                return self._function(expr, scope)
+                name, bound = expr.name.text, scope.find(expr.name.text)
+                if bound is not None:
+                    return ["call", *self.call(bound, expr.args, scope)]
+                word = FUNCTIONS[name]
+                args = [arg.value for arg in expr.args] if word.variadic else bind(word.params, expr.args)
+                return [name, *self.given(args, scope)]
             case nodes.Index():
                 return ["@", self.expression(expr.value, scope), self.expression(expr.index, scope)]
             case nodes.Member():
-                return self._member(expr, scope)
+                alias = scope.find(expr.value.name.text) if isinstance(expr.value, nodes.NameRef) else None
+                if alias is not None and alias.inside is not None:
+                    return self.value(alias.inside.names[expr.name.text], scope)
+                return [".", self.expression(expr.value, scope), COMPONENTS[expr.name.text]]
             case nodes.MaterialExpr():
                 return self._material(expr, scope)
         raise TypeError(f"no form of {expr.__class__.__name__}")
 
-    def _name(self, name: str, scope: Scope) -> Json:
-        bound = scope.find(name)
-        if bound is not None:
-            return self.value(bound, scope)
-        if name in ANIMATED:
-            return ["t", [*ANIMATED].index(name)]
-        value = CONSTANTS[name]
-        if isinstance(value, Vec):
-            return ["[", *map(plain, value.items)]
-        return ["none"] if value is None else value
-
-    def _member(self, expr: nodes.Member, scope: Scope) -> Json:
-        alias = scope.find(expr.value.name.text) if isinstance(expr.value, nodes.NameRef) else None
-        if alias is not None and alias.inside is not None:
-            return self.value(alias.inside.names[expr.name.text], scope)
-        return [".", self.expression(expr.value, scope), COMPONENTS[expr.name.text]]
-
-    def _function(self, expr: nodes.CallExpr, scope: Scope) -> Json:
-        name, bound = expr.name.text, scope.find(expr.name.text)
-        if bound is not None:
-            return ["call", *self.call(bound, expr.args, scope)]
-        word = FUNCTIONS[name]
-        args = [arg.value for arg in expr.args] if word.variadic else bind(word.params, expr.args)
-        return [name, *self.given(args, scope)]
-
-    # ------------------------------------------------------------ materials
-
     def _material(self, written: nodes.MaterialExpr | nodes.MaterialUse, scope: Scope) -> Json:
         """``["material", index of its shading, index of its paint or -1, block]``."""
+        name, shading = written.name.text, written.shading
+        alias, dot, rest = name.partition(".")
+        element = self.textures.get(name)
+        if dot and (file := scope.find(alias)) is not None and file.file is not None:
+            element = self.brought.materials[file.file.materials[rest]]
         try:
-            lit, paint = self._look(written.name.text, written.shading, scope)
+            look = self._look(name, element, None if shading is None else shading.text)
         except Lacking as lacking:
             return ["no", str(lacking)]
         ops = [] if written.body is None else self.block(written.body, scope, "material")
-        return ["material", self.manifest.materials.index(lit), paint, ops]
+        return ["material", *look, ops]
 
-    def _look(self, name: str, shading: nodes.Name | None, scope: Scope) -> tuple[str, int]:
-        alias, dot, rest = name.partition(".")
-        lit = self.manifest.materials[0] if shading is None else shading.text
-        paint = -1
-        if dot:
-            file = scope.find(alias)
-            assert file is not None
-            assert file.file is not None
-            paint = self._element(self.brought.materials[file.file.materials[rest]], self.paints, name)
-        elif name in self.textures:
-            paint = self._element(self.textures[name], self.paints, name)
-        else:
-            lit = name
+    def _look(self, name: str, element: Element | None, shading: str | None = None) -> tuple[int, int]:
+        """Indices of a material's shading and of its paint, -1 for none."""
+        lit = name if element is None else shading or self.manifest.materials[0]
+        paint = -1 if element is None else self._element(element, self.paints, name)
         if lit not in self.manifest.materials:
             raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
-        return lit, paint
+        return self.manifest.materials.index(lit), paint
 
     def _element(self, element: Element, known: list[Element], name: str) -> int:
-        if element not in known and element.kind not in self.manifest.elements:
-            raise Lacking(f"model `{self.manifest.name}` does not draw `{name}`")
         if element not in known:
+            if element.kind not in self.manifest.elements:
+                raise Lacking(f"model `{self.manifest.name}` does not draw `{name}`")
             known.append(element)
         return known.index(element)
-
-    # ------------------------------------------------------------ statements
 
     def statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> Json:
         """A statement in a kind of block; None where it does nothing when it runs."""
@@ -417,7 +365,10 @@ class Writer:
         bound = None if name in LANGUAGE else scope.find(name)
         worn = bound is not None and bound.kind in _VALUES and stmt.args is None
         if name in SETTINGS and not worn and (bound is None or bound.kind != "module"):
-            return self._setting(stmt, scope)
+            args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
+            if name in STAGE and self.manifest.dimension == 2:
+                return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
+            return None if name == "canvas" else [name, *args]
         if name in LANGUAGE:
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
@@ -432,13 +383,6 @@ class Writer:
         ops = [] if stmt.body is None else self.block(stmt.body, scope, "material")
         return ["use", self.value(bound, scope), *([ops] if ops else [])]
 
-    def _setting(self, stmt: nodes.Call, scope: Scope) -> Json:
-        name, word = stmt.name.text, SETTINGS[stmt.name.text]
-        args = self.given(bind(word.params, stmt.args), scope)
-        if name in STAGE and self.manifest.dimension == 2:
-            return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
-        return None if name == "canvas" else [name, *args]
-
     def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
         table = OPERATIONS if inks else TRANSFORMS
@@ -449,8 +393,6 @@ class Writer:
         if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
             return ["move", "even", self.expression(args[0].value, scope)]
         return ["move", name, *self.given(bind(table[name].params, args), scope)]
-
-    # ------------------------------------------------------------ elements
 
     def _brought(self, stmt: nodes.Call, called: str, body: Json) -> Json:
         """A geometry of a file of elements, or a ready group."""
@@ -480,14 +422,9 @@ class Writer:
                 lines.append(["move", "translate", *map(plain, (move.x, move.y, move.z))])
         if part.material is not None:
             name = part.material.name
-            element = self.brought.materials.get(name)
-            paint = -1 if element is None else self._element(element, self.paints, name)
-            lit = self.manifest.materials[0] if element is not None else name
             inks = [op.rgb for op in part.material.ops if isinstance(op, Color)]
             ops = [["move", "color", ["[", *map(plain, rgb)]] for rgb in inks]
-            if lit not in self.manifest.materials:
-                raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
-            lines.append(["use", ["material", self.manifest.materials.index(lit), paint, ops]])
+            lines.append(["use", ["material", *self._look(name, self.brought.materials.get(name)), ops]])
         return ["object", self._shape(part.geometry), lines]
 
 
@@ -505,28 +442,19 @@ _LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 
 class Form(Record):
-    """A scene's form and its params in a view.
+    """A scene's form and its params in a view."""
 
-    Args:
-        data: JSON for ``evaluateForm``.
-        params: JSON of params that matter to the picture: their values, in radians and seconds, and ranges.
-        fixed: names of those that no page can change, and why.
-        shapes, paints: elements that rows name by index, shapes behind the model's geometries.
-    """
-
-    data: Json
-    params: list[Json]
-    fixed: list[Json]
-    shapes: tuple[Element, ...]
+    data: Json  # for `evaluateForm`
+    params: list[Json]  # that matter to the picture: their values, in radians and seconds, and ranges
+    fixed: list[Json]  # names of those that no page can change, and why
+    shapes: tuple[Element, ...]  # that rows name by index, behind the model's geometries
     paints: tuple[Element, ...]
 
 
 def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> Form:
-    """The form of a scene that was evaluated without errors.
+    """The form of a scene that was evaluated without errors; params start from the values of that run.
 
     Args:
-        evaluation: after a run, whose values params start from.
-        manifest: the model that draws the page.
         elements: those of the Program of that run; they come first among shapes and paints, in their order.
     """
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
@@ -563,37 +491,28 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
     """The data of a param for its control on a page."""
     value = file.env[file.scope.names[stmt.name.text].slot]
-    data: dict[str, Any] = {"name": name, "kind": _kind(value, stmt.default), "value": _json(value)}
+    default = stmt.default
+    coloured = isinstance(default, nodes.CallExpr) and default.name.text in ("rgb", "hsv")
+    colour = "color" if coloured or isinstance(default, nodes.Color) else "vector"
+    kind = colour if isinstance(value, Vec) else _KINDS[value.__class__]
+    data: dict[str, Any] = {"name": name, "kind": kind, "value": _json(value)}
     if stmt.range is not None:
         allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
         if isinstance(allowed, Vec):
             data["choices"] = _json(allowed)
+        elif isinstance(allowed, RangeValue) and allowed.step is not None:
+            # it may go downwards, and need not reach its end
+            low, high = sorted((allowed.start, allowed.at(max(0, allowed.count() - 1))))
+            data |= {"low": low, "high": high, "step": abs(allowed.step)}
         elif isinstance(allowed, RangeValue):
-            data |= _bounds(allowed)
+            data |= {"low": allowed.start, "high": allowed.stop}
+            data |= {"exclusive": True} if allowed.exclusive else {}
     if isinstance(value, Angle | Time):
         units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.Number))
         data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")
     if label := _LABEL.match(stmt.span.source.text, (stmt.range or stmt.default).span.end):
         data["label"] = label[1].strip()
     return data
-
-
-def _bounds(allowed: RangeValue) -> dict[str, Any]:
-    """The least and the greatest value; a stepped range may go downwards, and need not reach its end."""
-    if allowed.step is None:
-        bounds = {"low": allowed.start, "high": allowed.stop}
-        return {**bounds, "exclusive": True} if allowed.exclusive else bounds
-    ends = sorted((allowed.start, allowed.at(max(0, allowed.count() - 1))))
-    return {"low": ends[0], "high": ends[1], "step": abs(allowed.step)}
-
-
-def _kind(value: Any, default: nodes.Expr) -> str:
-    if not isinstance(value, Vec):
-        return _KINDS[value.__class__]
-    colours = isinstance(default, nodes.Color) or (
-        isinstance(default, nodes.CallExpr) and default.name.text in ("rgb", "hsv")
-    )
-    return "color" if colours else "vector"
 
 
 def _json(value: Any) -> Json:

@@ -1,8 +1,8 @@
 """Jobs of a process for the page: views, pictures, figures and files, of texts that may not be saved.
 
 A job is JSON data: ``do`` (one of `DO`), ``path`` and ``name`` of the scene, its ``text``, ``texts`` of
-other files by their paths, ``root``, ``params``, ``frame``, ``size``, and ``message``, to which the answer's
-data adds the result; a job that makes a file also has ``folder``, an empty one for the duration.
+others by their paths, ``root``, ``params``, ``frame``, ``size``, ``message``, to which the result is added,
+and for a file an empty ``folder``.
 """
 
 from __future__ import annotations
@@ -63,21 +63,11 @@ def do(job: Job, tell: Tell) -> Answer:
 
 def warm() -> None:
     """Load what jobs would otherwise wait for."""
-    job: Job = {
-        "path": "a.nsg",
-        "name": "",
-        "texts": {},
-        "root": None,
-        "params": {},
-        "frame": 0,
-        "size": [32, 32],
-    }
+    job: Job = {"path": "a.nsg", "name": "", "texts": {}, "root": None}
+    job |= {"params": {}, "frame": 0, "size": [32, 32]}
     for text in ("square;", "sphere;"):
         for kind in ("view", "network"):
             do({**job, "do": kind, "text": text, "message": {}}, lambda share: None)
-
-
-# ---------------------------------------------------------------- views
 
 
 def _view(job: Job, tell: Tell) -> Answer:
@@ -85,18 +75,19 @@ def _view(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
     result = Diagnostics()
     shown: View | None = None
-    lacking: list[str] = []
+    lacking: list[dict[str, Any]] = []
     evaluation = _source(job).evaluation(result)
     try:
         shown = _viewed(job, evaluation, result)[0]
     except SceneError:
         pass  # `result` has its diagnostics
     except (ProgramError, FileNotFoundError) as error:
-        lacking.append(str(error))
+        problem = {"code": "", "severity": "warning", "message": str(error), "line": 1, "column": 1}
+        lacking.append(problem)
     data = {
         **job["message"],
         "view": shown and shown.message(),
-        "problems": [*map(_problem, result.items[:MOST_TOLD]), *map(_warning, lacking)],
+        "problems": [*map(_problem, result.items[:MOST_TOLD]), *lacking],
         "ms": _since(started),
     }
     head = {"wanted": [str(path) for path in evaluation.wanted]}
@@ -115,19 +106,10 @@ def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple
     return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
 
 
-def _warning(message: str) -> dict[str, Any]:
-    return {"code": "", "severity": "warning", "message": message, "line": 1, "column": 1}
-
-
 def _problem(diagnostic: Diagnostic) -> dict[str, Any]:
-    line, column = (
-        diagnostic.span.source.position(diagnostic.span.start) if diagnostic.span is not None else (1, 1)
-    )
+    line, column = (1, 1) if diagnostic.span is None else diagnostic.span.locate()[0]
     here = {"code": diagnostic.code, "severity": diagnostic.severity, "message": diagnostic.message}
     return {**here, "line": line, "column": column}
-
-
-# ---------------------------------------------------------------- pictures
 
 
 def _network(job: Job, tell: Tell) -> Answer:
@@ -146,31 +128,24 @@ def _difference(job: Job, tell: Tell) -> Answer:
     drawn, ms = _draw(clip, job["frame"])
     picture, exact = over_white(drawn), over_white(_exact(job, clip))
     figures = _figures_of(picture, exact)
-    text = f"PSNR {figures['psnr']:.2f} dB"
-    if figures["flip"] is not None:
-        text += f"  FLIP {figures['flip']:.4f}"
-    return _picture(job, side_by_side(picture, exact, text, plain=figures["flip"] is None), ms, **figures)
+    known = figures["flip"] is not None
+    text = f"PSNR {figures['psnr']:.2f} dB" + (f"  FLIP {figures['flip']:.4f}" if known else "")
+    return _picture(job, side_by_side(picture, exact, text, plain=not known), ms, **figures)
 
 
 def _figures(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
     clip = Clip(_source(job))
     shot = _shot(clip, job["frame"])
-    objects = 0
-
-    def count(stage: str, graph: Graph) -> None:
-        nonlocal objects
-        if stage == "lower":
-            objects = sum(isinstance(node, Leaf) for node in nodes(graph.root))
-
-    program = compile_scene(shot.scene, spans=shot.spans, after=count)
+    graphs: dict[str, Graph] = {}
+    program = compile_scene(shot.scene, spans=shot.spans, after=graphs.__setitem__)
     compiled = _since(started)
     drawn, ms = _draw(clip, job["frame"])
     started = time.perf_counter()
     exact = _exact(job, clip)
     data = {
         "model": program.model,
-        "objects": objects,
+        "objects": sum(isinstance(node, Leaf) for node in nodes(graphs["lower"].root)),
         "rows": len(program),
         "canvas": program.canvas,
         "ms": {**ms, "compile": compiled, "exact": _since(started)},
@@ -211,8 +186,7 @@ def _exact(job: Job, clip: Clip) -> Image:
     """The exact picture; the last one is cached, for figures and differences."""
     shot = _shot(clip, job["frame"])
     _check_size(shot.scene.canvas)
-    key = shot.scene.to_json()
-    if key not in _EXACT:
+    if (key := shot.scene.to_json()) not in _EXACT:
         image = draw_exact(shot.scene, spans=shot.spans)
         _EXACT.clear()
         _EXACT[key] = image
@@ -227,9 +201,6 @@ def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Answ
     size = [image.shape[1], image.shape[0]]
     facts = {**job["message"], "png": png, "size": size, "ms": {**ms, "encode": _since(started)}, **facts}
     return Answer(_json(facts))
-
-
-# ---------------------------------------------------------------- files
 
 
 class _ByNumpy(Painter):
@@ -261,16 +232,13 @@ def _file(job: Job, tell: Tell) -> Answer:
     return Answer(rendered.files[0].read_bytes())
 
 
-# ---------------------------------------------------------------- common to all
-
-
 def _source(job: Job) -> Source:
     return Source(
         job["path"],
         SourceFile(job["path"], job["text"]),
         params=job["params"],
         root=job["root"],
-        size=None if job["size"] is None else (job["size"][0], job["size"][1]),
+        size=job["size"] and tuple(job["size"]),
         texts={Path(path): text for path, text in job["texts"].items()},
     )
 

@@ -12,7 +12,6 @@ import json
 import logging
 import re
 import sys
-from collections.abc import Iterator
 from typing import Any, Final
 
 from pygls.uris import to_fs_path
@@ -21,7 +20,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from scenelang.assets.files import read_json
 from scenelang.web.folder import Folder
 
-log = logging.getLogger("scenelang.play")
 _LENGTH: Final = re.compile(rb"Content-Length: *(\d{1,9})\r\n", re.IGNORECASE)
 _REFUSED: Final = -32602  # the protocol's InvalidParams
 
@@ -30,53 +28,12 @@ class Elsewhere(ValueError):
     """A message names a file outside the folder."""
 
 
-class Languages:
-    """Language servers, one for each page, and a spare one, so that the next page need not wait."""
-
-    def __init__(self, folder: Folder) -> None:
-        self._folder, self._closed = folder, False
-        self._spare: asyncio.Task[asyncio.subprocess.Process] | None = None
-
-    def start(self) -> None:
-        """Start the spare one."""
-        if self._spare is None and not self._closed:
-            self._spare = asyncio.create_task(_start())
-
-    async def serve(self, socket: WebSocket) -> None:
-        """Pass messages on, both ways, until one side ends."""
-        await socket.accept()
-        self.start()
-        if self._spare is None:
-            return
-        spare, self._spare = self._spare, None
-        process = await spare
-        try:
-            await _bridge(socket, process, self._folder)
-        finally:
-            await _end(process)
-            self.start()
-
-    async def close(self) -> None:
-        """End the spare one."""
-        self._closed = True
-        if self._spare is not None:
-            await _end(await self._spare)
-            self._spare = None
-
-
-async def _start() -> asyncio.subprocess.Process:
+async def serve_language(socket: WebSocket, folder: Folder) -> None:
+    """Pass messages between a page and a process of its own, until one side ends."""
+    await socket.accept()
     pipe = asyncio.subprocess.PIPE
     command = (sys.executable, "-m", "scenelang.web.language")
-    return await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, start_new_session=True)
-
-
-async def _end(process: asyncio.subprocess.Process) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        process.kill()
-    await process.wait()
-
-
-async def _bridge(socket: WebSocket, process: asyncio.subprocess.Process, folder: Folder) -> None:
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, start_new_session=True)
     assert process.stdin is not None
     assert process.stdout is not None
     ways = [
@@ -86,9 +43,11 @@ async def _bridge(socket: WebSocket, process: asyncio.subprocess.Process, folder
     try:
         await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
     finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
         for way in ways:
             way.cancel()
-        await asyncio.gather(*ways, return_exceptions=True)
+        await asyncio.gather(*ways, process.wait(), return_exceptions=True)
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await socket.close()
 
@@ -116,15 +75,14 @@ async def _down(stream: asyncio.StreamReader, socket: WebSocket) -> None:
         WebSocketDisconnect, RuntimeError, OSError, ValueError, asyncio.IncompleteReadError
     ):
         while line := await stream.readline():
-            length = _LENGTH.fullmatch(line)
-            if length is not None:
+            if (length := _LENGTH.fullmatch(line)) is not None:
                 while (await stream.readline()).strip():
                     pass
                 await socket.send_text((await stream.readexactly(int(length[1]))).decode())
 
 
 def checked(message: Any, folder: Folder) -> dict[str, Any]:
-    """A message of the page, checked, with the folder and the root of this server.
+    """A message of the page, with the folder and the root of this server.
 
     Raises:
         Elsewhere: it names a file outside the folder.
@@ -136,21 +94,16 @@ def checked(message: Any, folder: Folder) -> dict[str, Any]:
     method = message.get("method")
     if method == "initialize" and isinstance(params, dict):
         uri = folder.path.as_uri()
-        options = params.get("initializationOptions")
-        params = {key: params[key] for key in ("capabilities", "clientInfo", "locale") if key in params}
-        params |= {"processId": None, "rootUri": uri}
-        params["workspaceFolders"] = [{"uri": uri, "name": folder.path.name}]
-        params["initializationOptions"] = _settings(options, folder)
-        return {**message, "params": params}
+        passed = {key: params[key] for key in ("capabilities", "clientInfo", "locale") if key in params}
+        passed |= {"processId": None, "rootUri": uri}
+        passed["workspaceFolders"] = [{"uri": uri, "name": folder.path.name}]
+        passed["initializationOptions"] = _settings(params.get("initializationOptions"), folder)
+        return {**message, "params": passed}
     if method == "workspace/didChangeConfiguration" and isinstance(params, dict):
         return {**message, "params": {"settings": _settings(params.get("settings"), folder)}}
     if method == "workspace/didChangeWorkspaceFolders":
         raise Elsewhere("the folder is the one that was opened")
-    for uri in _uris(params):
-        if uri[:5].lower() == "file:":
-            place = to_fs_path(uri)
-            if not place or not folder.holds(place):
-                raise Elsewhere("a file outside the folder")
+    _check_places(params, folder)
     return message
 
 
@@ -161,29 +114,27 @@ def _settings(given: Any, folder: Folder) -> dict[str, Any]:
     return allowed if folder.root is None else {**allowed, "root": str(folder.root)}
 
 
-def _uris(value: Any) -> Iterator[str]:
-    """Every text that a message has under a key that ends in ``uri``."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            if key.lower().endswith("uri") and isinstance(inner, str):
-                yield inner
-            else:
-                yield from _uris(inner)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _uris(inner)
+def _check_places(value: Any, folder: Folder) -> None:
+    """Raise `Elsewhere` where a text under a key that ends in ``uri`` leads out of the folder."""
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        if key.lower().endswith("uri") and isinstance(inner, str):
+            place = to_fs_path(inner) if inner[:5].lower() == "file:" else None
+            if inner[:5].lower() == "file:" and not (place and folder.holds(place)):
+                raise Elsewhere("a file outside the folder")
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _check_places(inner, folder)
 
 
 def main() -> None:
     """Serve standard input and output, with as much memory as a drawing may have."""
     from scenelang.drawing.small import thumbnail
-    from scenelang.editors.handlers import make_server
-    from scenelang.web.worker import limit_memory
+    from scenelang.editors.server import make_server
+    from scenelang.web.pool import limit_memory
 
     limit_memory()
     logging.basicConfig(level=logging.CRITICAL)
     server = make_server(lambda element: thumbnail(element, 96).encode())
-    server.serve(sys.stdin.buffer, sys.stdout.buffer)
+    server.start_io(sys.stdin.buffer, sys.stdout.buffer)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 import logging
-from collections.abc import Callable, Collection, Coroutine
+from collections.abc import Callable, Coroutine
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -22,29 +22,25 @@ from scenelang.web.folder import (
     Changed,
     Files,
     Folder,
+    JobFailed,
     Journal,
     Json,
     Refused,
+    choice_of,
     id_of,
-    in_unit,
     string_of,
     text_of,
     whole_of,
     wishes,
 )
-from scenelang.web.pool import LIMITS_S, Jobs, Pool, Slot, Took
+from scenelang.web.pool import Pool
 
 log = logging.getLogger("scenelang.play")
+EXAMPLES: Final = files("scenelang").joinpath("web/editor/examples")  # scenes that come with the page
 
 
 class Play:
-    """The state that all pages share.
-
-    Args:
-        folder: the scenes.
-        first: the one to show at first.
-        journal: of unsaved texts.
-    """
+    """The state that all pages share: the scenes, the one to show at first, and unsaved texts."""
 
     def __init__(self, folder: Folder, first: str | None = None, journal: Journal | None = None) -> None:
         self.folder, self.first = folder, first
@@ -57,18 +53,18 @@ class Play:
         self.pages: set[Live] = set()
         self.reading = asyncio.Lock()
         """Held from reading or writing a file until pages are told, so that they hear of changes in order."""
-        self._tasks: set[asyncio.Future[Any]] = set()
+        self._tasks: set[asyncio.Task[Any]] = set()
         self._listed: list[str] | None = None
 
     def later(self, work: Coroutine[Any, Any, Any]) -> None:
         """Run a task in the background."""
 
-        def ended(task: asyncio.Future[Any]) -> None:
+        def ended(task: asyncio.Task[Any]) -> None:
             self._tasks.discard(task)
             if not task.cancelled() and (error := task.exception()) is not None:
                 log.error("%r", error)
 
-        task = asyncio.ensure_future(work)
+        task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(ended)
 
@@ -86,7 +82,7 @@ class Play:
         return {
             "kind": "files",
             "files": self._listed,
-            "examples": _examples(),
+            "examples": sorted(place.name for place in EXAMPLES.iterdir() if place.name.endswith(".nsg")),
             "folder": self.folder.path.name,
             "open": self.first if self.first is not None else next(iter(self._listed), None),
             "uri": f"{self.folder.path.as_uri()}/",
@@ -124,13 +120,6 @@ class Play:
             log.warning("unsaved text is not kept: %s", error)
 
 
-def _examples() -> list[str]:
-    """Scenes that come with the page."""
-    folder = files("scenelang").joinpath("web/editor/examples")
-    result = folder.iterdir() if folder.is_dir() else ()
-    return sorted(place.name for place in result if place.name.endswith(".nsg"))
-
-
 FILES: Final = {
     "png": "image/png",
     "gif": "image/gif",
@@ -139,9 +128,14 @@ FILES: Final = {
     "html": "text/html",
     "nsg": "text/plain",
 }
+LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
+FILE_S: Final = 3600.0
 KEEP_S: Final = 0.5  # between two times that an unsaved text is stored
 MOST_WAITING: Final = 1 << 26  # characters for a page that does not read
 MOST_OPEN: Final = 100
+MOST_JOBS: Final = 100
+Slot = tuple[str, str]
+Took = Callable[[Answer], None]
 
 
 class Open:
@@ -166,23 +160,19 @@ class Live:
         self._out: asyncio.Queue[str] = asyncio.Queue()
         self._waiting = 0  # characters in the queue
         self._over = asyncio.Event()
-        self._jobs = Jobs(self.tell)
-
-    @property
-    def names(self) -> Collection[str]:
-        """The files that the page shows."""
-        return self.open.keys()
+        self._jobs: dict[Slot, tuple[asyncio.Task[None], Any, str]] = {}  # one in each slot, its id and file
 
     async def run(self) -> None:
         """Answer the page until it is gone."""
         await self._socket.accept()
+        self._play.pages.add(self)
         tasks = [asyncio.create_task(work) for work in (self._write(), self._read(), self._over.wait())]
         try:
             self.tell(await self._play.files())
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._jobs.close()
-            for task in tasks:
+            self._play.pages.discard(self)
+            for task in (*tasks, *(task for task, _, _ in self._jobs.values())):
                 task.cancel()
             for name in list(self.open):
                 self._keep(name)
@@ -216,29 +206,18 @@ class Live:
             try:
                 given = read_json(text.encode("utf-8"))
                 message = given if isinstance(given, dict) else {}
-                await self._answer(message)
+                await _ANSWERS[choice_of(message, "kind", _ANSWERS)](self, message)
+                continue
             except (Refused, OSError) as error:
-                self._trouble(message, str(error))
+                why = str(error)
             except (ValueError, RecursionError) as error:
-                self._trouble(message, f"not a message: {error}")
+                why = f"not a message: {error}"
             except Exception as error:
                 log.exception("internal error")
-                self._trouble(message, f"internal error: {error!r}")
-
-    def _trouble(self, message: Json, why: str) -> None:
-        id, file = message.get("id"), message.get("file")
-        id = id if isinstance(id, int | str | None) else None
-        self.tell(
-            {"kind": "error", "id": id, "file": file if isinstance(file, str) else None, "message": why}
-        )
-
-    async def _answer(self, message: Json) -> None:
-        kind = string_of(message, "kind")
-        if kind not in _ANSWERS:
-            raise ValueError(f"unknown kind `{kind[:40]}`")
-        await _ANSWERS[kind](self, message)
-
-    # ------------------------------------------------------------ texts
+                why = f"internal error: {error!r}"
+            id, file = message.get("id"), message.get("file")
+            id, file = id if isinstance(id, int | str) else None, file if isinstance(file, str) else None
+            self.tell({"kind": "error", "id": id, "file": file, "message": why})
 
     async def _open(self, message: Json) -> None:
         name = string_of(message, "file")
@@ -251,9 +230,8 @@ class Live:
         known = self.open.get(name)
         if known is None:
             known = self.open[name] = Open(path, text or "", disk)
-        unsaved = None
-        if kept is not None and kept.text != text:
-            unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds}
+        lost = kept is not None and kept.text != text
+        unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds} if kept and lost else None
         known.saved, known.disk = text or "", disk
         if not known.version:
             known.text, known.base = text or "", disk
@@ -264,7 +242,7 @@ class Live:
     async def _edit(self, message: Json) -> None:
         name, known = self._known(message)
         known.text, known.version = text_of(message), whole_of(message, "version", 1, 1 << 53)
-        self._jobs.cancel(lambda slot, id, file: file == name and slot[0] not in ("file", "view"))
+        self._cancel(lambda slot, id, file: file == name and slot[0] not in ("file", "view"))
         if known.keeping is None:
             known.keeping = asyncio.get_running_loop().call_later(KEEP_S, self._keep_later, name)
         for other in [name, *(k for k, o in self.open.items() if known.path in o.wanted)]:
@@ -272,9 +250,7 @@ class Live:
 
     async def _save(self, message: Json) -> None:
         name, known = self._known(message)
-        base = message.get("base")
-        if not isinstance(base, str | None):
-            raise ValueError("`base` is neither a text nor null")
+        base = None if message.get("base") is None else string_of(message, "base")
         text, version = text_of(message), whole_of(message, "version", 0, 1 << 53)
         said = {"file": name, "version": version}
         try:
@@ -299,7 +275,7 @@ class Live:
     async def _close(self, message: Json) -> None:
         name, _ = self._known(message)
         self._keep(name)
-        self._jobs.cancel(lambda slot, id, file: file == name)
+        self._cancel(lambda slot, id, file: file == name)
         del self.open[name]
 
     async def _rename(self, message: Json) -> None:
@@ -358,8 +334,6 @@ class Live:
             if path in known.wanted:
                 self._view(name)
 
-    # ------------------------------------------------------------ jobs
-
     def _view(self, name: str) -> None:
         version = self.open[name].version
 
@@ -374,9 +348,7 @@ class Live:
 
     async def _draw(self, message: Json) -> None:
         name, known = self._known(message)
-        id, by = id_of(message), string_of(message, "by")
-        if by not in LIMITS_S or by == "view":
-            raise ValueError(f"`by` is `{by[:40]}`")
+        id, by = id_of(message), choice_of(message, "by", LIMITS_S.keys() - {"view"})
         said = {"kind": "figures" if by == "figures" else "picture", "id": id, "file": name}
         said |= {"version": known.version, "by": by}
         job = {"do": by, "message": said, **wishes(message)}
@@ -384,9 +356,7 @@ class Live:
 
     async def _download(self, message: Json) -> None:
         name, known = self._known(message)
-        id, kind = id_of(message), string_of(message, "as")
-        if kind not in FILES:
-            raise ValueError(f"`as` is `{kind[:40]}`")
+        id, kind = id_of(message), choice_of(message, "as", FILES)
         stem = Path(name).name.removesuffix("nsg") + ("png" if kind == "apng" else kind)
 
         def made(answer: Answer) -> None:
@@ -402,18 +372,63 @@ class Live:
 
     async def _stop(self, message: Json) -> None:
         wanted = id_of(message)
-        self._jobs.cancel(lambda slot, id, file: id == wanted and id is not None)
+        self._cancel(lambda slot, id, file: id == wanted)
 
     def _start(self, slot: Slot, id: Any, name: str, job: Json, pool: Pool, done: Took | None = None) -> None:
-        """Start a job for a file, with the text that the page has."""
+        """Start a job for a file, with the text that the page has; the one that has its slot is cancelled.
+
+        Args:
+            id: the page's name of it; None where it has none.
+            done: called with the answer before the page gets it.
+        """
         known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}
-        job["params"] = {k: in_unit(v) if k in known.angles else v for k, v in job["params"].items()}
+        for key, value in job["params"].items():  # a number of radians becomes a literal of the language
+            if key in known.angles and isinstance(value, int | float) and not isinstance(value, bool):
+                job["params"] = {**job["params"], key: f"{value!r}rad"}
         job["path"], job["root"] = str(known.path), None if root is None else str(root)
         job["texts"] = {
             str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
         }
-        self._jobs.start(slot, id, name, job, pool, done)
+        if slot in self._jobs:
+            self._jobs[slot][0].cancel()
+        elif len(self._jobs) >= MOST_JOBS:
+            raise Refused("too many drawings at the same time")
+        task = asyncio.create_task(self._work(id, name, job, pool, done))
+        self._jobs[slot] = task, id, name
+
+        def ended(_: object) -> None:
+            if task.cancelled() and id is not None:  # perhaps before it began
+                self.tell({"kind": "cancelled", "id": id})
+            if slot in self._jobs and self._jobs[slot][0] is task:
+                del self._jobs[slot]
+
+        task.add_done_callback(ended)
+
+    def _cancel(self, wanted: Callable[[Slot, Any, str], bool]) -> None:
+        """Cancel the jobs whose slot, id and file ``wanted`` is true of."""
+        for slot, (task, id, file) in list(self._jobs.items()):
+            if wanted(slot, id, file):
+                task.cancel()
+
+    async def _work(self, id: Any, file: str, job: Json, pool: Pool, done: Took | None) -> None:
+        def said(share: float) -> None:
+            self.tell({"kind": "progress", "id": id, "done": round(share, 4)})
+
+        try:
+            limit = LIMITS_S.get(job["do"], FILE_S)
+            answer = await pool.run(job, limit, said if job["do"] == "file" else None)
+        except JobFailed as error:
+            if job["do"] == "view":
+                problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}
+                self.tell({**job["message"], "view": None, "problems": [problem], "ms": None})
+            else:
+                self.tell({"kind": "error", "id": id, "file": file, "message": str(error)})
+            return
+        if done is not None:
+            done(answer)
+        if job["do"] != "file":
+            self.tell(answer.data.decode())
 
 
 _ANSWERS: Final[dict[str, Callable[[Live, Json], Coroutine[Any, Any, None]]]] = {

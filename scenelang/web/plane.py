@@ -29,24 +29,15 @@ Floats = npt.NDArray[np.float64]
 
 
 class Leaf(NamedTuple):
-    """A decoder for shaders, in leaf units.
+    """A decoder for shaders, in leaf units."""
 
-    Args:
-        first: (n, 3) of the units of the first layer: factors of x and y, and bias.
-        second: (m, 1 + n) of those of the second: bias, and factors of the first.
-        last: (m + 1,) factors of these, and bias.
-        far: growth beyond the rim.
-        bounds: (3,) x, y and radius; it is no nearer than |q.x| - x, |q.y| - y and |q| - radius, times `far`
-            where that is below 1.
-        inner: radius of a disc within the shape, 0 where none is known.
-    """
-
-    first: Floats
-    second: Floats
-    last: Floats
-    far: float
+    first: Floats  # (n, 3) of the units of the first layer: factors of x and y, and bias
+    second: Floats  # (m, 1 + n) of those of the second: bias, and factors of the first
+    last: Floats  # (m + 1,) factors of these, and bias
+    far: float  # growth beyond the rim
+    # (3,): it is no nearer than |q.x|, |q.y| and |q| less these, times `far` where that is below 1
     bounds: tuple[float, ...]
-    inner: float
+    inner: float  # radius of a disc within the shape, 0 where none is known
 
 
 def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
@@ -123,17 +114,13 @@ def leaves(network: FramedArrays) -> list[Leaf]:
             gaps = [n - (middle - rise) / min(far, 1.0) for n in (*abs(p), radius)]
             bounds = tuple([float(gap[seen].max()) + off for gap in gaps])
             inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
-        result.append(Leaf(*_pruned(layers), far, bounds, inner))
+        (w, b), (v, c), (u, d) = layers
+        first = b + RADIUS * np.hypot(*w.T) > 0  # without the units that are nowhere above zero
+        w, b, v = w[first], b[first], v[:, first]
+        second = _firing(w, b, v, c)
+        kept = np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
+        result.append(Leaf(*kept, far, bounds, inner))
     return result
-
-
-def _pruned(layers: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
-    """The layers of a `Leaf`: a decoder without the units that are nowhere above zero."""
-    (w, b), (v, c), (u, d) = layers
-    first = b + RADIUS * np.hypot(*w.T) > 0
-    w, b, v = w[first], b[first], v[:, first]
-    second = _firing(w, b, v, c)
-    return np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
 
 
 def _firing(w: Floats, b: Floats, v: Floats, c: Floats) -> npt.NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Processes that compile and draw, and the jobs of one page.
+"""Processes that compile and draw, one job after the other.
 
 A job that takes too long, is cancelled or needs too much memory ends with its process.
 """
@@ -6,18 +6,27 @@ A job that takes too long, is cancelled or needs too much memory ends with its p
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import importlib
 import multiprocessing
+import os
 import sys
+import threading
+import time
+import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import nullcontext
+from multiprocessing.connection import Connection
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from scenelang.web import worker
-from scenelang.web.folder import Answer, JobFailed, Json, Refused
+from scenelang.web.folder import Answer, JobFailed
 
 Said = Callable[[float], None]
+MOST_MEMORY: Final = 4 << 30
+"""Bytes of addresses that a process may have, where the system counts them."""
+_REPORT_S: Final = 0.1  # between two reports of the share done
+_DEEP: Final = 10_000
 _CONTEXT: Final[Any] = multiprocessing.get_context("spawn" if sys.platform == "win32" else "forkserver")
 _ENDED: Final = "the process that drew has ended; perhaps the scene needs more memory than it may have"
 
@@ -28,14 +37,14 @@ class Worker:
     def __init__(self, nice: int) -> None:
         _CONTEXT.set_forkserver_preload(["scenelang.web.warm"])
         self._pipe, other = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=worker.serve, args=(other, nice), daemon=True)
+        self.process = _CONTEXT.Process(target=serve, args=(other, nice), daemon=True)
         self.process.start()
         other.close()
 
     def do(self, job: dict[str, Any], said: Said) -> Answer:
         """Have a job done, one that makes a file in a folder for the duration; raises `JobFailed`."""
         is_file = job["do"] == "file"
-        with TemporaryDirectory(prefix="scenelang-") if is_file else nullcontext() as folder:
+        with TemporaryDirectory(prefix="scenelang-") if is_file else contextlib.nullcontext() as folder:
             try:
                 self._pipe.send({**job, "folder": folder})
                 while isinstance(reply := self._pipe.recv(), float):
@@ -50,12 +59,7 @@ class Worker:
 
 
 class Pool:
-    """Processes for jobs; the one that was used last is used first.
-
-    Args:
-        most: processes at the same time.
-        nice: their niceness.
-    """
+    """Processes for jobs, so many at the same time; the one that was used last is used first."""
 
     def __init__(self, most: int, nice: int = 0) -> None:
         self._nice, self._free = nice, asyncio.Semaphore(most)
@@ -71,13 +75,8 @@ class Pool:
     async def run(self, job: dict[str, Any], limit_s: float, said: Said | None = None) -> Answer:
         """Do a job in a process; where this is cancelled the process is ended.
 
-        Args:
-            job: JSON data, as `scenelang.web.jobs` has them, but for the folder.
-            limit_s: seconds that it may take, without the wait for others.
-            said: called with the share done.
-
         Raises:
-            JobFailed: it failed, took too long, or its process ended.
+            JobFailed: it failed, took more than ``limit_s`` seconds without the wait, or its process ended.
         """
         loop = asyncio.get_running_loop()
 
@@ -100,7 +99,9 @@ class Pool:
             finally:
                 self._busy.discard(started)
                 unasked = doing.cancel()  # where no thread has taken it up
-                if unasked or (doing.done() and _lives(started)):
+                if unasked or (
+                    doing.done() and not started.exception() and started.result().process.is_alive()
+                ):
                     self._idle.append(started)
                 else:
                     started.add_done_callback(_kill)
@@ -117,83 +118,58 @@ class Pool:
                 await asyncio.to_thread(started.result().process.join)
 
 
-def _lives(started: Future[Worker]) -> bool:
-    return not started.exception() and bool(started.result().process.is_alive())
-
-
 def _kill(started: Future[Worker]) -> None:
     if not started.exception():
         started.result().process.kill()
 
 
-LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
-FILE_S: Final = 3600.0
-MOST_JOBS: Final = 100
-Slot = tuple[str, str]
-Took = Callable[[Answer], None]
+def serve(pipe: Connection, nice: int) -> None:
+    """Take jobs from a pipe, and of each send shares done (floats), then an `Answer` or `JobFailed`."""
+    server = multiprocessing.parent_process()
+    assert server is not None
+
+    def end_with_server() -> None:
+        server.join()
+        os._exit(0)
+
+    threading.Thread(target=end_with_server, daemon=True).start()
+    with contextlib.suppress(AttributeError, OSError):
+        os.nice(nice)
+    limit_memory()
+    sys.setrecursionlimit(max(sys.getrecursionlimit(), _DEEP))
+    importlib.import_module("scenelang.web.warm")  # is there already where this process was forked
+    with contextlib.suppress(EOFError, OSError):  # nobody asks any more
+        while True:
+            pipe.send(_answer(pipe.recv(), pipe))
 
 
-class Jobs:
-    """The jobs of a page, one in each slot.
+def _answer(job: dict[str, Any], pipe: Connection) -> Answer | JobFailed:
+    from scenelang.web.jobs import do
 
-    Args:
-        tell: sends the page a message, or the text of one.
-    """
+    reported = 0.0
 
-    def __init__(self, tell: Callable[[Json | str], None]) -> None:
-        self._tell = tell
-        self._tasks: dict[Slot, tuple[asyncio.Task[None], Any, str]] = {}
+    def tell(share: float) -> None:
+        nonlocal reported
+        if time.monotonic() - reported > _REPORT_S:
+            reported = time.monotonic()
+            pipe.send(float(share))
 
-    def start(self, slot: Slot, id: Any, file: str, job: Json, pool: Pool, done: Took | None) -> None:
-        """Start a job of `scenelang.web.jobs`; the one that has its slot is cancelled.
+    try:
+        return do(job, tell)
+    except JobFailed as error:
+        return error
+    except MemoryError:
+        return JobFailed(f"it needs more than {MOST_MEMORY >> 30} GB of memory")
+    except Exception as error:
+        traceback.print_exc()
+        return JobFailed(f"internal error: {error!r}"[:500])
 
-        Args:
-            id: the page's name of it; None where it has none.
-            done: called with the answer before the page gets it.
 
-        Raises:
-            Refused: there are too many.
-        """
-        if slot in self._tasks:
-            self._tasks[slot][0].cancel()
-        elif len(self._tasks) >= MOST_JOBS:
-            raise Refused("too many drawings at the same time")
-        task = asyncio.create_task(self._work(id, file, job, pool, done))
-        self._tasks[slot] = task, id, file
+def limit_memory(most: int = MOST_MEMORY) -> None:
+    """Have allocations fail rather than this process take all memory, where the system can."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
 
-        def ended(_: object) -> None:
-            if task.cancelled() and id is not None:  # perhaps before it began
-                self._tell({"kind": "cancelled", "id": id})
-            if slot in self._tasks and self._tasks[slot][0] is task:
-                del self._tasks[slot]
-
-        task.add_done_callback(ended)
-
-    def cancel(self, wanted: Callable[[Slot, Any, str], bool]) -> None:
-        """Cancel the jobs whose slot, id and file ``wanted`` is true of."""
-        for slot, (task, id, file) in list(self._tasks.items()):
-            if wanted(slot, id, file):
-                task.cancel()
-
-    def close(self) -> None:
-        """Cancel all of them."""
-        self.cancel(lambda slot, id, file: True)
-
-    async def _work(self, id: Any, file: str, job: Json, pool: Pool, done: Took | None) -> None:
-        def said(share: float) -> None:
-            self._tell({"kind": "progress", "id": id, "done": round(share, 4)})
-
-        try:
-            limit = LIMITS_S.get(job["do"], FILE_S)
-            answer = await pool.run(job, limit, said if job["do"] == "file" else None)
-        except JobFailed as error:
-            if job["do"] == "view":
-                problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}
-                self._tell({**job["message"], "view": None, "problems": [problem], "ms": None})
-            else:
-                self._tell({"kind": "error", "id": id, "file": file, "message": str(error)})
-            return
-        if done is not None:
-            done(answer)
-        if job["do"] != "file":
-            self._tell(answer.data.decode())
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))

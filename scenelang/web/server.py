@@ -4,65 +4,7 @@ The page is on this machine, and so is whatever else the browser shows. Another 
 here, and by a name that it has point at 127.0.0.1 even read the answers, but knows no token, cannot choose
 the ``Host`` of a name that is not its own, and cannot hide its ``Origin``.
 
-**Addresses.** Everything lies below ``http://127.0.0.1:PORT/TOKEN/``, so the page uses relative addresses
-(``static/play.js``, ``live``, ``lsp``, ``download?key=…``) and names the token nowhere; behind an address at
-the root ``?token=TOKEN`` does too. Of every request the token, the ``Host`` (a name of this machine) and the
-``Origin`` are checked; a websocket must have an origin.
-
-- ``GET ./``: ``editor/play.html``, in which ``__NONCE__`` is replaced by that of its content policy: scripts
-  come from ``static/`` alone, a ``<style>`` needs the nonce (of CodeMirror: ``EditorView.cspNonce``),
-  pictures may be ``data:`` and ``blob:``, nothing comes from elsewhere, and the page has no ``style="…"`` and
-  no inline script.
-- ``GET static/NAME``: a file of ``editor/``; ``static/viewer/NAME``: one of the viewer's, a module as it is
-  written; ``static/examples/NAME.nsg``: a scene to start from.
-- ``GET download?key=KEY``: a file that was made, once.
-
-**A websocket of JSON texts, ``live``.** Names of files are relative to the folder, with ``/``. ``version`` is
-the page's number of a text, at least 1, and grows; answers carry that of the text that they are of. ``disk``
-is a digest of what the file held when it was last read or written; null where there is no file. The page
-says:
-
-- ``{kind: "open", file}``: answered by ``text``, then ``view``.
-- ``{kind: "edit", file, version, text}``: the text of an open file; answered by ``view``.
-- ``{kind: "save", file, version, text, base}``: write it, if the file still is as when its ``disk`` was
-  ``base`` (null: there is none); answered by ``saved`` or ``conflict``.
-- ``{kind: "discard", file}``: forget what was not saved. ``{kind: "close", file}``: it is not shown any more.
-- ``{kind: "rename", file, to}``: answered by ``files``.
-- ``{kind: "draw", id, file, params, frame, size, by}``: ``by`` is ``network``, ``reference``, ``difference``
-  or ``figures``; answered by one of ``picture``, ``figures``, ``cancelled``, ``error``. ``params`` maps names
-  to numbers (an angle's is in radians), booleans, vectors as lists, or texts as behind ``-D``; those left out
-  have their defaults. ``size`` is ``[width, height]``, null for the scene's own.
-- ``{kind: "download", id, file, as, params, frame, size}``: ``as`` is ``png``, ``gif``, ``webp``, ``apng``,
-  ``html`` or ``nsg``; answered by ``progress`` …, then ``ready``.
-- ``{kind: "cancel", id}``: a drawing or a download. A newer drawing by the same means cancels the older, and
-  an edit cancels drawings of the text before.
-
-The server says:
-
-- ``{kind: "files", files, examples, folder, open, uri, most: {bytes, side}}``: at first and after changes.
-  ``folder`` is its name, ``open`` the file to show first or null, ``uri`` the folder's for ``lsp``, with a
-  ``/`` at its end.
-- ``{kind: "text", file, text, version, disk, origin, unsaved}``: ``origin`` is ``open``, or ``disk`` where
-  the file has changed there (``text`` null: it is gone). ``version`` is that of the last edit, 0 before any.
-  ``unsaved`` is null or ``{text, disk, seconds}``: what was not saved when page or server ended, so long ago.
-- ``{kind: "saved", file, version, disk}``: which is not told back as a ``text``.
-- ``{kind: "conflict", file, version, text, disk}``: nothing was written, as the file holds ``text``; the same
-  save with ``base: disk`` overwrites it.
-- ``{kind: "view", file, version, view, problems: [{code, severity, message, line, column}], ms}``: ``view``
-  is a text (`View.message`), null where the scene has errors, or where the last problem, a warning, says why
-  no page draws it, as the network still does.
-- ``{kind: "picture", id, file, version, by, png, size, ms, …}``: ``png`` in base64; ``ms`` by stage. A
-  difference is three pictures in a row, with ``psnr``, ``ssim`` and ``flip``.
-- ``{kind: "figures", id, file, version, model, objects, rows, canvas, ms, psnr, ssim, flip}``: null where the
-  package that measures it is missing.
-- ``{kind: "progress", id, done}``: of a download, in [0, 1]. ``{kind: "ready", id, url, name, bytes}``: fetch
-  it.
-- ``{kind: "cancelled", id}``: by a newer one, by the page or by an edit.
-- ``{kind: "error", id, file, message}``: of one message of the page; ``id`` and ``file`` may be null.
-
-**A websocket of JSON-RPC, ``lsp``**, a message a text: `scenelang lsp` in a process of its own. Addresses of
-files are below ``uri``; messages with others are refused. The folder and the root of imports are the
-server's, whatever ``initialize`` says.
+docs/architecture.md has its addresses and messages.
 """
 
 from __future__ import annotations
@@ -92,10 +34,10 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
-from watchfiles import Change, DefaultFilter, awatch
+from watchfiles import DefaultFilter, awatch
 
 from scenelang.web.folder import Refused
-from scenelang.web.language import Languages
+from scenelang.web.language import serve_language
 from scenelang.web.live import Live, Play
 
 LOCAL: Final = ("localhost", "127.0.0.1", "::1")
@@ -123,8 +65,6 @@ class Guard:
     """Middleware that lets requests through that have the token, come from the page and name this machine.
 
     Args:
-        app: gets the requests, their paths without the token.
-        token: of the page's address.
         hosts: names of this machine besides those of its loopback.
         anywhere: accept any IP address as a name of this machine, as it serves other machines too.
     """
@@ -155,18 +95,17 @@ class Guard:
         if self._knows(scope):
             path, query = scope["path"], parse_qs(scope["query_string"].decode("latin-1"))
             first, _, rest = path.removeprefix("/").partition("/")
-            if self._once and _same(path, self.once):
+            asked = _same(query.get("token", [""])[0], self._token)
+            once = self._once is not None and _same(path, self.once)
+            if once:
                 self._once = None
+            elif _same(first, self._token) and path != f"/{first}":
+                await self._app({**scope, "path": f"/{rest}", "raw_path": None}, receive, answer)
+                return
+            if once or _same(first, self._token) or (asked and path == "/"):
                 await RedirectResponse(f"/{self._token}/", 303)(scope, receive, answer)
                 return
-            if _same(first, self._token) and path != f"/{first}":
-                inner = {**scope, "path": f"/{rest}", "raw_path": None}
-                await self._app(inner, receive, answer)
-                return
-            if _same(first, self._token) or (path == "/" and _same(query.get("token", [""])[0], self._token)):
-                await RedirectResponse(f"/{self._token}/", 303)(scope, receive, answer)
-                return
-            if _same(query.get("token", [""])[0], self._token):
+            if asked:
                 await self._app(scope, receive, answer)
                 return
         if scope["type"] == "websocket":
@@ -178,18 +117,15 @@ class Guard:
         """True where a request names this machine and does not come from another page."""
         headers = Headers(scope=scope)
         host, origin, site = headers.getlist("host"), headers.getlist("origin"), headers.get("sec-fetch-site")
-        if len(host) != 1 or not self._is_here(host[0]) or len(origin) > 1:
+        if len(host) != 1 or not self._is_here(host[0]) or site not in (None, "same-origin", "none"):
             return False
-        if scope["type"] == "websocket" and not origin:
-            return False
-        if site not in (None, "same-origin", "none"):
-            return False
-        return not origin or origin[0].lower() == f"http://{host[0].lower()}"
+        if not origin:
+            return bool(scope["type"] != "websocket")
+        return [one.lower() for one in origin] == [f"http://{host[0].lower()}"]
 
     def _is_here(self, host: str) -> bool:
         """True where a ``Host`` is a name of this machine; its port is checked with the origin."""
-        name, _, port = host.lower().rpartition(":") if not host.endswith("]") else (host, "", "")
-        name = name if port.isascii() and port.isdigit() else host.lower()
+        name = re.sub(r":[0-9]+\Z", "", host.lower())
         name = name[1:-1] if name.startswith("[") and name.endswith("]") else name
         if name in self._hosts:
             return True
@@ -219,21 +155,15 @@ PATIENCE_S: Final = 0.3  # a file that is gone, or empty, may be in the middle o
 SLOW_MS: Final = 1000  # between two polls where the system reports no changes
 
 
-class _Filter(DefaultFilter):
-    """A filter of hidden files and of temporary files that this package writes."""
-
-    def __call__(self, change: Change, path: str) -> bool:
-        return not Path(path).name.startswith(".") and super().__call__(change, path)
-
-
 async def watch(play: Play, stop: asyncio.Event) -> None:
     """Report changes to pages until ``stop``."""
     await asyncio.to_thread(play.folder.names)  # which finds whether it is large
+    usual = DefaultFilter()
     for polling in (False, True):
         try:
             changes = awatch(
                 play.folder.path,
-                watch_filter=_Filter(),
+                watch_filter=lambda change, path: not Path(path).name.startswith(".") and usual(change, path),
                 debounce=300,
                 step=STEP_MS,
                 stop_event=stop,
@@ -241,8 +171,8 @@ async def watch(play: Play, stop: asyncio.Event) -> None:
                 force_polling=polling or None,
                 poll_delay_ms=SLOW_MS,
             )
-            async for result in changes:
-                play.later(_tell(play, {Path(path) for _, path in result}))
+            async for found in changes:
+                play.later(_tell(play, {Path(path) for _, path in found}))
             return
         except (OSError, RuntimeError) as error:
             log.warning("the system does not tell of changes: %s", error)
@@ -251,7 +181,7 @@ async def watch(play: Play, stop: asyncio.Event) -> None:
 async def _tell(play: Play, paths: set[Path]) -> None:
     names = {name for path in paths if (name := play.folder.name_of(path)) is not None}
     for name in names:
-        if any(name in page.names for page in play.pages):
+        if any(name in page.open for page in play.pages):
             await _reread(play, name)
     for page in play.pages:
         for path in paths:
@@ -284,8 +214,6 @@ _FROM: Final = {None: "web/editor", "viewer": "web/viewer", "examples": "web/edi
 def make_app(play: Play) -> Starlette:
     """The server, without a guard; while it runs processes wait for jobs and the folder is watched."""
 
-    languages = Languages(play.folder)
-
     async def page(request: Request) -> Response:
         nonce = secrets.token_urlsafe(16)
         text = files("scenelang").joinpath("web/editor/play.html").read_text("utf-8")
@@ -301,26 +229,22 @@ def make_app(play: Play) -> Starlette:
         return Response(data, media_type=kind, headers=headers)
 
     async def live(socket: WebSocket) -> None:
-        connection = Live(play, socket)
-        play.pages.add(connection)
-        try:
-            await connection.run()
-        finally:
-            play.pages.discard(connection)
+        await Live(play, socket).run()
+
+    async def language(socket: WebSocket) -> None:
+        await serve_language(socket, play.folder)
 
     @contextlib.asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
         stop = asyncio.Event()
         play.quick.start()
         play.views.start()
-        languages.start()
         play.later(asyncio.to_thread(play.journal.tidy))
         play.later(watch(play, stop))
         try:
             yield
         finally:
             stop.set()
-            await languages.close()
             await play.close()
 
     routes = [
@@ -328,7 +252,7 @@ def make_app(play: Play) -> Starlette:
         Route("/static/{name:path}", _static),
         Route("/download", download),
         WebSocketRoute("/live", _few(live)),
-        WebSocketRoute("/lsp", _few(languages.serve)),
+        WebSocketRoute("/lsp", _few(language)),
     ]
     return Starlette(routes=routes, lifespan=running)
 
@@ -344,19 +268,18 @@ async def _static(request: Request) -> Response:
 
 
 def _few(answer: Callable[[WebSocket], Awaitable[None]]) -> Callable[[WebSocket], Awaitable[None]]:
-    """Wrap an endpoint so that it refuses a connection where there are `MOST_PAGES` already."""
-    count = 0
+    """An endpoint that refuses a connection where there are `MOST_PAGES` already."""
+    connected: set[WebSocket] = set()
 
     async def counted(socket: WebSocket) -> None:
-        nonlocal count
-        if count >= MOST_PAGES:
+        if len(connected) >= MOST_PAGES:
             await socket.close(1013, f"more than {MOST_PAGES} pages")
             return
-        count += 1
+        connected.add(socket)
         try:
             await answer(socket)
         finally:
-            count -= 1
+            connected.discard(socket)
 
     return counted
 
@@ -364,48 +287,27 @@ def _few(answer: Callable[[WebSocket], Awaitable[None]]) -> Callable[[WebSocket]
 PORT: Final = 8766
 MOST_MESSAGE: Final = 1 << 25
 """Bytes of a message of the page: the largest text, each character of which may be escaped."""
-_LEAVE_S: Final = 2
-
-
-class PortTaken(OSError):
-    """The port that was asked for cannot be had."""
+_TAKEN: Final = {errno.EADDRINUSE: "is in use", errno.EACCES: "may not be used"}
 
 
 def listen(host: str, port: int | None) -> socket.socket:
-    """A listening socket: on the port, or on `PORT` or any other that is free.
-
-    Raises:
-        PortTaken: it cannot be had.
-        OSError: there is no such address here.
-    """
-    wanted = (PORT, 0) if port is None else (port,)
-    for number in wanted:
-        try:
-            family = socket.getaddrinfo(host, number, type=socket.SOCK_STREAM)[0][0]
-            return socket.create_server((host, number), family=family)
-        except OSError as error:
-            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
-                raise OSError(error.errno, f"cannot listen on `{host}`: {error.strerror or error}") from None
-            if number == wanted[-1]:
-                reason = "is in use" if error.errno == errno.EADDRINUSE else "may not be used"
-                raise PortTaken(error.errno, f"port {number} of {host} {reason}") from None
-    raise AssertionError
+    """A listening socket: on the port, or on `PORT` or any other that is free; raises `OSError`."""
+    try:
+        number = PORT if port is None else port
+        family = socket.getaddrinfo(host, number, type=socket.SOCK_STREAM)[0][0]
+        return socket.create_server((host, number), family=family)
+    except OSError as error:
+        if error.errno not in _TAKEN:
+            raise OSError(error.errno, f"cannot listen on `{host}`: {error.strerror or error}") from None
+        if port is None:
+            return listen(host, 0)
+        raise OSError(error.errno, f"port {port} of {host} {_TAKEN[error.errno]}") from None
 
 
 def serve(
     play: Play, host: str, port: int | None, *, browser: bool, say: Callable[[str], None] = print
 ) -> None:
-    """Serve until Ctrl-C, which is raised again when everything has ended.
-
-    Args:
-        host: an address or name of this machine.
-        port: None for any.
-        browser: open the page.
-        say: called with the address.
-
-    Raises:
-        OSError: as `listen`.
-    """
+    """Serve until Ctrl-C, which is raised again when everything has ended; raises as `listen`."""
     token = secrets.token_urlsafe(32)
     with listen(host, port) as listener:
         number = listener.getsockname()[1]
@@ -424,7 +326,7 @@ def serve(
             ws_max_size=MOST_MESSAGE,
             ws_per_message_deflate=False,
             lifespan="on",
-            timeout_graceful_shutdown=_LEAVE_S,
+            timeout_graceful_shutdown=2,
         )
         say(f"http://{name}:{number}/{token}/")
         if browser:

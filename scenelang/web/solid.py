@@ -1,8 +1,6 @@
 """The solid network for the page's shader: its layers as GLSL, its numbers as one array.
 
-Each shape's decoder and each token's cell is prepared here, as a renderer would: weights linear in a code,
-gains behind their exponential. The rows of the scene are the page's (``viewer/solid.js``). The rest of
-the shader, the same for every network, are the files of `FILES`.
+Each shape's decoder and each token's cell is prepared here, as a renderer would.
 """
 
 from __future__ import annotations

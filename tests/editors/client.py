@@ -40,14 +40,7 @@ CAPABILITIES: Json = {
 
 
 class Client:
-    """One server process and the editor in front of it.
-
-    Args:
-        root: the folder that the editor has open.
-        encoding: the only position encoding that the client knows.
-        options: initialization options.
-        command: how to start the server.
-    """
+    """One server process and the editor in front of it, which has a folder open and knows one encoding."""
 
     def __init__(
         self,
@@ -98,17 +91,12 @@ class Client:
         assert stream is not None
         while True:
             length = 0
-            while (line := stream.readline().strip()) or not length:
-                if not line and stream.closed:
-                    break
-                if not line:
-                    if self.process.poll() is not None or not length:
-                        self._inbox.put(None)
-                        return
-                    break
+            while line := stream.readline().strip():
                 name, _, value = line.partition(b":")
-                if name.lower() == b"content-length":
-                    length = int(value)
+                length = int(value) if name.lower() == b"content-length" else length
+            if not length:
+                self._inbox.put(None)
+                return
             self._inbox.put(json.loads(stream.read(length)))
 
     def _drain(self) -> None:
@@ -205,14 +193,10 @@ class Client:
         return {"line": line, "character": self.units(column)}
 
     def units(self, text: str) -> int:
-        return (
-            len(text.encode({"utf-16": "utf-16-le", "utf-8": "utf-8", "utf-32": "utf-32-le"}[self.encoding]))
-            // {
-                "utf-16": 2,
-                "utf-8": 1,
-                "utf-32": 4,
-            }[self.encoding]
-        )
+        name, size = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}[
+            self.encoding
+        ]
+        return len(text.encode(name)) // size
 
     def offset(self, text: str, place: Json) -> int:
         start = 0
@@ -228,10 +212,7 @@ class Client:
         at = -1
         for _ in range(occurrence + 1):
             at = self.texts[uri].index(word, at + 1)
-        return {
-            "textDocument": {"uri": uri},
-            "position": self.position(self.texts[uri], at + shift),
-        }
+        return {"textDocument": {"uri": uri}, "position": self.position(self.texts[uri], at + shift)}
 
     def shown(self, uri: str, place: Json) -> str:
         """The text of a range."""
@@ -254,13 +235,11 @@ class Client:
     def diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """What is published for the latest text of a document, once its check has ended too."""
         end = time.monotonic() + seconds
-        count = len(self.published.get(uri, []))
-        wanted = 2  # the syntax at once, the rest later
         while True:
             found = [p for p in self.published.get(uri, []) if p.get("version") == self.versions[uri]]
-            if len(found) >= wanted:
+            if len(found) >= 2:  # the syntax at once, the rest later
                 return list(found[-1]["diagnostics"])
-            assert self._take(end - time.monotonic()), f"only {count} publications for {uri}"
+            assert self._take(end - time.monotonic()), f"not enough publications for {uri}"
 
     def next_diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """The publication after those that have come so far."""

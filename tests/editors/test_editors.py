@@ -92,24 +92,14 @@ def test_vim_formats_and_indents(tmp_path: Path) -> None:
     assert indented == "group {\n  square {\n    scale(\n      1,\n    );\n  }\n}\n"
 
 
-def bodies() -> list[tuple[str, str]]:
-    snippets = json.loads((VSCODE / "snippets/nsg.json").read_text("utf-8"))
-    found = []
-    for name, snippet in snippets.items():
+def test_snippets_are_scene_text_in_the_canonical_layout() -> None:
+    for name, snippet in json.loads((VSCODE / "snippets/nsg.json").read_text("utf-8")).items():
         body = snippet["body"]
-        found.append((name, body if isinstance(body, str) else "\n".join(body)))
-    return found
-
-
-@pytest.mark.parametrize(("name", "body"), bodies())
-def test_snippets_are_scene_text_in_the_canonical_layout(name: str, body: str) -> None:
-    text = re.sub(r"\$\{\d+\|([^,|]*)[^}]*\}", r"\1", body)
-    text = re.sub(r"\$\{\d+:([^}]*)\}", r"\1", text)
-    text = re.sub(r"\$\d+", "", text)
-    text = re.sub(r"\n\s*(?=\n)", "", text).strip() + "\n"
-    laid_out = format_text(text)
-    # Snippets are opened blocks to write in, even where little text would fit on one line.
-    assert re.sub(r"\s", "", laid_out) == re.sub(r"\s", "", text)
+        text = re.sub(r"\$\{\d+\|([^,|]*)[^}]*\}", r"\1", body if isinstance(body, str) else "\n".join(body))
+        text = re.sub(r"\$\d+", "", re.sub(r"\$\{\d+:([^}]*)\}", r"\1", text))
+        text = re.sub(r"\n\s*(?=\n)", "", text).strip() + "\n"
+        # Snippets are opened blocks to write in, even where little text would fit on one line.
+        assert re.sub(r"\s", "", format_text(text)) == re.sub(r"\s", "", text), name
 
 
 def test_extension_names_what_exists() -> None:
@@ -131,25 +121,18 @@ def test_extension_names_what_exists() -> None:
 
 def test_extension_passes_the_settings_of_the_server() -> None:
     pytest.importorskip("pygls")
-    from scenelang.editors.server import Settings
+    from scenelang.editors.workspace import Settings
 
-    changed = {
-        "scenelang": {
-            "model": "m",
-            "root": "/r",
-            "debounceMs": 7,
-            "inlayHints": {"values": False, "arguments": False},
-        }
-    }
-    default, read = Settings.read({}), Settings.read(changed)
+    hints = {"values": False, "arguments": False}
+    changed = {"model": "m", "root": "/r", "debounceMs": 7, "inlayHints": hints}
+    default, read = Settings.read({}), Settings.read({"scenelang": changed})
     client = (VSCODE / "src/extension.js").read_text("utf-8")
     for name in Settings.__dataclass_fields__:
         assert getattr(read, name) != getattr(default, name)
     for key in ("model", "root", "debounceMs", "inlayHints", "values", "arguments"):
         assert re.search(rf"\b{key}:", client), key
-    properties = json.loads((VSCODE / "package.json").read_text("utf-8"))["contributes"]["configuration"][
-        "properties"
-    ]
+    package = json.loads((VSCODE / "package.json").read_text("utf-8"))
+    properties = package["contributes"]["configuration"]["properties"]
     assert properties["scenelang.debounceMs"]["default"] == default.debounce_ms
 
 

@@ -1,12 +1,17 @@
-"""What names stand for, held against the evaluator, and what is in sight of the cursor."""
+"""Meanings of names, held against the evaluator; the context of a cursor; offsets, positions and edits."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lsprotocol import types
 
 from scenelang.editors.context import cursor_at
+from scenelang.editors.workspace import Encoding, Lines, difference, width
 from scenelang.language import expressions, tree
 from scenelang.language.builder import Place
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
@@ -60,51 +65,89 @@ def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pyte
         assert use.symbol.span == place, name
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "head"),
-    [
-        ("|", "file", ""),
-        ("group { | }", "group", "group"),
-        ("group { for (i in 0..3) { | } }", "group", "group"),
-        ("chain { smooth star { | } }", "object", "star"),
-        ("chain { square; | }", "chain", "chain"),
-        ("subtract { | }", "group", "subtract"),
-        ("module m(a) { if (a) { } else { | } }", "group", "module"),
-        ("square { material flat { | } }", "material", "material"),
-        ("let m = material flat { | };", "material", "let"),
-        ("let m = 1; square { m { | } }", "material", "m"),
-        ("m(1) { | }", "object", "m"),
-        ("square { group { a } | ", "object", "square"),
-    ],
-)
-def test_the_kind_of_block_is_read_off_tokens(text: str, kind: str, head: str) -> None:
-    offset = text.index("|")
-    block = cursor_at(tokens_of(text), offset, frozenset({"m"}) if "let m" in text else frozenset()).block
-    assert (block.kind, block.head) == (kind, head)
+BLOCKS = [
+    ("|", "file", ""),
+    ("group { | }", "group", "group"),
+    ("group { for (i in 0..3) { | } }", "group", "group"),
+    ("chain { smooth star { | } }", "object", "star"),
+    ("chain { square; | }", "chain", "chain"),
+    ("subtract { | }", "group", "subtract"),
+    ("module m(a) { if (a) { } else { | } }", "group", "module"),
+    ("square { material flat { | } }", "material", "material"),
+    ("let m = material flat { | };", "material", "let"),
+    ("let m = 1; square { m { | } }", "material", "m"),
+    ("m(1) { | }", "object", "m"),
+    ("square { group { a } | ", "object", "square"),
+]
+CALLS: list[tuple[str, str, int, str | None, set[str]]] = [
+    ("f(|", "f", 0, None, set()),
+    ("f(1, g(2, 3), |", "f", 2, None, set()),
+    ("f(1, g(2, |", "g", 1, None, set()),
+    ("f(a = 1, b = |", "f", 1, "b", {"a"}),
+    ("f([1, 2, |], 3", "f", 0, None, set()),
+    ("lib.f(1, |", "lib.f", 1, None, set()),
+    ("square { scale(0.5, | ); }", "scale", 1, None, set()),
+]
 
 
-@pytest.mark.parametrize(
-    ("text", "name", "index", "named", "given"),
-    [
-        ("f(|", "f", 0, None, ()),
-        ("f(1, g(2, 3), |", "f", 2, None, ()),
-        ("f(1, g(2, |", "g", 1, None, ()),
-        ("f(a = 1, b = |", "f", 1, "b", ("a",)),
-        ("f([1, 2, |], 3", "f", 0, None, ()),
-        ("lib.f(1, |", "lib.f", 1, None, ()),
-        ("square { scale(0.5, | ); }", "scale", 1, None, ()),
-    ],
-)
-def test_the_call_around_the_cursor(
-    text: str, name: str, index: int, named: str | None, given: tuple[str, ...]
-) -> None:
-    offset = text.index("|")
-    call = cursor_at(tokens_of(text), offset).call
-    assert call is not None
-    assert (call.name, call.index, call.named, call.given) == (name, index, named, frozenset(given))
+def test_blocks_and_calls_are_read_off_tokens() -> None:
+    for text, kind, head in BLOCKS:
+        values = frozenset({"m"}) if "let m" in text else frozenset()
+        block = cursor_at(tokens_of(text), text.index("|"), values).block
+        assert (block.kind, block.head) == (kind, head), text
+    for text, name, index, named, others in CALLS:
+        call = cursor_at(tokens_of(text), text.index("|")).call
+        assert call is not None, text
+        assert (call.name, call.index, call.named, call.given) == (name, index, named, others), text
 
 
 def test_parentheses_that_call_nothing_are_no_call() -> None:
     for text in ("if (|", "let a = (1 + |", "fn f(|", "for (i in |"):
         offset = text.index("|")
         assert cursor_at(tokens_of(text), offset).call is None
+
+
+TEXTS = st.text(st.sampled_from("ab\té𝄞\n\r\u2028\x0b"), max_size=30)
+SIZES: dict[Encoding, tuple[str, int]] = {
+    "utf-8": ("utf-8", 1),
+    "utf-16": ("utf-16-le", 2),
+    "utf-32": ("utf-32-le", 4),
+}
+
+
+def slow_position(text: str, offset: int, encoding: Encoding) -> tuple[int, int]:
+    """Line and column by splitting what is before."""
+    if text[offset - 1 : offset + 1] == "\r\n":
+        offset -= 1  # inside a newline: the end of its line
+    before = re.split(r"\r\n|\n|\r", text[:offset])
+    name, size = SIZES[encoding]
+    return len(before) - 1, len(before[-1].encode(name)) // size
+
+
+@given(TEXTS, st.integers(0, 30), st.sampled_from(list(SIZES)))
+def test_positions_are_those_of_the_protocol(text: str, offset: int, encoding: Encoding) -> None:
+    offset = min(offset, len(text))
+    if text[offset - 1 : offset + 1] == "\r\n":
+        return
+    lines = Lines(text, encoding)
+    place = lines.position(offset)
+    assert (place.line, place.character) == slow_position(text, offset, encoding)
+    assert lines.offset(place) == offset
+
+
+@given(TEXTS, st.integers(0, 40), st.integers(0, 40), st.sampled_from(list(SIZES)))
+def test_every_position_means_an_offset(text: str, line: int, character: int, encoding: Encoding) -> None:
+    offset = Lines(text, encoding).offset(types.Position(line, character))
+    assert 0 <= offset <= len(text)
+
+
+@pytest.mark.parametrize(("encoding", "units"), [("utf-8", 8), ("utf-16", 5), ("utf-32", 4)])
+def test_width_counts_code_units(encoding: Encoding, units: int) -> None:
+    assert width("aé𝄞b", encoding) == units
+
+
+@given(TEXTS, TEXTS)
+def test_the_difference_makes_one_text_of_the_other(old: str, new: str) -> None:
+    edit = difference(old, new)
+    assert old[: edit.start] + new[edit.start : edit.new_end] + old[edit.old_end :] == new
+    assert edit.start == edit.old_end == edit.new_end or old != new

@@ -1,8 +1,7 @@
-"""The protocol itself: the life of a session, encodings, cancelling, texts in step, nothing that crashes."""
+"""The protocol itself: sessions, encodings, texts in step; what is missing is told, nothing crashes."""
 
 from __future__ import annotations
 
-import io
 import json
 import socket
 import subprocess
@@ -13,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenelang.editors.server import Incoming, Settings
-from scenelang.editors.workspace import MAX_TEXT
-from tests.editors.client import PATIENCE_S, Client, Json
+from scenelang.editors.workspace import MAX_TEXT, Settings
+from tests.editors.client import PATIENCE_S, Client
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
 
 
@@ -66,39 +63,13 @@ def test_positions_count_what_was_agreed_on(encoding: str) -> None:
         client.kill()
 
 
-def test_lines_end_as_the_protocol_says(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\r\nlet b = 2;\rlet c = #d33;\n")
-    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert colour["range"]["start"] == {"line": 2, "character": 8}
-    client.replace(uri, "let a = \u2028#d33;\x0b\nlet b = #d33;\n")
-    found = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert [c["range"]["start"] for c in found] == [{"line": 0, "character": 9}, {"line": 1, "character": 8}]
-
-
-def test_places_outside_the_text_are_its_ends(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\n")
-    far = {"line": 1000, "character": 1000}
-    params: Json = {"textDocument": {"uri": uri}, "position": far}
-    for method in ("hover", "completion", "definition", "signatureHelp", "documentHighlight"):
-        client.request(f"textDocument/{method}", params)
-    version = {"uri": uri, "version": 2}
-    change = {"range": {"start": far, "end": far}, "text": "let b = #d33;\n"}
-    client.notify("textDocument/didChange", {"textDocument": version, "contentChanges": [change]})
-    (colour,) = client.request("textDocument/documentColor", {"textDocument": {"uri": uri}})
-    assert colour["range"]["start"] == {"line": 1, "character": 8}
-
-
 def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:
     document = {"textDocument": {"uri": "file:///nowhere/at/all.nsg"}}
     at = {**document, "position": {"line": 0, "character": 0}}
     assert client.request("textDocument/hover", at) is None
     assert client.request("textDocument/documentSymbol", document) == []
-    assert (
-        client.request(
-            "textDocument/formatting", {**document, "options": {"tabSize": 2, "insertSpaces": True}}
-        )
-        is None
-    )
+    options = {"options": {"tabSize": 2, "insertSpaces": True}}
+    assert client.request("textDocument/formatting", {**document, **options}) is None
     change = {"textDocument": {**document["textDocument"], "version": 2}, "contentChanges": [{"text": "x"}]}
     client.notify("textDocument/didChange", change)
     client.notify("textDocument/didClose", document)
@@ -107,68 +78,18 @@ def test_documents_that_are_not_there_get_empty_answers(client: Client) -> None:
     assert client.stop() == 0
 
 
-@pytest.mark.parametrize("method", ["hover", "completion", "definition"])
-@pytest.mark.parametrize(
-    "place", [{"line": -1, "character": 0}, {"line": 0, "character": 1 << 40}, None, "x"]
-)
-def test_positions_that_are_none_are_refused(lasting: Client, method: str, place: Any) -> None:
+def test_positions_that_are_none_are_refused(lasting: Client) -> None:
     uri = lasting.open("untitled:a", "let a = 1;\n")
-    params = {"textDocument": {"uri": uri}, "position": place}
-    assert "Invalid" in lasting.refused(f"textDocument/{method}", params)
+    for place in ({"line": -1, "character": 0}, {"line": 0, "character": 1 << 40}, None, "x"):
+        for method in ("hover", "completion", "definition"):
+            params = {"textDocument": {"uri": uri}, "position": place}
+            assert "Invalid" in lasting.refused(f"textDocument/{method}", params)
 
 
-def test_a_second_initialization_is_refused(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\n")
-    params = {"processId": None, "rootUri": None, "capabilities": {}}
-    assert "initialized already" in client.refused("initialize", params)
-    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
-
-
-@pytest.mark.parametrize("length", [b"100000000", b"9" * 30, b"9" * 5000])
-def test_a_message_that_is_too_long_is_refused(client: Client, length: bytes) -> None:
-    """However much of it comes, the next one is read."""
-    assert client.process.stdin is not None
-    for body in (b"", b'{"jsonrpc": "2.0", "id": 1}', b"x" * 100_000):
-        client.process.stdin.write(b"Content-Length: " + length + b"\r\n\r\n" + body)
-        client.process.stdin.flush()
-        assert client.answer(None)["error"]["code"] == -32600
-        assert "unknownRequest" in client.refused("some/unknownRequest", {})
-    assert client.stop() == 0
-
-
-@settings(max_examples=60)
-@given(st.integers(0, 100), st.integers(0, 2), st.sampled_from([b"", b"\n", b"\r\n", b"Content-Length: 1"]))
-def test_the_next_message_is_found(cut: int, chunks: int, end: bytes) -> None:
-    """Wherever the pieces end in which the one before is passed over; lines stay short."""
-    chunk = 1 << 16
-    body = b"x" * max(0, chunks * chunk - cut) + end
-    said: list[None] = []
-    data = b"Content-Length: 1234567890\r\n\r\n" + body + b"Content-Length: 2\r\n\r\n{}"
-    incoming = Incoming(io.BytesIO(data), lambda: said.append(None))
-    while (line := incoming.readline()) != b"Content-Length: 2\r\n":
-        assert line
-        assert len(line) <= chunk + 64
-    assert incoming.readline() == b"\r\n"
-    assert incoming.read(2) == b"{}"
-    assert incoming.readline() == b""
-    assert len(said) == 1
-
-
-@pytest.mark.parametrize(
-    "pause", [1e300, 10**400, float("nan"), float("inf"), -1, 60_001, True, False, "7", None]
-)
-def test_a_pause_that_is_none_is_the_usual_one(pause: Any) -> None:
-    assert Settings.read({"debounceMs": pause}) == Settings()
+def test_a_pause_that_is_none_is_the_usual_one() -> None:
+    for pause in (1e300, 10**400, float("nan"), float("inf"), -1, 60_001, True, False, "7", None):
+        assert Settings.read({"debounceMs": pause}) == Settings(), pause
     assert Settings.read({"debounceMs": 60_000}).debounce_ms == 60_000
-
-
-def test_a_cancelled_request_is_answered_all_the_same(client: Client) -> None:
-    uri = client.open("untitled:a", "let a = 1;\n")
-    request = client.start("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
-    client.notify("$/cancelRequest", {"id": request})
-    answer = client.answer(request)
-    assert "result" in answer or answer["error"]["code"] == -32800
-    assert client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
 
 
 HELD = """
@@ -256,32 +177,106 @@ def test_a_port_serves_as_well_as_pipes() -> None:
                 assert process.poll() is None, "the server ended"
                 assert time.monotonic() < end, "nobody listens"
                 time.sleep(0.05)
+        connection.settimeout(PATIENCE_S)
         with connection, connection.makefile("rwb") as stream:
             params = {"processId": None, "rootUri": None, "capabilities": {}}
-            message: Json = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params}
-            data = json.dumps(message).encode()
-            stream.write(b"Content-Length: %d\r\n\r\n" % len(data) + data)
+            data = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params})
+            stream.write(f"Content-Length: {len(data)}\r\n\r\n{data}".encode())
             stream.flush()
-            length = 0
-            while line := stream.readline().strip():
-                if line.lower().startswith(b"content-length:"):
-                    length = int(line.split(b":")[1])
-            assert json.loads(stream.read(length))["result"]["serverInfo"]["name"] == "scenelang"
+            heads = dict(line.split(b": ") for line in iter(lambda: stream.readline().strip(), b""))
+            answer = json.loads(stream.read(int(heads[b"Content-Length"])))
+            assert answer["result"]["serverInfo"]["name"] == "scenelang"
     finally:
         process.kill()
         process.wait(PATIENCE_S)
 
 
-def test_many_documents_are_open_at_once() -> None:
-    client = Client(EXAMPLES)
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PIECES = [
+    *"{}()[];,.\"'/=#é𝄞\t\n",
+    *("\r\n", "let x = ", "square { scale(0.5); }\n", 'import "a.nsg" as b;\n'),
+    *("lib.", "/*", "*/", "30deg", "rotate("),
+]
+FEATURES = ("hover", "completion", "signatureHelp", "definition", "documentHighlight", "prepareRename")
+WHOLE = ("documentSymbol", "foldingRange", "documentColor", "documentLink", "semanticTokens/full")
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from(["carousel", "tangram", "gear", "chain"]),
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 9), st.sampled_from(PIECES)), min_size=1, max_size=6),
+    st.floats(0, 1),
+)
+def test_random_edits_keep_texts_in_step_and_crash_nothing(
+    lasting: Client, name: str, edits: list[tuple[float, int, str]], where: float
+) -> None:
+    client = lasting
+    uri = client.open(f"untitled:{name}", (EXAMPLES / f"{name}.nsg").read_text("utf-8"))
+    document = {"textDocument": {"uri": uri}}
+    for share, length, new in edits:
+        text = client.texts[uri]
+        start = round(share * len(text))
+        end = min(start + length, len(text))
+        # A position cannot stand between the two characters of a CRLF.
+        if "\r" in (text[start - 1 : start], text[end - 1 : end]):
+            continue
+        client.change(uri, start, end, new)
+    if "\r" not in client.texts[uri]:
+        whole = client.request(
+            "textDocument/selectionRange", {**document, "positions": [{"line": 0, "character": 0}]}
+        )
+        outer = whole[0]
+        while outer.get("parent"):
+            outer = outer["parent"]
+        assert client.shown(uri, outer["range"]) == client.texts[uri]
+        colours = client.request("textDocument/documentColor", document)
+        assert all(client.shown(uri, c["range"])[:1] in "#[rh" for c in colours)
+    line = client.texts[uri].count("\n")
+    at = {**document, "position": {"line": round(where * line), "character": 3}}
+    for feature in FEATURES:
+        client.answer(client.start(f"textDocument/{feature}", at))
+    for feature in WHOLE:
+        client.request(f"textDocument/{feature}", document)
+    place = {"start": {"line": 0, "character": 0}, "end": {"line": line + 1, "character": 0}}
+    client.request("textDocument/inlayHint", {**document, "range": place})
+    client.request("textDocument/codeAction", {**document, "range": place, "context": {"diagnostics": []}})
+    client.close(uri)
+
+
+def test_a_missing_library_is_one_line_that_says_what_to_do() -> None:
+    code = "import sys; sys.modules['pygls'] = None\nfrom scenelang.cli.main import main\nmain(['lsp'])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.strip() == "Error: the language server needs pygls: pip install 'scenelang[lsp]'"
+
+
+def test_a_log_is_written_where_asked(tmp_path: Path) -> None:
+    log = tmp_path / "server.log"
+    client = Client(command=[sys.executable, "-m", "scenelang", "lsp", "--stdio", "--log", str(log)])
     try:
-        uris = [
-            client.open(path.as_uri(), path.read_text("utf-8")) for path in sorted(EXAMPLES.glob("*.nsg"))
-        ]
-        for uri in uris:
-            assert [d for d in client.diagnostics(uri) if d["severity"] == 1] == []
-            document = {"textDocument": {"uri": uri}}
-            assert client.request("textDocument/documentSymbol", document)
-            client.request("textDocument/semanticTokens/full", document)
+        assert client.stop() == 0
+        assert "INFO" in log.read_text("utf-8")
+    finally:
+        client.kill()
+
+
+def test_an_internal_error_is_logged_and_the_answer_empty(tmp_path: Path) -> None:
+    code = (
+        "import scenelang.editors.hover as hover\n"
+        "def broken(*_): raise RuntimeError('on purpose')\n"
+        "hover.hover = broken\n"
+        "from scenelang.cli.main import main\n"
+        "main(['lsp'])"
+    )
+    client = Client(command=[sys.executable, "-c", code])
+    try:
+        uri = client.open("untitled:a", "let a = 1;\n")
+        answer: Any = client.request("textDocument/hover", client.at(uri, "let", 1))
+        assert answer is None
+        client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
+        assert "on purpose" in client.logged[-1]["message"]
+        assert client.stop() == 0
     finally:
         client.kill()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -27,21 +26,14 @@ class Server:
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
         assert self.process.stdout is not None
-        self.process.stdout.readline()
-        self.url = self.process.stdout.readline().strip()
-        assert self.url, self.process.stderr and self.process.stderr.read()
-
-    @property
-    def origin(self) -> str:
-        """Scheme, host and port."""
-        found = re.match(r"http://[^/]+", self.url)
-        assert found is not None
-        return found[0]
+        self.url = next(line.strip() for line in self.process.stdout if line.startswith("http://"))
+        self.origin = self.url.rsplit("/", 2)[0]
 
     def connect(self, name: str, **options: Any) -> ClientConnection:
         """A websocket."""
         options = {"origin": self.origin, "max_size": None, "proxy": None, **options}
-        return connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
+        socket: ClientConnection = connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
+        return socket
 
     @contextlib.contextmanager
     def page(self) -> Iterator[Page]:
@@ -53,8 +45,7 @@ class Server:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.process.poll() is None:
-            self.end(signal.SIGTERM)
+        self.end(signal.SIGTERM)  # which does nothing to one that has ended
 
     def end(self, how: int = signal.SIGINT) -> int:
         """End it; the exit code."""

@@ -1,42 +1,17 @@
-"""A server of its own for a test, and the page in Chromium."""
+"""The page in Chromium."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from tests.browser import watched
+from tests.play.client import Server
 
 PATIENCE_MS = 20_000
 """How long anything is waited for; most takes milliseconds."""
-
-
-class Served:
-    """A server that runs."""
-
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        assert process.stdout is not None
-        self.process = process
-        self.address = next(line.strip() for line in process.stdout if line.startswith("http://"))
-        self.origin = self.address.rsplit("/", 2)[0]
-
-
-@contextmanager
-def served(path: Path, state: Path) -> Iterator[Served]:
-    """A server of a scene or folder; what is not saved it keeps in ``state``."""
-    command = [sys.executable, "-m", "scenelang", "play", str(path), "--no-browser"]
-    environment = {**os.environ, "SCENELANG_STATE": str(state), "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            yield Served(process)
-        finally:
-            process.terminate()
 
 
 class Page:
@@ -96,9 +71,9 @@ class Page:
 
 
 @contextmanager
-def opened(browser: Any, server: Served, first: str = "", **options: Any) -> Iterator[Page]:
+def opened(browser: Any, server: Server, first: str = "", **options: Any) -> Iterator[Page]:
     """The page; fails where it wrote to the console or asked another host. ``first`` runs before all else."""
     with watched(browser, (server.origin,), **options) as page:
         page.add_init_script(first)
-        page.goto(server.address)
+        page.goto(server.url)
         yield Page(page)

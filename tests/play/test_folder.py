@@ -1,15 +1,17 @@
-"""Files of the folder and no others, written whole, with nothing lost."""
+"""Files of the folder and no others, written whole; what is not saved is kept for its owner alone."""
 
 from __future__ import annotations
 
+import json
 import os
+import time
 from pathlib import Path, PureWindowsPath
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenelang.web.folder import Changed, Folder, Refused, fits
+from scenelang.web.folder import MOST_DAYS, MOST_KEPT, Changed, Folder, Journal, Refused, fits, state_folder
 
 ESCAPES = [
     *("../out.nsg", "a/../../out.nsg", "..", ".", "", "/etc/passwd", "/tmp/out.nsg", "a//b.nsg", "/", "a/"),
@@ -30,16 +32,15 @@ def folder(tmp_path: Path) -> Folder:
     return Folder(inside)
 
 
-@pytest.mark.parametrize("name", ESCAPES)
-def test_names_that_lead_elsewhere(folder: Folder, name: str) -> None:
-    for ask in (
-        lambda: folder.read(name),
-        lambda: folder.write(name, "x", None),
-        lambda: folder.rename("a.nsg", name),
-        lambda: folder.rename(name, "b.nsg"),
-    ):
+def test_names_that_lead_elsewhere(folder: Folder) -> None:
+    for name in ESCAPES:
         with pytest.raises(Refused):
-            ask()
+            folder.read(name)
+        with pytest.raises(Refused):
+            folder.write(name, "x", None)
+        for names in (("a.nsg", name), (name, "b.nsg")):
+            with pytest.raises(Refused):
+                folder.rename(*names)
     assert (folder.path.parent / "out.nsg").read_text() == "outside"
     assert [path.name for path in folder.path.iterdir()] == ["a.nsg"]
 
@@ -102,23 +103,16 @@ def test_line_ends_stay(folder: Folder) -> None:
     assert (folder.path / "a.nsg").read_bytes() == b"square;\r\ntriangle;\r\nstar;\r\n"
 
 
-@pytest.mark.parametrize("data", [b"\xff", b"x" * 10_000_001])
-def test_what_is_not_a_scene_is_not_read(folder: Folder, data: bytes) -> None:
-    (folder.path / "b.nsg").write_bytes(data)
-    with pytest.raises(Refused):
-        folder.read("b.nsg")
-
-
-def test_nothing_waits_for_a_pipe(folder: Folder) -> None:
+def test_what_is_not_a_scene_is_neither_read_nor_written(folder: Folder) -> None:
     os.mkfifo(folder.path / "pipe.nsg")
-    with pytest.raises(Refused):
-        folder.read("pipe.nsg")
-
-
-def test_what_is_too_large_is_not_written(folder: Folder) -> None:
+    (folder.path / "binary.nsg").write_bytes(b"\xff")
+    (folder.path / "large.nsg").write_bytes(b"x" * 10_000_001)
+    for name in ("pipe.nsg", "binary.nsg", "large.nsg"):
+        with pytest.raises(Refused):
+            folder.read(name)
     with pytest.raises(Refused):
         folder.write("big.nsg", "x" * 10_000_001, None)
-    assert folder.names() == ["a.nsg"]
+    assert not (folder.path / "big.nsg").exists()
 
 
 def test_renaming_takes_no_other_name(folder: Folder) -> None:
@@ -139,3 +133,60 @@ def test_hidden_folders_and_links_are_not_listed(folder: Folder) -> None:
         path.write_text("square;")
     (folder.path / "loop").symlink_to(folder.path)
     assert folder.names() == ["a.nsg", "deep/z.nsg"]
+
+
+SCENE = Path("/scenes/a.nsg")
+
+
+def test_a_text_is_found_again(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "deep/play")
+    assert journal.find(SCENE) is None
+    journal.keep(SCENE, "square; // \u202e", "abc")
+    journal.keep(Path("/scenes/b.nsg"), "other", None)
+    found = Journal(tmp_path / "deep/play").find(SCENE)
+    assert found is not None
+    assert (found.text, found.disk) == ("square; // \u202e", "abc")
+    assert 0 <= found.seconds < 60
+    (entry,) = [path for path in journal.folder.iterdir() if "square" in path.read_text()]
+    assert entry.stat().st_mode & 0o777 == 0o600
+    assert journal.folder.stat().st_mode & 0o777 == 0o700
+    journal.drop(SCENE)
+    assert journal.find(SCENE) is None
+    journal.drop(SCENE)
+
+
+def test_damaged_entries_are_none(tmp_path: Path) -> None:
+    good = {"file": str(SCENE), "text": "x", "disk": None, "time": 0}
+    changes = ({"file": "/other.nsg"}, {"text": 1}, {"time": "now"})
+    wrong = [json.dumps({**good, **change}).encode() for change in changes]
+    journal = Journal(tmp_path)
+    journal.keep(SCENE, "x", None)
+    (entry,) = tmp_path.iterdir()
+    for data in (*wrong, b"", b"{", b"[]", b"\xff", b'{"file": "/scenes/a.nsg"}', b"[" * 100_000):
+        entry.write_bytes(data)
+        assert journal.find(SCENE) is None, data[:80]
+
+
+def test_old_ones_go(tmp_path: Path) -> None:
+    journal = Journal(tmp_path)
+    for number in range(MOST_KEPT + 5):
+        journal.keep(Path(f"/scenes/{number}.nsg"), "x", None)
+        at = time.time() - (MOST_KEPT + 5 - number)
+        os.utime(journal._place(Path(f"/scenes/{number}.nsg")), (at, at))
+    old = time.time() - (MOST_DAYS + 1) * 86400
+    os.utime(journal._place(Path("/scenes/50.nsg")), (old, old))
+    journal.tidy()
+    kept = [n for n in range(MOST_KEPT + 5) if journal.find(Path(f"/scenes/{n}.nsg"))]
+    assert kept == [n for n in range(4, MOST_KEPT + 5) if n != 50]
+
+
+def test_where_it_lies() -> None:
+    home = Path.home()
+    for environment, platform, expected in (
+        ({"SCENELANG_STATE": "/own", "XDG_STATE_HOME": "/x"}, "linux", Path("/own")),
+        ({"XDG_STATE_HOME": "/x"}, "linux", Path("/x/scenelang")),
+        ({"XDG_STATE_HOME": "x"}, "linux", home / ".local/state/scenelang"),
+        ({}, "darwin", home / "Library/Application Support/scenelang"),
+        ({"LOCALAPPDATA": "/local"}, "win32", Path("/local/scenelang")),
+    ):
+        assert state_folder(environment, platform) == expected

@@ -86,23 +86,21 @@ def test_figures_count_what_is_written_and_what_is_left() -> None:
     assert (figures["objects"], figures["rows"]) == (2, 1)
 
 
-@pytest.mark.parametrize(
-    ("parts", "message"),
-    [
+def test_what_cannot_be_done_says_why() -> None:
+    cases: list[tuple[dict[str, Any], str]] = [
         ({"text": "sqare;"}, "unknown geometry or module `sqare`"),
         ({"params": {"k": 1}}, "no param `k`"),
         ({"text": 'import "/etc/passwd" as x; square;'}, "absolute path"),
         ({"size": [8192, 8192]}, "8192 × 8192"),
-    ],
-)
-def test_what_cannot_be_done_says_why(parts: dict[str, Any], message: str) -> None:
-    with pytest.raises(jobs.JobFailed, match=message):
-        done(**parts)
+    ]
+    for parts, message in cases:
+        with pytest.raises(jobs.JobFailed, match=message):
+            done(**parts)
 
 
 def test_a_process_has_so_much_memory_and_no_more() -> None:
     code = (
-        "from scenelang.web.worker import limit_memory\n"
+        "from scenelang.web.pool import limit_memory\n"
         "import numpy\nlimit_memory(1 << 30)\n"
         "try:\n    numpy.ones(1 << 28)\nexcept MemoryError:\n    print(numpy.ones(1 << 20).sum())"
     )

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Iterator
-from http.server import HTTPServer, SimpleHTTPRequestHandler
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.play.page import Page, Served, opened, served
+from tests.play.client import Server
+from tests.play.page import Page, opened
 
 pytestmark = pytest.mark.browser
 SCENE = """nsg 1;
@@ -32,13 +31,13 @@ def scene(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def server(scene: Path, tmp_path: Path) -> Iterator[Served]:
-    with served(scene, tmp_path / "state") as server:
+def server(scene: Path, tmp_path: Path) -> Iterator[Server]:
+    with Server(scene, tmp_path / "state") as server:
         yield server
 
 
 @pytest.fixture
-def page(chromium: Any, server: Served) -> Iterator[Page]:
+def page(chromium: Any, server: Server) -> Iterator[Page]:
     with opened(chromium, server, viewport={"width": 1280, "height": 800}) as page:
         yield page
 
@@ -72,29 +71,6 @@ def test_a_mistake_is_shown_while_the_last_picture_stays(page: Page) -> None:
     page.page.locator("#problems", has_text="No mistakes").wait_for()
 
 
-def test_mistakes_are_counted_in_one_place(page: Page) -> None:
-    page.knows()
-    page.click_text("background")
-    page.page.keyboard.insert_text("\nsquare { scael(0.4) }")
-    page.page.locator("#problems", has_text="2 mistakes").wait_for()
-    page.page.locator("#note", has_text="mistakes").wait_for()
-    assert not re.search(r"\d", page.page.locator("#note").inner_text())
-
-
-def test_a_material_is_coloured_whatever_comes_behind_it(page: Page) -> None:
-    page.knows()
-    page.click_text("background")
-    page.page.keyboard.insert_text("\nlet w = material diffuse tex.grain; let v = grain;")
-    colour = (
-        "[...document.querySelectorAll('.cm-line span')].filter((e) => !e.children.length"
-        " && e.textContent === g[0]).map((e) => getComputedStyle(e).color)"
-    )
-    page.until(f"{colour}.length > 0", "diffuse")
-    look, shape, plain = (page.page.evaluate(f"(g) => {colour}", [w]) for w in ("diffuse", "square", "v"))
-    assert look == shape[:1]
-    assert plain != look
-
-
 def test_completion_hover_and_arguments_know_the_language(page: Page) -> None:
     page.knows()
     page.click_text("background")
@@ -110,27 +86,6 @@ def test_completion_hover_and_arguments_know_the_language(page: Page) -> None:
     page.page.locator(".cm-tooltip-hover .markdown", has_text="in 0..1").wait_for()
 
 
-def test_keys_do_what_they_do_in_editors(page: Page) -> None:
-    page.click_text("background")
-    keyboard = page.page.keyboard
-    keyboard.type("\ngroup {\nsphere {\n")
-    lines = page.page.locator(".cm-line").all_inner_texts()
-    assert lines[4:9] == ["group {", "  sphere {", "    ", "  }", "}"], (
-        "brackets close, and what is in them is indented"
-    )
-    keyboard.press("Control+/")
-    page.has("    // ")
-    for _ in range(40):
-        keyboard.press("Control+z")
-    assert page.text() == SCENE
-    page.click_text("param", "Home")
-    keyboard.press("Control+/")
-    page.has("// param r")
-    keyboard.press("Control+f")
-    page.page.locator(".cm-search input[name=search]").press_sequentially("ff0000")
-    page.page.locator(".cm-searchMatch", has_text="ff0000").wait_for()
-
-
 def test_a_slider_is_drawn_by_the_shader_and_then_by_the_network(page: Page) -> None:
     before = page.picture()
     page.page.locator("#controls input[type=range]").fill("0.9")
@@ -139,24 +94,12 @@ def test_a_slider_is_drawn_by_the_shader_and_then_by_the_network(page: Page) -> 
     assert "0.5" in page.text(), "the text stays"
 
 
-def test_without_webgl_the_server_draws_all(chromium: Any, server: Served) -> None:
+def test_without_webgl_the_server_draws_all(chromium: Any, server: Server) -> None:
     with opened(chromium, server, "HTMLCanvasElement.prototype.getContext = () => null;") as page:
         before = page.picture()
         page.page.locator("#note", has_text="WebGL2").wait_for()
         page.page.locator("#controls input[type=range]").fill("0.9")
         page.other_picture(before)
-
-
-def test_what_no_page_draws_the_server_does(page: Page, scene: Path) -> None:
-    before = page.picture()
-    page.page.locator("#controls input").first.wait_for()
-    scene.write_text("for (i in 0..5000) { square { scale(0.01); translate(i / 5000, 0); } }\n", "utf-8")
-    page.page.locator("#note", has_text="server alone draws").wait_for()
-    page.other_picture(before)
-    assert page.page.locator("#controls input").count() == 0
-    scene.write_text(SCENE, "utf-8")
-    page.page.locator("#controls input").first.wait_for()
-    page.page.locator("#note").wait_for(state="hidden")
 
 
 def test_the_camera_is_written_into_the_text(page: Page, scene: Path) -> None:
@@ -197,7 +140,7 @@ def test_files_on_the_disk_and_texts_are_in_step(page: Page, scene: Path) -> Non
 
 def test_what_was_not_saved_is_back_after_a_crash(chromium: Any, scene: Path, tmp_path: Path) -> None:
     for crash in range(2):
-        with served(scene, tmp_path / "state") as server, opened(chromium, server) as page:
+        with Server(scene, tmp_path / "state") as server, opened(chromium, server) as page:
             page.picture()
             if crash:
                 page.has("// mine")
@@ -240,21 +183,6 @@ def test_a_new_scene_begins_with_an_example(page: Page, scene: Path) -> None:
     assert made == (Path(__file__).parents[2] / "examples/hello.nsg").read_text("utf-8")
 
 
-def test_a_file_is_renamed(page: Page, scene: Path) -> None:
-    page.picture()
-    page.page.get_by_role("button", name="Rename…").click()
-    page.page.get_by_label("Name").fill("b")
-    page.page.get_by_role("button", name="OK").click()
-    page.page.locator("#files option:checked", has_text="b.nsg").wait_for(state="attached")
-    assert (scene.exists(), scene.with_name("b.nsg").read_text("utf-8")) == (False, SCENE)
-    page.click_text("background")
-    page.page.keyboard.type("  // mine")
-    page.page.keyboard.press("Control+s")
-    page.page.locator("#unsaved").wait_for(state="hidden")
-    assert "// mine" in scene.with_name("b.nsg").read_text("utf-8")
-    assert page.page.locator(".asks").count() == 0
-
-
 def test_a_stranger_s_text_stays_text(page: Page, scene: Path) -> None:
     evil = "</script><img src=x onerror=document.title=1> \u202e"
     page.picture()
@@ -284,42 +212,3 @@ def test_the_picture_is_downloaded(page: Page) -> None:
     assert download.value.suggested_filename == "a.png"
     data = Path(download.value.path()).read_bytes()
     assert data[16:24] == (40).to_bytes(4, "big") * 2
-
-
-def test_another_site_s_page_hears_nothing(chromium: Any, server: Served, tmp_path: Path) -> None:
-    """Not even one that knows the token."""
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site/index.html").write_text("<title>elsewhere</title>", "utf-8")
-
-    class Quiet(SimpleHTTPRequestHandler):
-        def __init__(self, *args: Any) -> None:
-            super().__init__(*args, directory=str(tmp_path / "site"))
-
-        def log_message(self, *args: Any) -> None:
-            pass
-
-    with HTTPServer(("127.0.0.1", 0), Quiet) as site:
-        threading.Thread(target=site.serve_forever, daemon=True).start()
-        page = chromium.new_page()
-        page.goto(f"http://127.0.0.1:{site.server_port}/")
-        script = """async ([address]) => {
-          const socket = new WebSocket(`${address.replace("http", "ws")}live`);
-          const heard = new Promise((done) => {
-            socket.onmessage = () => done("a message");
-            socket.onclose = () => done("nothing");
-          });
-          const read = await fetch(address).then((answer) => answer.text(), () => "nothing");
-          return [await heard, read];
-        }"""
-        assert page.evaluate(script, [server.address]) == ["nothing", "nothing"]
-        page.close()
-        site.shutdown()
-
-
-def test_a_phone_has_one_column(chromium: Any, server: Served) -> None:
-    with opened(chromium, server, viewport={"width": 390, "height": 844}) as page:
-        page.picture()
-        assert page.page.evaluate("document.documentElement.scrollWidth") <= 390
-        still, editor = (page.page.locator(place).bounding_box() for place in ("#still", "#editor"))
-        assert still["y"] + still["height"] <= editor["y"]
-        assert still["width"] > 300

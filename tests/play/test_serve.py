@@ -1,7 +1,8 @@
-"""From the command line: ports, addresses, Ctrl-C, and nothing that stays."""
+"""Who may ask, and from the command line: ports, addresses, Ctrl-C, and nothing that stays."""
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import socket
 import subprocess
@@ -10,26 +11,29 @@ import time
 import urllib.error
 import urllib.request
 from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 import pytest
 from click.testing import CliRunner
+from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
 
 import scenelang as nsg
 from scenelang.cli.main import cli
-from scenelang.web.server import PORT, listen
+from scenelang.web.server import HEADERS, PORT, Guard, is_loopback, listen, policy
 from tests.play.client import Server, below, is_there
 from tests.play.conftest import SQUARE
-from tests.play.page import served
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_it_ends_with_all_its_processes(tmp_path: Path, how: signal.Signals) -> None:
     (tmp_path / "a.nsg").write_text(SQUARE)
-    with (
-        Server(tmp_path, tmp_path / ".state") as server,
-        server.page() as page,
-        server.connect("lsp"),
-    ):
+    with Server(tmp_path, tmp_path / ".state") as server, server.page() as page, server.connect("lsp"):
         page.open("a.nsg")
         page.say("edit", file="a.nsg", version=1, text="for (i in 0..3000) { for (j in 0..3000) { } }")
         page.draw(1, "a.nsg", by="reference")
@@ -53,36 +57,25 @@ def test_a_port_in_use() -> None:
         assert second.getsockname()[0] == "127.0.0.1"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+def test_what_cannot_be_served(tmp_path: Path) -> None:
+    for arguments, message in (
         (["none/none.nsg"], "there is neither a scene nor a folder"),
-        (["--host", "192.0.2.1"], "cannot listen on `192.0.2.1`"),
-        (["--host", "no.such.host.invalid"], "cannot listen on `no.such.host.invalid`"),
-        (["--port", "0"], "not in the range"),
-    ],
-)
-def test_what_cannot_be_served(tmp_path: Path, arguments: list[str], message: str) -> None:
-    if arguments[0].startswith("-"):
-        arguments = [str(tmp_path), *arguments]
-    found = CliRunner().invoke(cli, ["play", "--no-browser", *arguments])
-    assert found.exit_code == 2
-    assert message in found.output
+        ([str(tmp_path), "--host", "192.0.2.1"], "cannot listen on `192.0.2.1`"),
+        ([str(tmp_path), "--host", "192.0.2.1"], "other machines reach 192.0.2.1"),
+        ([str(tmp_path), "--host", "no.such.host.invalid"], "cannot listen on `no.such.host.invalid`"),
+        ([str(tmp_path), "--port", "0"], "not in the range"),
+    ):
+        found = CliRunner().invoke(cli, ["play", "--no-browser", *arguments])
+        assert (found.exit_code, message in found.output) == (2, True), found.output
 
 
 def test_a_scene_that_is_not_there_is_made(tmp_path: Path) -> None:
     new = tmp_path / "new.nsg"
-    with served(new, tmp_path / ".state") as found:
-        assert found.address
+    with Server(new, tmp_path / ".state"):
         assert [d.severity for d in nsg.check(new)] == []
     new.write_text("star;")
-    with served(new, tmp_path / ".state"):
+    with Server(new, tmp_path / ".state"):
         assert new.read_text() == "star;"
-
-
-def test_others_are_warned_of(tmp_path: Path) -> None:
-    found = CliRunner().invoke(cli, ["play", str(tmp_path), "--no-browser", "--host", "192.0.2.1"])
-    assert "other machines reach 192.0.2.1" in found.output
 
 
 @pytest.mark.parametrize("missing", ["starlette", "uvicorn", "watchfiles", "pygls"])
@@ -111,9 +104,143 @@ def test_files_of_the_package_and_no_others(server: Server) -> None:
             "static/../app.py",
             "static/%2e%2e/app.py",
             "static/viewer/../view.py",
-            "static/viewer/%2e%2e%2fview.py",
+            "static/viewer/%2e%2e%2fa.py",
         ),
         *("static//etc/passwd", "static/..%5capp.py", "static/web", "static/", "static/.", "static/viewer"),
         *("static/play.js%00.py", "static/viewer/gl.js/x", "app.py", "download", "download?key=", "live"),
     ):
         assert get(path) in (403, 404, 405), path
+
+
+TOKEN, HERE = "t" * 43, "127.0.0.1:8766"
+
+
+async def answer(request: Request) -> PlainTextResponse:
+    return PlainTextResponse(request.url.path)
+
+
+async def hold(socket: WebSocket) -> None:
+    await socket.accept()
+
+
+def guard(**options: Any) -> Guard:
+    routes = [Route("/{rest:path}", answer), WebSocketRoute("/live", hold)]
+    return Guard(Starlette(routes=routes), TOKEN, **options)
+
+
+class Answer(NamedTuple):
+    code: int  # of a websocket 101 where it is accepted
+    headers: Headers
+    text: str
+
+
+def ask(guarded: Guard, address: str, kind: str = "http", **headers: str | list[str]) -> Answer:
+    """What a guard answers; a header may be there several times."""
+    path, _, query = address.partition("?")
+    given = {"host": HERE, **{name.replace("_", "-"): value for name, value in headers.items()}}
+    pairs = [(k, one) for k, v in given.items() for one in ([v] if isinstance(v, str) else v)]
+    scope: dict[str, Any] = {
+        "type": kind,
+        "path": unquote(path, errors="surrogateescape"),
+        "query_string": query.encode(),
+        "headers": [(name.encode(), value.encode("latin-1")) for name, value in pairs],
+        **({"method": "GET"} if kind == "http" else {"subprotocols": []}),
+    }
+    sent: list[Any] = []
+
+    async def receive() -> Any:
+        return {"type": "websocket.connect" if kind == "websocket" else "http.request"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    asyncio.run(guarded(scope, receive, send))
+    first = sent[0]
+    code = first.get("status") or (101 if first["type"] == "websocket.accept" else 403)
+    text = b"".join(message.get("body", b"") for message in sent).decode()
+    return Answer(code, Headers(raw=list(first.get("headers", ()))), text)
+
+
+PAGE = f"/{TOKEN}/"
+FINE: list[tuple[str, dict[str, Any], int]] = [
+    (PAGE, {}, 200),
+    (f"{PAGE}static/play.js", {"origin": f"http://{HERE}", "sec_fetch_site": "same-origin"}, 200),
+    (f"/static/play.js?token={TOKEN}", {}, 200),
+    *((PAGE, {"host": host}, 200) for host in ("localhost:8766", "[::1]:8766", "LOCALHOST")),
+    (f"/{TOKEN}", {}, 303),
+    (f"/?token={TOKEN}", {}, 303),
+]
+PATHS = ("/", f"/{TOKEN[:-1]}/", f"/{TOKEN}t/", f"/{TOKEN.upper()}/", "/%C3%A9%ED%A0%80/", f"//{TOKEN}/")
+PATHS += ("/static/play.js?token=", f"/static/play.js?token={TOKEN}x", "/open/None", "/open/")
+HOSTS = ("evil.example", "evil.example:8766", "127.0.0.1.evil.example:8766", "localhost.evil.example")
+HOSTS += ("192.168.1.7:8766", "127.0.0.1:8766:1", "", [], [HERE, "evil.example"])  # type: ignore[assignment]
+ORIGINS = ("http://evil.example", "null", [f"http://{HERE}", "http://evil.example"], f"https://{HERE}")
+ORIGINS += ("http://127.0.0.1:9999", "http://localhost:8766", f"http://{HERE}.evil.example")
+REFUSED: list[tuple[str, dict[str, Any], int]] = [
+    *((path, {}, 403) for path in PATHS),
+    *((PAGE, {"host": host}, 403) for host in HOSTS),
+    *((PAGE, {"origin": origin}, 403) for origin in ORIGINS),
+    *((PAGE, {"sec_fetch_site": site}, 403) for site in ("cross-site", "same-site")),
+]
+
+
+def test_requests() -> None:
+    for path, headers, code in [*FINE, *REFUSED]:
+        found = ask(guard(), path, **headers)
+        assert found.code == code, (path, headers)
+        assert {name: found.headers[name] for name in HEADERS} == HEADERS
+        assert "default-src 'none'" in found.headers["content-security-policy"]
+        assert "set-cookie" not in found.headers
+        if code == 403:
+            assert TOKEN not in found.text + str(found.headers)
+        if code == 303:
+            assert found.headers["location"] == PAGE
+    assert ask(guard(), f"{PAGE}static/viewer/gl.js").text == "/static/viewer/gl.js"
+
+
+def test_a_browser_is_led_to_the_page_once() -> None:
+    guarded = guard()
+    way = guarded.once
+    assert TOKEN not in way
+    assert ask(guarded, way, host="evil.example").code == 403
+    assert ask(guarded, way).headers["location"] == f"/{TOKEN}/"
+    assert ask(guarded, way).code == 403
+    assert ask(guarded, guarded.once).code == 403
+
+
+def test_websockets() -> None:
+    here, evil = f"http://{HERE}", "http://evil.example"
+    for path, headers in (
+        (f"{PAGE}live", {}),  # no origin at all
+        (f"{PAGE}live", {"origin": evil}),
+        (f"{PAGE}live", {"origin": "null"}),
+        (f"{PAGE}live", {"origin": here, "host": "evil.example"}),
+        (f"{PAGE}live", {"origin": evil, "host": "evil.example"}),
+        (f"{PAGE}live", {"origin": here, "sec_fetch_site": "cross-site"}),
+        ("/live", {"origin": here}),
+        ("/live?token=x", {"origin": here}),
+    ):
+        assert ask(guard(), path, "websocket", **headers).code == 403, (path, headers)
+    for path in (f"{PAGE}live", f"/live?token={TOKEN}"):
+        assert ask(guard(), path, "websocket", origin=here).code == 101, path
+
+
+def test_a_server_for_others_has_names_and_numbers() -> None:
+    known = guard(hosts=("box.local",), anywhere=True)
+    for host, code in (("10.0.0.7:8766", 200), ("[fe80::1]:8766", 200), ("box.local", 200)):
+        assert ask(known, PAGE, host=host).code == code, host
+    for host in ("evil.example", "10"):
+        assert ask(known, PAGE, host=host).code == 403, host
+
+
+def test_the_page_can_load_nothing_from_elsewhere() -> None:
+    parts = dict(part.strip().split(" ", 1) for part in policy("abc", HERE).split(";"))
+    assert parts["default-src"] == "'none'"
+    assert parts["script-src"] == "'self'"
+    assert parts["connect-src"] == f"'self' ws://{HERE}"
+    assert "unsafe" not in policy("abc", HERE)
+
+
+def test_what_is_loopback() -> None:
+    assert all(map(is_loopback, ("127.0.0.1", "localhost", "127.9.9.9")))
+    assert not any(map(is_loopback, ("0.0.0.0", "8.8.8.8")))

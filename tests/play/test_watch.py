@@ -19,7 +19,7 @@ class Page:
     """One that notes what it is told."""
 
     def __init__(self) -> None:
-        self.names = {"a.nsg"}
+        self.open = {"a.nsg"}
         self.told: list[Any] = []
 
     def tell(self, message: Any) -> None:

@@ -16,14 +16,7 @@ PARAMS = [
     {"name": "k", "kind": "number", "value": 1, "low": 0, "high": 4, "step": 0.5, "label": ODD},
     {"name": "far", "kind": "number", "value": 1.25, "low": 1, "high": 2, "exclusive": True},
     {"name": "n", "kind": "number", "value": 7},
-    {
-        "name": "turn",
-        "kind": "angle",
-        "value": 0.5235987755982988,
-        "low": 0,
-        "high": 1.5707963267948966,
-        "unit": "deg",
-    },
+    {"name": "turn", "kind": "angle", "value": pi / 6, "low": 0, "high": pi / 2, "unit": "deg"},
     {"name": "wait", "kind": "time", "value": 0.25, "low": 0, "high": 2, "unit": "ms"},
     {"name": "on", "kind": "bool", "value": False},
     {"name": "ink", "kind": "color", "value": [1, 0.5, 0]},
@@ -59,9 +52,8 @@ def put(page: Any, selector: str, value: Any) -> Any:
     return ask(page, "viewer.params")
 
 
-@pytest.mark.parametrize(
-    ("selector", "value", "name", "expected"),
-    [
+def test_controls_set_params(controls: Any) -> None:
+    for selector, value, name, expected in (
         ("#param-k", "2.5", "k", 2.5),
         ("[aria-label=k]", "2.3", "k", 2.5),
         ("[aria-label=k]", "9", "k", 4),
@@ -77,10 +69,9 @@ def put(page: Any, selector: str, value: Any) -> Any:
         ("#param-said", "</script>", "said", "</script>"),
         ("#param-list", "[1, [2, 3]]", "list", [1, [2, 3]]),
         ("#param-list", "alert(1)", "list", [1, [0.5, 2]]),
-    ],
-)
-def test_controls_set_params(controls: Any, selector: str, value: str, name: str, expected: Any) -> None:
-    assert put(controls, selector, value)[name] == expected
+    ):
+        ask(controls, "viewer.reset()")
+        assert put(controls, selector, value)[name] == expected, (selector, value)
 
 
 def test_controls_show_params(controls: Any) -> None:

@@ -4,37 +4,214 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-import scenelang as nsg
 from lab.sets.plane import SETS
 from lab.sets.plane import random_scene as random_set_scene
 from lab.sets.solids import SOLID_SETS, random_solid
-from scenelang.compiler.groups import OPERATOR, felt, read_groups, widths_of
-from scenelang.compiler.lifting import LAYOUTS
-from scenelang.language.diagnostics import SourceFile
+from scenelang.compiler import steps as affine
+from scenelang.compiler.compile import compile_scene, find_model
+from scenelang.compiler.graph import Graph
+from scenelang.compiler.groups import BEGINS, ENDS
+from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.passes import OPTIONAL
+from scenelang.compiler.program import Program
+from scenelang.compiler.steps import Affine, Displace, Step, Warp
+from scenelang.language import tree as nodes
+from scenelang.language.diagnostics import Diagnostics, SourceFile
+from scenelang.language.evaluation import Evaluation, Source
+from scenelang.language.parser import parse
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Camera, Scene
+from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
+from scenelang.language.words import BLEND, FUNCTIONS, TOKENS
+from scenelang.web.arrays import stage_of
 from scenelang.web.export import view_of
+from scenelang.web.form import Form, Scope, Writer, form_of
 from tests.compiler.random_scenes import blob_scene, full_scene, random_scene
-from tests.web.live import (
-    check_picture,
-    check_rows,
-    compiled,
-    defined,
-    drawable,
-    moved,
-    pictures,
-    solid_text,
-    sources,
-)
+from tests.language.test_groups import IMPORT, folder
+from tests.web.test_view import carried
 
 pytestmark = pytest.mark.browser
+WORDS = ("token", "shape", "material", "paint", "object")
+POINTS = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 50))
+
+
+class Compiled(NamedTuple):
+    """A scene by the compiler."""
+
+    evaluation: Evaluation
+    manifest: Manifest
+    graph: Graph
+    program: Program
+
+    def form(self) -> Form:
+        """The same for a page."""
+        return form_of(self.evaluation, self.manifest, self.program.elements)
+
+
+def compiled(source: SourceFile, path: Path | None = None, frame: int = 0, **inputs: Any) -> Compiled:
+    """Compile a scene without passes that only save work; raises SceneError."""
+    found, graphs = Diagnostics(), {}
+    evaluation = Source(path, source, **inputs).evaluation(found, frame=frame)
+    scene, _ = evaluation.run(frame)
+    if scene is None:
+        raise SceneError(found)
+    model, after = inputs.get("model"), graphs.__setitem__
+    program = compile_scene(scene, diagnostics=found, model=model, without=OPTIONAL, after=after)
+    return Compiled(evaluation, load_manifest(program.model), graphs["check_trained"], program)
+
+
+def moved(param: dict[str, Any]) -> list[Any]:
+    """Values over a param's range, or among its choices."""
+    if "low" in param:
+        low, high, step = param["low"], param["high"], param.get("step")
+        values = [low + (high - low) * share for share in (0.0, 0.25, 0.5, 0.77, 1.0)]
+        return values if step is None else [low + round((v - low) / step) * step for v in values]
+    if "choices" in param:
+        return list(param["choices"])
+    others = {"color": [[0.2, 0.7, 0.4]], "bool": [not param["value"]], "string": [], "vector": []}
+    return others[param["kind"]] if param["kind"] in others else [0.9 * param["value"]]
+
+
+def defined(param: dict[str, Any], value: Any) -> Any:
+    """A page's value of a param as the compiler takes it."""
+    unit = {"angle": "rad", "time": "s"}.get(param["kind"])
+    return value if unit is None else f"{value!r}{unit}"
+
+
+def way_back(steps: tuple[Step, ...], p: np.ndarray) -> np.ndarray:
+    """World points (3, M) in a leaf's own space, by the definition of each step."""
+    for step in reversed(steps):
+        if isinstance(step, Displace):
+            continue
+        if isinstance(step, Affine):
+            rows = np.reshape(affine.inverted(step.rows), (3, 4))
+            p = rows[:, :3] @ p + rows[:, 3:]
+            continue
+        warps = isinstance(step, Warp)
+        j, k = (1, step.twirl) if isinstance(step, Warp) else (2, step.twist)
+        a = k * (np.linalg.norm(p, axis=0) if warps else p[1])
+        if isinstance(step, Warp):
+            a = a + step.bend[0] * p[0] + step.bend[1] * p[1]
+        p = p.copy()
+        p[0], p[j] = np.cos(a) * p[0] + np.sin(a) * p[j], np.cos(a) * p[j] - np.sin(a) * p[0]
+    return p
+
+
+def check_picture(picture: dict[str, Any], expected: Compiled, form: Form) -> None:
+    """Hold what a page's evaluator says against what the compiler says."""
+    graph, d = expected.graph, expected.manifest.dimension
+    rows = graph.rows()
+    assert len(picture["rows"]) == len(rows)
+    names = [*expected.manifest.geometries, *form.shapes]
+    for row, (op, leaf, k, begins, ends, _) in zip(picture["rows"], rows, strict=True):
+        look = leaf.look
+        assert row["token"] == TOKENS[op] + BEGINS * begins + (ends << ENDS)
+        assert names[row["shape"]] == graph.elements.get(leaf.geometry, leaf.geometry)
+        assert expected.manifest.materials[row["material"]] == look.material
+        assert row["object"] == leaf.number
+        assert row["blend"] == (k or (BLEND if op == "smooth" else 0))
+        np.testing.assert_allclose(row["colour"], look.rgb, atol=1e-9)
+        stretch = graph.space.stretches(affine.composed(leaf.steps))[0]
+        np.testing.assert_allclose(row["scale"], stretch, rtol=1e-9)
+        bump = next((s for s in leaf.steps if isinstance(s, Displace)), Displace(0.0, 0.0))
+        assert (row["amount"], row["frequency"]) == (bump.amount, bump.frequency)
+        _check_paint(row, look, form)
+        there, here = carried(row["steps"], POINTS[:d]), way_back(leaf.steps, POINTS * [[1], [1], [d > 2]])
+        np.testing.assert_allclose(there, here[:d], rtol=1e-6, atol=1e-6)
+    stage = None if graph.stage is None else stage_of(graph.stage)
+    assert _flat(picture["stage"]).keys() == _flat(stage).keys()
+    for name, number in _flat(stage).items():
+        np.testing.assert_allclose(_flat(picture["stage"])[name], number, atol=1e-9, err_msg=name)
+    assert picture["background"] == (None if graph.background is None else list(graph.background))
+
+
+def check_rows(rows: list[dict[str, Any]], program: Program) -> None:
+    """Hold a page's rows against those of the Program, which names shapes and paints by their places too."""
+    kept = view_of(program).data["program"]["rows"]
+    assert len(rows) == len(kept)
+    for row, own in zip(rows, kept, strict=True):
+        assert [row[key] for key in WORDS] == [own[key] for key in WORDS]
+        for key in (
+            "colour",
+            "scale",
+            "blend",
+            "amount",
+            "frequency",
+            *(("place",) if row["paint"] >= 0 else ()),
+        ):
+            np.testing.assert_allclose(row[key], own[key], rtol=1e-6, atol=1e-6)
+
+
+def _check_paint(row: dict[str, Any], look: Any, form: Form) -> None:
+    if look.element is None:
+        assert row["paint"] == -1
+        return
+    assert form.paints[row["paint"]] == look.element
+    inverse = affine.inverted(look.moved)
+    np.testing.assert_allclose(row["place"], [inverse[at] for at in (0, 1, 3, 4, 5, 7)], atol=1e-9)
+    assert [step[0] for step in row["paintSteps"]] == [step[0] for step in look.colours]
+    for mine, theirs in zip(row["paintSteps"], look.colours, strict=True):
+        np.testing.assert_allclose(mine[1:], theirs[1:], atol=1e-9)
+
+
+def _flat(data: Any, name: str = "") -> dict[str, Any]:
+    """Numbers of nested data by their places; what is not a number is told by its place."""
+    if isinstance(data, dict):
+        return {k: v for key, value in data.items() for k, v in _flat(value, f"{name}.{key}").items()}
+    if isinstance(data, list | tuple):
+        return {k: v for at, value in enumerate(data) for k, v in _flat(value, f"{name}.{at}").items()}
+    return {f"{name} {data}": 0.0} if data is None or isinstance(data, bool) else {name: data}
+
+
+RUN = """(jobs) => jobs.map(([form, all]) => all.map((inputs) => {
+  try {
+    return evaluateForm(form, inputs);
+  } catch (error) {
+    if (error instanceof NotLive) return error.message;
+    throw error;
+  }
+}))"""
+
+
+def pictures(page: Any, jobs: list[tuple[Form, list[dict[str, Any]]]]) -> list[list[Any]]:
+    """What a page says of forms for inputs: a picture, or why there is none."""
+    found: list[list[Any]] = page.evaluate(RUN, [[form.data, inputs] for form, inputs in jobs])
+    return found
+
+
+def drawable(source: SourceFile, **inputs: Any) -> tuple[Form, Compiled | None] | None:
+    """A scene's form, and what the compiler makes of it, if it does; nothing where no page draws it."""
+    found = Diagnostics()
+    evaluation = Source(text=source, **inputs).evaluation(found)
+    scene, _ = evaluation.run(0)
+    if scene is None or found.errors:
+        return None
+    if (manifest := find_model(scene, found)) is None or manifest.lifting != "exact":
+        return None
+    try:
+        expected = compiled(source, **inputs)
+    except SceneError:
+        return form_of(evaluation, manifest), None
+    return expected.form(), expected
+
+
+def sources(root: Path) -> Iterator[SourceFile]:
+    """Scenes of the documentation and the conformance suite."""
+    for page in sorted([*root.glob("docs/*.md"), *root.glob("scenelang/language/pages/*.md")]):
+        texts = re.findall(r"^```nsg[^\n]*\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+        yield from (SourceFile(f"{page.stem}-{at}", text) for at, text in enumerate(texts))
+    for path in sorted(root.glob("tests/conformance/cases/*.nsg")):
+        yield SourceFile(path.stem, path.read_text())
+
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = [path for path in sorted(ROOT.glob("examples/**/*.nsg")) if path.name != "still.nsg"]
 
@@ -96,36 +273,17 @@ def test_random_trees_of_the_plane(viewer_page: Any) -> None:
     assert refused >= 5  # as the model lacks room
 
 
-def test_random_trees_of_space(viewer_page: Any) -> None:
-    scenes = (SourceFile(f"solid {n}", solid_text(random.Random(n))) for n in range(200))
-    good, refused = agree(viewer_page, scenes, model="solids3d")
-    assert min(good, refused) > 30
-
-
-def test_rows_of_trees_matter_as_far_as_programs_have_it(viewer_page: Any) -> None:
-    told = "seen.total, seen.widest, seen.count, always || seen.hidden"
-    ask = f"(rows) => joinsOf(rows).map(({{ seen, always }}) => [{told}])"
-    for seed in range(60):
-        program = nsg.compile(any_scene(seed))
-        blends = program.vectors[:, LAYOUTS[2].places.width]
-        known = felt(
-            read_groups(program.tokens), widths_of(program.tokens.astype(np.intp) & OPERATOR, blends)
-        )
-        found = viewer_page.evaluate(ask, view_of(program).data["program"]["rows"])
-        np.testing.assert_allclose(np.array(found, float).T, np.array(known[:4], float), rtol=1e-6)
-
-
-def test_eyes_in_trees(viewer_page: Any) -> None:
-    """Inside what is opaque, in holes, in mist, and outside."""
+def test_random_solids(viewer_page: Any) -> None:
+    """With eyes inside what is opaque, in holes, in mist, and outside."""
     scenes = []
-    for n in range(80):
+    for n in range(120):
         rng = np.random.default_rng(n)
-        scene = random_solid(rng, SOLID_SETS["trees"])
+        scene = random_solid(rng, SOLID_SETS[("trees", "mixed", "trees", "deformed")[n % 4]])
         eye = tuple(rng.uniform(-0.7, 0.7, 3).tolist())
         scene = scene.model_copy(update={"camera": Camera(eye, (9.0, 0.5, 0.0))})
         scenes.append(SourceFile(str(n), scene.to_nsg()))
     good, refused = agree(viewer_page, scenes)
-    assert good > 30
+    assert good > 50
     assert refused >= 5
 
 
@@ -200,3 +358,160 @@ def test_what_the_canvas_and_the_length_hang_on_is_fixed() -> None:
     assert [param["name"] for param in form.params] == ["w", "speed", "k"]
     assert form.params[2]["label"] == "how far"
     assert "wide" not in str(form.data)
+
+
+__all__ = ["folder"]  # a fixture
+
+TEXTS = Path(__file__).with_name("corners.nsgs").read_text().split("--- ")[1:]
+SCENES = dict(text.split("\n", 1) for text in TEXTS)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_corners(name: str, viewer_page: Any) -> None:
+    source = SourceFile(name, f"nsg 1;\nparam n = 3 in -5..9;\n{SCENES[name]}")
+    first = compiled(source)
+    form = first.form()
+    cases = [(n, frame) for n in (3, 1, 0.5, 0, 7, -2) for frame in (0, first.evaluation.frames - 1)]
+    shown = pictures(viewer_page, [(form, [{"params": {"n": n}, "frame": frame} for n, frame in cases])])[0]
+    for (n, frame), picture in zip(cases, shown, strict=True):
+        try:
+            expected = compiled(source, params={"n": n}, frame=frame, model=first.manifest.name)
+        except SceneError:
+            assert isinstance(picture, str), n
+            continue
+        assert isinstance(picture, dict), (picture, n)
+        check_picture(picture, expected, form)
+    assert sum(isinstance(picture, dict) for picture in shown) >= 2
+
+
+ELEMENTS = [
+    "zoo.car() { rotate(30deg, axis = X); } zoo.ring(); sphere { translate(3, 0, 0); }",
+    "chain { zoo.ball; smooth zoo.ring { twist(0.3); } subtract zoo.ring() { scale(0.4); } }",
+    """let m = material volumetric zoo.hide { hue(0.2turn); color(#d33); color(#3d3); }; zoo.ball { m; }
+       sphere { m { grayscale(0.5); grayscale(0.2); } translate(3, 0, 0); } zoo.ring();""",
+    "zoo.logo() { scale(0.3); } square { translate(1, 0); }",
+    'import "zoo.safetensors" as again; again.ball { material again.hide; } zoo.ring { translate(2, 0, 0); }',
+    'import "lib.nsg" as lib; lib.two(0.5) { material flat; } square { scale(lib.k + lib.f(1)); lib.red; }',
+    "param n = 0; if (n > 0) { zoo.car(); } else { sphere; }",
+]
+
+
+@pytest.mark.parametrize("text", ELEMENTS)
+def test_elements_and_imports(text: str, folder: Path, viewer_page: Any) -> None:
+    lib = "param k = 0.3; fn f(x) = k * x; module two(s) { zoo.tile { scale(s); } square { scale(f(s)); } }"
+    red = "let red = material flat { color([k, 0, 0]); }; square; background(#000);"
+    (folder / "lib.nsg").write_text(f"{IMPORT} {lib} {red}")
+    source, path = SourceFile("scene.nsg", IMPORT + text), folder / "scene.nsg"
+    first = compiled(source, path)
+    form = first.form()
+    changes = {"lib.k": 0.7} if "lib" in text else {"n": 1} if "param" in text else {}
+    before, after = pictures(viewer_page, [(form, [{}, {"params": changes}])])[0]
+    check_rows(before["rows"], first.program)
+    check_picture(before, first, form)
+    check_picture(after, compiled(source, path, params=changes), form)
+
+
+MODEL = load_manifest("shapes2d")
+TABLE = Path(__file__).parents[1] / "language" / "expressions.nsgs"
+LITERALS = """0 1 2 3 0.5 -1 -2.5 7 1e-3 10 0.1 -0 1e200 255 30deg -45deg 0.5rad 0.25turn 0deg 2s 40ms -1s 0s
+    [1,2] [0,1,0.5] X #d33 #7a5c3e [] [1,[2,3]] [10deg,20deg] [-1,0.5] true false "a" "day" "ä😀" none PI TAU
+    t u frame frames (0..3) (0..<4step(0.5)) (0deg..90deg/**/step/**/30deg) (5..1)
+    (5..1/**/step-2) (0s..2s)"""
+VALUES = """(expressions) => {
+  const told = (value) => {
+    if (value instanceof Vec) return value.items.map(told);
+    if (value instanceof Angle) return { angle: value.size };
+    if (value instanceof Time) return { time: value.size };
+    if (!(value instanceof Progression)) return value;
+    return { range: [value.start, value.stop, value.exclusive, value.unit] };
+  };
+  return expressions.map((expression) => {
+    const run = new SceneRun({ body: [], slots: 0, calls: [] });
+    Object.assign(run, { work: 0, animated: [0, 0, 0, 1] });
+    try {
+      return { value: told(prepared(expression, run)()) };
+    } catch (error) {
+      if (error instanceof NotLive) return { refused: error.message };
+      throw error;
+    }
+  });
+}"""
+
+
+def evaluated(text: str) -> tuple[Any, Any] | None:
+    """The value and the form of an expression; None where it does not parse."""
+    found = Diagnostics()
+    tree = parse(SourceFile("", f"let v = {text};"), found)
+    if found.errors:
+        return None
+    evaluation = Source(tree=tree).evaluation(found)
+    evaluation.run(0)
+    context, stmt = evaluation.context, tree.statements[0]
+    assert isinstance(stmt, nodes.Let)
+    form = Writer(context, MODEL, ()).expression(stmt.value, Scope())
+    return context.env[context.scope.names["v"].slot], form
+
+
+def told(value: Any) -> Any:
+    """A value as the page tells it."""
+    if isinstance(value, Vec):
+        return [told(item) for item in value.items]
+    if isinstance(value, RangeValue):
+        unit = ("number", "angle", "time").index(value.unit)
+        return {"range": [value.start, value.stop, value.exclusive, unit]}
+    if isinstance(value, Angle | Time):
+        return {type(value).__name__.lower(): value.size}
+    return value
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Equal, or for numbers nearly: mathematical functions may differ in their last digit."""
+    if isinstance(one, dict | list):
+        items = list(one.items()) if isinstance(one, dict) else one
+        others = list(other.items()) if isinstance(other, dict) else other
+        return len(items) == len(others) and all(map(alike, items, others))
+    if isinstance(one, tuple):
+        return one[0] == other[0] and alike(one[1], other[1])
+    if isinstance(one, float) and not isinstance(other, bool):
+        return bool(one == pytest.approx(other, rel=1e-13, abs=0))
+    return type(one) is type(other) and bool(one == other)
+
+
+def written(pick: random.Random, depth: int) -> str:
+    """A random expression; most of the deep ones are mistakes."""
+    if depth == 0 or pick.random() < 0.15:
+        return pick.choice(LITERALS.split())
+    a, b, c = (written(pick, depth - 1) for _ in range(3))
+    order, sign = pick.choice(["<", "<=", ">", ">=", "==", "!="]), pick.choice(["-", "+", "!"])
+    word = pick.choice([*FUNCTIONS.values()])
+    count = pick.randint(1, 3) if word.variadic else word.required
+    ways = [
+        *[f"({a} {op} {b})" for op in pick.sample(["+", "-", "*", "/", "%", "^"], 3)],
+        *(f"-{a} ^ {b}", f"({sign}{a})", f"({a} {order} {b} ? {c} : {a})", f"({a} {order} {b} && {c})"),
+        *(f"[{a}, {b}]", f"[{a}]", f"({a})[{b}]", f"({a}).{pick.choice('xyzrgb')}"),
+        *[f"{word.name}({', '.join([a, b, c][:count])})"] * 5,
+    ]
+    return pick.choice(ways)
+
+
+def test_random_expressions(viewer_page: Any) -> None:
+    pick = random.Random(1)
+    texts = [written(pick, pick.randint(1, 3)) for _ in range(2500)]
+    texts += [f"rand({pick.choice([n, n / 7, -n, [n, n + 1]])})" for n in range(200)]
+    made = [(text, *pair) for text in texts if (pair := evaluated(text)) is not None]
+    shown = viewer_page.evaluate(VALUES, [form for _, _, form in made])
+    for (text, value, _), answer in zip(made, shown, strict=True):
+        assert ("refused" in answer) == (value is POISON), (text, answer)
+        assert value is POISON or alike(told(value), answer["value"]), (text, value, answer)
+    good = sum(value is not POISON for _, value, _ in made)
+    assert 600 < good < len(made) - 600
+
+
+def test_expressions_worked_out_by_hand(viewer_page: Any) -> None:
+    lines = [line for line in TABLE.read_text().splitlines() if " = " in line and not line.startswith("#")]
+    pairs = [line.rsplit(" = ", 1) for line in lines]
+    forms = [pair[1] for text, _ in pairs if (pair := evaluated(text)) is not None]
+    assert len(forms) == len(pairs) > 100
+    for line, answer in zip(lines, viewer_page.evaluate(VALUES, forms), strict=True):
+        number = float(line.rsplit(" = ", 1)[1])
+        assert answer.get("value") == pytest.approx(number, rel=1e-12, abs=1e-12), (line, answer)

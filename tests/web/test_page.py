@@ -1,4 +1,4 @@
-"""The page as text: whole, inert whatever a scene's author wrote, and what it says."""
+"""The page as text: whole, inert whatever a scene's author wrote; its script, and the rows of Programs."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import itertools
 import json
 import re
 import zlib
+from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.web.arrays import script
+from scenelang.web.arrays import MODULES, script, web
 from scenelang.web.export import alternative, colour_name, page, plain, still, view_of
 
 ODD = "</script><script>alert(1)</script><!-- ]]> [[script]] \u202e\u2066 & \" ' \u2028 \ud800"
@@ -62,43 +64,28 @@ def test_the_script_makes_no_code_and_no_markup_of_texts() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("rgb", "name"),
-    [
-        ((1, 0, 0), "red"),
-        ((0.5, 0.5, 0.5), "grey"),
-        ((1, 1, 1), "white"),
-        ((0, 0, 0), "black"),
-        ((0.1, 0.2, 0.9), "blue"),
-        ((0.55, 0.27, 0.07), "brown"),
-        ((0.7, 0.9, 0.7), "light green"),
-        ((0, 0.2, 0), "dark green"),
-    ],
-)
-def test_colours_have_names(rgb: tuple[float, float, float], name: str) -> None:
-    assert colour_name(rgb) == name
+def test_colours_have_names() -> None:
+    named = {"red": (1, 0, 0), "grey": (0.5, 0.5, 0.5), "white": (1, 1, 1), "black": (0, 0, 0)}
+    named |= {"blue": (0.1, 0.2, 0.9), "brown": (0.55, 0.27, 0.07), "light green": (0.7, 0.9, 0.7)}
+    for name, rgb in {**named, "dark green": (0, 0.2, 0)}.items():
+        assert colour_name(rgb) == name
 
 
 def test_a_picture_in_words() -> None:
-    data = view_of(
-        nsg.compile(
-            nsg.loads("background(#fff); square; subtract { star; } star { material flat { color(#00f); } }")
-        )
-    ).data
-    assert "square" in alternative(data)
-    told = alternative(data)
+    def data(text: str) -> dict[str, Any]:
+        return view_of(nsg.compile(nsg.loads(text))).data
+
+    star = "background(#fff); square; subtract { star; } star { material flat { color(#00f); } }"
+    told = alternative(data(star))
     assert told.startswith("A picture of a s")
-    holed = nsg.loads("subtract { square; intersect { star; union { pentagon; square; } } }")
-    assert alternative(view_of(nsg.compile(holed)).data).startswith("A picture of a square, with 3 cut-outs")
-    assert "blue" in told
     assert told.endswith("on white.")
-    solid = nsg.compile(
-        nsg.loads("sphere { material diffuse { color(#f00); } } torus { translate(2, 0, 0); }")
-    )
-    assert alternative(view_of(solid).data).startswith("A 3D scene of a sphere and a torus, in red")
-    empty = nsg.compile(nsg.loads('model "shapes2d"; background(none);'))
-    assert alternative(view_of(empty).data) == "An empty picture."
-    moving = {**data, "animation": {"seconds": 4.0, "loop": True}}
+    assert all(word in told for word in ("square", "blue"))
+    holed = "subtract { square; intersect { star; union { pentagon; square; } } }"
+    assert alternative(data(holed)).startswith("A picture of a square, with 3 cut-outs")
+    solid = "sphere { material diffuse { color(#f00); } } torus { translate(2, 0, 0); }"
+    assert alternative(data(solid)).startswith("A 3D scene of a sphere and a torus, in red")
+    assert alternative(data('model "shapes2d"; background(none);')) == "An empty picture."
+    moving = {**data(star), "animation": {"seconds": 4.0, "loop": True}}
     assert alternative(moving).endswith("It moves for 4 seconds, over and over.")
 
 
@@ -146,3 +133,14 @@ def test_sources_are_named_from_the_scenes_folder(tmp_path: Path) -> None:
     assert [one["name"] for one in data["source"]] == ["a.nsg", "lib/dots.nsg"]
     assert str(tmp_path) not in text
     assert data["canvas"] == [64, 32]
+
+
+def test_names_at_the_top_differ() -> None:
+    names = re.findall(r"^(?:async )?(?:function\*?|class|const|let) (\w+)", script(), re.MULTILINE)
+    assert {name: count for name, count in Counter(names).items() if count > 1} == {}
+
+
+def test_files_stand_behind_what_they_import() -> None:
+    for at, name in enumerate(MODULES):
+        needed = re.findall(r'from "\./(\w+)\.js"', web(f"{name}.js"))
+        assert not set(needed) & set(MODULES[at:]), name

@@ -75,10 +75,7 @@ def test_what_strangers_wrote_is_inert(chromium: Any, tmp_path: Path) -> None:
     [
         ("HTMLCanvasElement.prototype.getContext = () => null", "no WebGL2"),
         ("delete globalThis.DecompressionStream", "cannot unpack"),
-        (
-            "WebGL2RenderingContext.prototype.getProgramParameter = () => false",
-            "the shader does not compile",
-        ),
+        ("WebGL2RenderingContext.prototype.getProgramParameter = () => false", "the shader does not compile"),
     ],
 )
 def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, broken: str, why: str) -> None:
@@ -89,62 +86,6 @@ def test_a_still_picture_where_it_cannot_draw(chromium: Any, tmp_path: Path, bro
         assert why in page.locator("#note").text_content()
         assert page.locator("#still").is_visible()
         assert ask(page, "still.naturalWidth") == 960
-
-
-def test_values_without_a_picture_are_told_beside_their_control(chromium: Any, tmp_path: Path) -> None:
-    scene = tmp_path / "a.nsg"
-    scene.write_text(
-        "param k = 0.5 in 0..1; background(#fff); star { scale(k); material flat { color(#00f); } }"
-    )
-    export(scene, tmp_path / "a.html")
-    with watched(chromium, viewport={"width": 200, "height": 200}) as page:
-        loaded(page, tmp_path / "a.html")
-        before, slider = page.locator("canvas").screenshot(), page.locator("[type=range]")
-        slider.press("Home")
-        page.locator(".why:not(:empty)").wait_for()
-        assert slider.input_value() == "0"
-        assert page.locator("canvas").screenshot() == before, "the last picture stays"
-        slider.press("End")
-        page.locator(".why:not(:empty)").wait_for(state="detached")
-        assert page.locator("canvas").screenshot() != before
-
-
-def test_a_lost_context_comes_back(chromium: Any, tmp_path: Path) -> None:
-    export(EXAMPLES[0].with_stem("hello"), tmp_path / "a.html")
-    with watched(chromium, viewport={"width": 300, "height": 200}) as page:
-        loaded(page, tmp_path / "a.html")
-        before = page.locator("canvas").screenshot()
-        lost = "canvas.getContext('webgl2').getExtension('WEBGL_lose_context')"
-        ask(page, f"void (globalThis.extension = {lost}, extension.loseContext())")
-        page.locator("#note").wait_for()
-        ask(page, "void extension.restoreContext()")
-        page.locator("#note").wait_for(state="hidden")
-        page.wait_for_function(
-            "() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 100, true)))"
-        )
-        assert page.locator("canvas").screenshot() == before
-
-
-@pytest.mark.parametrize("size", [(256, 256), (640, 200), (100, 400)])
-def test_what_a_page_shows_stands_in_one_column(chromium: Any, tmp_path: Path, size: tuple[int, int]) -> None:
-    scene = tmp_path / "a.nsg"
-    scene.write_text(f"canvas({size[0]}, {size[1]}); param k = 0.5 in 0..1; star {{ scale(k); }}")
-    export(scene, tmp_path / "a.html")
-    with watched(chromium, viewport={"width": 1300, "height": 900}) as page:
-        loaded(page, tmp_path / "a.html")
-        left, right = (
-            [ask(page, f"document.querySelector('{of}').getBoundingClientRect().{end}") for of in parts]
-            for end, parts in (
-                ("left", ("h1", ".picture", "#controls", "footer")),
-                ("right", ("h1", "#controls", "footer")),
-            )
-        )
-        assert max(left) - min(left) < 1
-        assert max(right) - min(right) < 1
-        told = page.get_by_text("mean FLIP")
-        assert not told.is_visible()
-        page.get_by_text("About this page").click()
-        assert told.is_visible()
 
 
 def test_a_still_picture_without_scripts(chromium: Any, tmp_path: Path) -> None:

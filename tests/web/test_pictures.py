@@ -17,8 +17,8 @@ import scenelang as nsg
 from scenelang.drawing.metrics import psnr
 from scenelang.language.evaluation import Source
 from scenelang.web.export import viewed
-from tests.web.live import defined, moved
 
+pytestmark = pytest.mark.browser
 EXAMPLES = sorted(Path(__file__).parents[2].joinpath("examples").glob("*.nsg"))
 SIZE = 128, 128
 LEAST_DB = 40
@@ -63,7 +63,6 @@ def over_grey(image: np.ndarray) -> np.ndarray:
     return image[..., :3] * image[..., 3:] + 0.5 * (1 - image[..., 3:])
 
 
-@pytest.mark.browser
 @pytest.mark.parametrize("name", ["caterpillar", "die", "saturn"])
 def test_the_line_of_a_moved_camera_gives_its_picture(viewer_page: Any, tmp_path: Path, name: str) -> None:
     path = next(path for path in EXAMPLES if path.stem == name)
@@ -76,26 +75,3 @@ def test_the_line_of_a_moved_camera_gives_its_picture(viewer_page: Any, tmp_path
     text, times = re.subn(r"^camera\(.*$", line, path.read_text("utf-8"), flags=re.MULTILINE)
     assert times == 1
     assert psnr(over_grey(after), over_grey(drawn(nsg.loads(text, size=SIZE, root=path.parent)))) >= LEAST_DB
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_every_param_moves_the_picture_as_it_does_for_the_network(viewer_page: Any, path: Path) -> None:
-    data = opened(viewer_page, path)
-    fixed = {one["name"] for one in data["fixed"]}
-    found = {}
-    for param in data["params"]:
-        if param["name"] not in fixed:
-            for value in moved(param):
-                try:
-                    scene = nsg.load(path, size=SIZE, params={param["name"]: defined(param, value)})
-                except nsg.SceneError:
-                    viewer_page.evaluate(SNAPSHOT, {param["name"]: value})
-                    assert len(viewer_page.evaluate("refused.splice(0)")) == 1
-                    viewer_page.evaluate("viewer.reset(); viewer.draw(); refused.splice(0)")
-                    continue
-                shown = picture(viewer_page, **{param["name"]: value})
-                found[param["name"], str(value)] = psnr(over_grey(shown), over_grey(drawn(scene)))
-            viewer_page.evaluate("viewer.reset()")
-    print(path.stem, {key: round(value, 1) for key, value in found.items()})
-    assert all(value >= LEAST_DB for value in found.values()), found

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from lab.bench.viewer import SMALL, timed
 from lab.sets.plane import SETS, random_scene
 from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.groups import read_groups
@@ -197,13 +196,6 @@ def test_trees_are_the_networks(page: Any) -> None:
         found[seed] = compared(page, program)
     assert depths == {1, 2, 3}
     assert not {name: db for name, db in found.items() if db < LEAST_DB}
-
-
-@pytest.mark.browser
-def test_many_small_objects_cost_as_much_as_a_few(page: Any) -> None:
-    chain, small = (timed(page, name, 256, 1)["operations"] for name in ("chain", SMALL))
-    assert 500 < chain < 1185 * 5 * 4
-    assert 10 < small < 10 * chain
 
 
 @pytest.mark.browser

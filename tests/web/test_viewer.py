@@ -60,8 +60,7 @@ def test_an_animation_without_loop_ends(shown: Any) -> None:
     ask(page, "viewer.play()")
     page.wait_for_function("() => !viewer.playing")
     assert ask(page, "viewer.frame") == 3
-    ask(page, "viewer.play()")
-    assert ask(page, "viewer.frame") == 0
+    assert ask(page, "(viewer.play(), viewer.frame)") == 0
     ask(page, "viewer.seek(99)")
     assert ask(page, "viewer.frame") == 3
 
@@ -97,18 +96,6 @@ def test_solids_begin_coarse_and_end_full(shown: Any) -> None:
     ask(page, "viewer.orbit(0.1, 0)")
     page.wait_for_function("() => scales.includes(0.25) && drawn.scale === 1 && canvas.width === 64")
     assert ask(page, "pieces.slice(-3)") == [0, 1, 2]
-    found = page.evaluate(
-        """async () => {
-          const copy = new OffscreenCanvas(64, 48).getContext("2d");
-          await new Promise((done) => viewer.watch(({ kind }) => {
-            if (kind !== "drawn" || canvas.width !== 64) return;
-            copy.drawImage(canvas, 0, 0);
-            done();
-          }) && viewer.orbit(0.1, 0));
-          return Array.from(copy.getImageData(30, 20, 1, 1).data);
-        }"""
-    )
-    assert found == [0, 255, 128, 255], "what was drawn behind is on the canvas"
 
 
 @pytest.mark.parametrize("scale", [0.25, 1])
@@ -147,26 +134,6 @@ def test_another_view_keeps_what_was_moved(shown: Any) -> None:
     assert ask(page, "[made, viewer.params.k]") == [2, 1]
 
 
-def test_sizes_are_those_on_the_page(shown: Any) -> None:
-    page = shown(**FORM)
-    assert ask(page, "[drawn.width, drawn.height]") == [64, 48]
-    ask(page, "void (canvas.style.width = '200px')")
-    page.wait_for_function("() => drawn.width === 200 && drawn.height === 150 && drawn.scale === 1")
-    assert ask(page, "viewer.snapshot().then(createImageBitmap).then((one) => [one.width, one.height])") == [
-        200,
-        150,
-    ]
-
-
-def test_cameras_have_the_axes_that_the_language_gives_them(viewer_page: Any) -> None:
-    random = np.random.default_rng(3)
-    cameras = [Camera(tuple(e), tuple(t)) for e, t in random.normal(size=(20, 2, 3))]
-    cameras.append(Camera((0.0, 3.0, 0.0), (0.0, 0.0, 0.0)))
-    given = [{"eye": c.eye, "target": c.target} for c in cameras]
-    found = viewer_page.evaluate("(given) => given.map(({ eye, target }) => axesOf(eye, target))", given)
-    np.testing.assert_allclose(found, [c.axes() for c in cameras], atol=1e-12)
-
-
 def test_orbits_zooms_and_pans(shown: Any) -> None:
     page = shown(SOLID)
     assert ask(page, "viewer.cameraLine()") == "camera(eye = [1, 2, 4], target = [0, 0.5, 0], fov = 40deg);"
@@ -195,9 +162,3 @@ def test_orbits_zooms_and_pans(shown: Any) -> None:
     np.testing.assert_allclose(
         ask(page, "drawn.program.stage.eye && viewer.program.stage.eye"), camera["eye"]
     )
-
-
-def test_the_plane_has_no_camera(shown: Any) -> None:
-    page = shown()
-    ask(page, "viewer.orbit(1, 1), viewer.zoom(2), viewer.pan(1, 1)")
-    assert ask(page, "viewer.camera") is None

@@ -30,7 +30,7 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     if stdio and tcp is not None:
         raise click.UsageError("--stdio and --tcp exclude each other.")
     try:
-        from scenelang.editors.handlers import make_server
+        from scenelang.editors.server import make_server
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
             raise
@@ -45,12 +45,12 @@ def command(stdio: bool, tcp: int | None, log: str | None) -> None:
         logging.getLogger("pygls").setLevel(logging.CRITICAL)
     server = make_server(_thumbnail)
     if tcp is None:
-        server.serve(sys.stdin.buffer, sys.stdout.buffer)
+        server.start_io(sys.stdin.buffer, sys.stdout.buffer)
     else:
         with socket.create_server(("127.0.0.1", tcp)) as listener:
             connection, _ = listener.accept()
         with connection, connection.makefile("rb") as source, connection.makefile("wb") as answers:
-            server.serve(source, answers)
+            server.start_io(source, answers)
     if not server.was_shut_down:  # the protocol: an exit that was not announced is a failure
         raise click.exceptions.Exit(1)
 
