@@ -26,7 +26,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 from lab.docs.blocks import pictured
-from scenelang.cli.main import Commands, cli
+from scenelang.cli.main import COMMANDS, Commands, cli
 from scenelang.language.evaluation import Source
 from scenelang.web.export import View, control_rows, viewed
 from scenelang.web.export import page as page_of
@@ -113,7 +113,7 @@ def commands_page() -> str:
 
 
 def _told(group: Commands, path: str) -> Iterator[str]:
-    for name, summary in group.table.items():
+    for name, summary in COMMANDS.items():
         command = group.get_command(click.Context(group), name)
         assert command is not None, name
         context = click.Context(command, info_name=f"{path} {name}", terminal_width=100)

@@ -13,8 +13,8 @@ from typing import Final
 from fuzz import text
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import read_zoo
-from scenelang.cli.checking import Scenes
-from scenelang.cli.inputs import Request
+from scenelang.cli.commands.check import Scenes
+from scenelang.cli.options import Request
 from scenelang.compiler.program import ProgramError, parse_program
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import Source

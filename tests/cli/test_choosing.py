@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.cli import jobs
+from scenelang.cli import choosing
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import available
 from scenelang.drawing.small import load_of
@@ -39,7 +39,7 @@ def shipped(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Folder:
     path = folder.path / "shipped.json"
     path.write_text(ladder().to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.cli.choosing.yardstick", lambda: 1.0)
     return folder
 
 
@@ -188,7 +188,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
             options["diagnostics"].add("W0501", "4 objects, trained on 3", None)  # type: ignore[attr-defined]
         return made
 
-    monkeypatch.setattr(jobs, "compile_scene", warns)
+    monkeypatch.setattr(choosing, "compile_scene", warns)
     text = said(shipped, "--max-flip", "0.05")
     assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text
@@ -211,7 +211,7 @@ def test_solids_are_chosen_for(
     path = folder.path / "solids.json"
     path.write_text(replace(frontier(*found), set="mixed").to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.cli.choosing.yardstick", lambda: 1.0)
     result = folder.run("render", folder.write("ball.nsg", ball), "-o", "a.png", "-v", *limit)
     assert result.exit_code == 0, result.output
     assert f"chosen by the frontier: solids3d, {samples}: " in result.stderr

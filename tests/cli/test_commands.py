@@ -14,15 +14,13 @@ from pathlib import Path
 import click
 import pytest
 
-from scenelang.cli.inputs import Sectioned
-from scenelang.cli.main import cli
+from scenelang.cli.main import COMMANDS, cli
+from scenelang.cli.options import Real, Sectioned
 from scenelang.compiler.manifest import available
 from tests.cli.conftest import Folder
 
 
 def test_help_lists_every_command(folder: Folder) -> None:
-    from scenelang.cli.main import COMMANDS
-
     said = folder.run("--help").stdout
     assert "Draw 2D and 3D scenes" in said
     for name, words in COMMANDS.items():
@@ -67,8 +65,6 @@ def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> Non
 
 def test_no_option_takes_what_is_not_a_number() -> None:
     """Whose bounds `nan` would pass, as it is neither below nor above them."""
-    from scenelang.cli.inputs import Real
-
     found = 0
     context = click.Context(cli)
     for name, option in options_of(cli):

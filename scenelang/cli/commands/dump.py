@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
 from scenelang.cli.main import Trouble
 from scenelang.cli.say import put_out
 from scenelang.compiler.passes import PASSES
+from scenelang.drawing.how import How, threads_for
 from scenelang.language.diagnostics import plural
 from scenelang.language.words import COMBINE
 
 if TYPE_CHECKING:
-    from scenelang.cli.inputs import Input, Request
-    from scenelang.drawing.how import How
+    from scenelang.cli.inputs import Input
 
 
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
@@ -48,17 +48,10 @@ _PATIENCE_S: Final = 60
     help="Format of what is printed, or of a drawing of the graph: mmd (Mermaid), dot, or svg and png, which "
     "need Graphviz; by default the one of OUT's suffix, else text.",
 )
-@click.option(
-    "--most",
-    type=click.IntRange(1, 10_000),
-    metavar="N",
-    default=200,
-    show_default=True,
-    help="Largest number of boxes to draw.",
-)
-@inputs.out
-@inputs.request
-@inputs.drawing("device", "threads")
+@options.count("--most", high=10_000, default=200, help="Largest number of boxes to draw.")
+@options.out
+@options.request()
+@options.drawing("device", "threads")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -69,7 +62,7 @@ def command(
     kind: Kind | None,
     most: int,
     out: str | None,
-    request: Request,
+    request: options.Request,
     how: How,
 ) -> None:
     """Show what a scene is after stages of the compiler, or draw its graph.
@@ -86,7 +79,7 @@ def command(
     steps and evaluations of the network), the parameters, the time of a frame, and the error against the
     exact picture.
     """
-    from scenelang.cli.jobs import prepare_scene
+    from scenelang.cli.inputs import prepare_scene
 
     suffix = Path(out or "").suffix[1:].lower()
     form = kind or (suffix if suffix in _DRAWN else "text")
@@ -193,9 +186,8 @@ def _picture(dot: str, kind: str, text: str) -> bytes:
 # ---------------------------------------------------------------- costs
 
 
-def _plan(job: Input, request: Request, how: How) -> dict[str, Any]:
+def _plan(job: Input, request: options.Request, how: How) -> dict[str, Any]:
     """Draw the scene and say what that took."""
-    from scenelang.drawing.how import threads_for
     from scenelang.drawing.torch_backend import choose_device, open_model
     from scenelang.output.plan import plan_of
 

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import inputs
-from scenelang.cli.jobs import targets
+from scenelang.cli import options
+from scenelang.cli.files import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.say import Bar, put_out, say_diagnostics, say_trouble
-
-if TYPE_CHECKING:
-    from scenelang.language.session import Defines
-
+from scenelang.cli.say import Bar, put_out
 
 NOT_CONVERGED = 1
 MOST_FRAMES = 10_000  # whose pictures are looked for
@@ -85,10 +80,10 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     "--start",
     multiple=True,
     metavar="NAME=VALUE",
-    callback=inputs.assignments,
+    callback=options.assignments,
     help="Value to begin with, instead of the param's default.",
 )
-@inputs.define
+@options.request("defines", "frame", "model", "root")
 @click.option(
     "--mask",
     type=click.Path(path_type=Path),
@@ -106,20 +101,8 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 )
 @click.option("--compare", metavar="OUT.png", help="Write a picture of before, after and target.")
 @click.option("--animate", metavar="OUT.gif", help="Write an animation of the way to what was found.")
-@click.option(
-    "--seed", default=0, type=click.IntRange(0, 2**31 - 1), metavar="N", help="Seed of the places to look at."
-)
-@click.option(
-    "--budget",
-    default=300.0,
-    type=inputs.Real(0, min_open=True),
-    show_default=True,
-    metavar="SECONDS",
-    help="Time after which nothing new is begun.",
-)
-@inputs.frame
-@inputs.model
-@inputs.root
+@options.count("--seed", low=0, high=2**31 - 1, default=0, help="Seed of the places to look at.")
+@options.positive("--budget", "SECONDS", "Time after which nothing new is begun.", default=300.0)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -128,7 +111,7 @@ def command(
     out: str | None,
     names: tuple[str, ...],
     start: dict[str, str],
-    defines: Defines,
+    request: options.Request,
     mask: Path | None,
     crop: tuple[int, int, int, int] | None,
     background: tuple[float, float, float],
@@ -136,9 +119,6 @@ def command(
     animate: str | None,
     seed: int,
     budget: float,
-    frame: int | None,
-    model: str | None,
-    root: str | None,
 ) -> None:
     """Find the params of SCENE whose picture comes nearest to another picture.
 
@@ -148,7 +128,6 @@ def command(
     """
     from scenelang.drawing.exact.mesh import FitError
     from scenelang.inverse.fit import fit
-    from scenelang.language.reports import SceneError
     from scenelang.output.animate import animate as render
     from scenelang.output.frames import is_animation
 
@@ -157,19 +136,16 @@ def command(
     if animate is not None and not is_animation(animate):
         raise click.UsageError(f"`{animate}` names no animation, such as way.gif.")
     wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
+    given = request.source
     try:
         with Bar() as bar:
             result = fit(
-                scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
-                background=background, model=model, root=root, frame=frame or 0, seed=seed, budget_s=budget,
-                progress=bar,
+                scene, target, params=wanted, start=start, fixed=given.values, mask=mask, crop=crop,
+                background=background, model=given.model, root=given.root, frame=request.frame or 0,
+                seed=seed, budget_s=budget, progress=bar,
             )  # fmt: skip
-    except SceneError as error:
-        say_diagnostics(error.diagnostics)
-        raise click.exceptions.Exit(1) from None
     except FitError as error:
-        say_trouble(str(error))
-        raise click.exceptions.Exit(Trouble.exit_code) from None
+        raise Trouble(str(error)) from None
     if out is not None:
         put_out(result.text, out)
     if compare is not None:
