@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lab.docs.make_words import made
-from scenelang.assets.textures import load_textures
+from scenelang.assets.zoo import load_textures
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.editors.highlighting import OPERATORS
 from scenelang.language import modifiers, values, words

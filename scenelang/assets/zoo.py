@@ -24,6 +24,7 @@ from scenelang.assets.picture import pixels
 from scenelang.assets.tensors import Tensor, TensorError, read_tensors
 
 SUFFIX: Final = ".safetensors"
+TEXTURES_FILE: Final = Path(__file__).with_name("textures.safetensors")
 MOST_BYTES: Final = 32 << 20
 MOST_ELEMENTS: Final = 1000
 MOST_HELD: Final = 128 << 20  # bytes that all elements of a file take unpacked
@@ -62,6 +63,11 @@ def load_zoo(path: str | Path) -> Zoo:
     """
     stat = os.stat(path)
     return _load(os.fspath(path), stat.st_mtime_ns, stat.st_size, stat.st_ino)
+
+
+def load_textures() -> dict[str, Element]:
+    """The sixteen textures that ship, by name, materials of every model; raises as `load_zoo`."""
+    return load_zoo(TEXTURES_FILE).materials
 
 
 @lru_cache(maxsize=16)

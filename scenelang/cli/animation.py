@@ -40,13 +40,7 @@ def moves(job: Input, target: Target, film: Film, out: str) -> bool:
 
 
 def animate(
-    job: Input,
-    target: Target,
-    film: Film,
-    out: str,
-    outputs: tuple[Output, ...],
-    strict: bool,
-    verbose: bool,
+    job: Input, target: Target, film: Film, out: str, outputs: tuple[Output, ...], strict: bool, verbose: bool
 ) -> None:
     """Draw an animation and report what was written.
 

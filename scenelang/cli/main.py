@@ -140,10 +140,7 @@ def describe(error: OSError) -> str:
     return f"{error.filename}: {reason}" if error.filename else reason
 
 
-@click.group(
-    cls=Commands,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="scenelang", message="%(prog)s %(version)s")
 def cli() -> None:
     """Draw 2D and 3D scenes, written as text, with trained neural networks.

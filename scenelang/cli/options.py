@@ -89,6 +89,11 @@ class Sectioned(click.Command):
 # ---------------------------------------------------------------- kinds of options
 
 
+def text(name: str, metavar: str, help: str, **more: Any) -> Option:
+    """An option that takes a text, or what its callback makes of that."""
+    return click.option(name, metavar=metavar, help=help, **more)
+
+
 def choice(*names: str, words: str, help: str) -> Option:
     """An option that takes one of some words, the first of them by default."""
     known = words.split()

@@ -72,11 +72,7 @@ def test_groups_of_strangers(change: dict[str, Any], words: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "group", "words"),
-    [
-        ("no name", CAR, "has the name"),
-        ("car", (), "1 to 256 parts"),
-        ("car", CAR * 129, "1 to 256 parts"),
-    ],
+    [("no name", CAR, "has the name"), ("car", (), "1 to 256 parts"), ("car", CAR * 129, "1 to 256 parts")],
 )
 def test_groups_are_bounded(name: str, group: groups.Group, words: str) -> None:
     with pytest.raises(TensorError, match=words):

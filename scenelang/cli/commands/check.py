@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
@@ -177,11 +177,8 @@ def _for_machines(left: Sequence[Diagnostic], kind: Format, most: int | None) ->
     shown = in_order(left)[:most]
     if kind == "sarif":
         return machine.render_sarif(shown, version("scenelang"))
-    return {
-        "json": machine.render_json,
-        "github": machine.render_github,
-        "concise": machine.render_concise,
-    }[kind](shown)
+    render: Callable[[Sequence[Diagnostic]], str] = getattr(machine, f"render_{kind}")
+    return render(shown)
 
 
 class Scenes(Record, frozen=False):

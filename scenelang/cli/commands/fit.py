@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -64,41 +65,20 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     help="Target, PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
 )
 @click.option(
-    "-o",
-    "--out",
-    metavar="OUT",
-    help="Scene to write, with the values that were found as defaults; - prints it.",
+    "-o", "--out", metavar="OUT", help="Scene to write, with the values found as defaults; - prints it."
 )
-@click.option(
-    "--params",
-    "names",
-    multiple=True,
-    metavar="NAME,…",
-    help="Params to find, instead of all that have a range.",
-)
-@click.option(
-    "--start",
-    multiple=True,
-    metavar="NAME=VALUE",
+@options.text("--params", "NAME,…", "Params to find, instead of all that have a range.", multiple=True)
+@options.text(
+    "--start", "NAME=VALUE", "Value to begin with, instead of the param's default.", multiple=True,
     callback=options.assignments,
-    help="Value to begin with, instead of the param's default.",
-)
+)  # fmt: skip
 @options.request("defines", "frame", "model", "root")
-@click.option(
-    "--mask",
-    type=click.Path(path_type=Path),
-    metavar="PICTURE",
-    help="Picture that is bright where pixels count.",
-)
-@click.option("--crop", metavar="WxH+X+Y", callback=_crop, help="Part of the target that shows the scene.")
-@click.option(
-    "--background",
-    default="#ffffff",
-    metavar="COLOR",
+@options.text("--mask", "PICTURE", "Picture that is bright where pixels count.")
+@options.text("--crop", "WxH+X+Y", "Part of the target that shows the scene.", callback=_crop)
+@options.text(
+    "--background", "COLOR", "Colour behind what is transparent.", default="#ffffff", show_default=True,
     callback=_colour,
-    show_default=True,
-    help="Colour behind what is transparent.",
-)
+)  # fmt: skip
 @click.option("--compare", metavar="OUT.png", help="Write a picture of before, after and target.")
 @click.option("--animate", metavar="OUT.gif", help="Write an animation of the way to what was found.")
 @options.count("--seed", low=0, high=2**31 - 1, default=0, help="Seed of the places to look at.")
@@ -107,18 +87,13 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 def command(
     ctx: click.Context,
     scene: Path,
-    target: Path | dict[int, Path],
     out: str | None,
-    names: tuple[str, ...],
-    start: dict[str, str],
+    params: tuple[str, ...],
     request: options.Request,
-    mask: Path | None,
-    crop: tuple[int, int, int, int] | None,
-    background: tuple[float, float, float],
     compare: str | None,
     animate: str | None,
-    seed: int,
     budget: float,
+    **given: Any,  # arguments of `fit` by their names
 ) -> None:
     """Find the params of SCENE whose picture comes nearest to another picture.
 
@@ -135,14 +110,13 @@ def command(
         targets(["compare"], compare)
     if animate is not None and not is_animation(animate):
         raise click.UsageError(f"`{animate}` names no animation, such as way.gif.")
-    wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
-    given = request.source
+    wanted = [name for listed in params for name in re.split(r"[,\s]+", listed) if name]
+    source = request.source
     try:
         with Bar() as bar:
             result = fit(
-                scene, target, params=wanted, start=start, fixed=given.values, mask=mask, crop=crop,
-                background=background, model=given.model, root=given.root, frame=request.frame or 0,
-                seed=seed, budget_s=budget, progress=bar,
+                scene, params=wanted, fixed=source.values, model=source.model, root=source.root,
+                frame=request.frame or 0, budget_s=budget, progress=bar, **given,
             )  # fmt: skip
     except FitError as error:
         raise Trouble(str(error)) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Any
 
 import click
 
@@ -13,10 +13,7 @@ from scenelang.assets.zoo import SUFFIX, load_zoo
 from scenelang.cli import options
 from scenelang.cli.files import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.say import Bar, say_trouble
-
-if TYPE_CHECKING:
-    from scenelang.drawing.exact.mesh import Sign
+from scenelang.cli.say import Bar
 
 
 @click.command("learn")
@@ -51,10 +48,7 @@ if TYPE_CHECKING:
     "colour; by default those of drawings.",
 )
 @options.positive(
-    "--color-error",
-    "SHARE",
-    "Largest root mean square error of a mesh's colours; by default 0.025.",
-    high=1,
+    "--color-error", "SHARE", "Largest root mean square error of a mesh's colours; by default 0.025.", high=1
 )
 @options.positive(
     "--max-error",
@@ -74,18 +68,10 @@ def command(
     files: tuple[str, ...],
     out: str,
     name: str | None,
-    pictures: Literal["texture", "outline"],
-    texels: int,
-    sign: Sign,
-    parts: bool | None,
-    color_error: float | None,
-    max_error: float | None,
     budget: float | None,
-    steps: int | None,
-    license: str | None,
-    source: str | None,
     cluster: str | None,
     preview: str | None,
+    **given: Any,  # fields of `LearnOptions` by their names
 ) -> None:
     """Make meshes and drawings elements, which scenes import.
 
@@ -108,20 +94,16 @@ def command(
     if preview is not None:
         targets(["preview"], preview)
     try:
-        options = LearnOptions(
-            sign, max_error, budget or math.inf, steps, license, source, pictures, texels, parts, color_error
-        )
-        names_of(files, options, name)
+        wishes = LearnOptions(budget_s=budget or math.inf, **given)
+        names_of(files, wishes, name)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            learn_files(files, out, options, name=name, cluster=cluster, say=say, progress=bar)
+            learn_files(files, out, wishes, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
-        for line in str(error).split("\n"):
-            say_trouble(line)
-        raise click.exceptions.Exit(Trouble.exit_code) from None
+        raise Trouble(str(error).replace("\n", "\nError: ")) from None
     if preview is not None:
         from scenelang.drawing.small import sheet
 

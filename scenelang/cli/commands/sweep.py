@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -14,9 +14,6 @@ from scenelang.cli.main import Trouble
 from scenelang.cli.say import Bar, say_diagnostics
 from scenelang.drawing.how import How
 from scenelang.language.diagnostics import plural
-
-if TYPE_CHECKING:
-    from scenelang.output.sweep import Kind
 
 
 def _grid(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
@@ -76,17 +73,11 @@ def command(
     ctx: click.Context,
     scene: Path,
     out: str,
-    grid: dict[str, str],
-    random: dict[str, str],
-    count: int | None,
-    seed: int,
-    outputs: tuple[Kind, ...],
-    sheet: str | None,
-    table: str | None,
     request: options.Request,
     how: How,
     film: options.Film,
     verbose: bool,
+    **given: Any,  # arguments of `render_many` by their names
 ) -> None:
     """Draw SCENE with many values of its params.
 
@@ -98,14 +89,13 @@ def command(
     from scenelang.output.frames import TargetError
     from scenelang.output.sweep import render_many
 
-    started, given = time.perf_counter(), request.source
+    started, source = time.perf_counter(), request.source
     try:
         with Bar() as bar:
             sweep = render_many(
-                scene, out, grid=grid, random=random, count=count, seed=seed, outputs=outputs, table=table,
-                sheet=sheet, jobs=film.jobs, cluster=film.cluster, frame=request.frame or 0,
-                params=given.values, model=given.model, root=given.root, size=given.size, **how._asdict(),
-                progress=lambda now: bar(now.told, now.done, now.total),
+                scene, out, params=source.values, model=source.model, root=source.root, size=source.size,
+                frame=request.frame or 0, jobs=film.jobs, cluster=film.cluster,
+                progress=lambda now: bar(now.told, now.done, now.total), **how._asdict(), **given,
             )  # fmt: skip
     except (ParamError, TargetError) as error:
         raise click.UsageError(f"{error}.") from None
