@@ -115,13 +115,6 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
     assert result.stdout.startswith("scene 256x256")
 
 
-def test_unknown_stages(folder: Folder) -> None:
-    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "flaten")
-    assert result.exit_code == 2
-    assert "'flatten'" in result.stderr
-    assert folder.run("dump", "a.nsg", "--after", "syntax", "--format", "mmd").exit_code == 2
-
-
 def test_mermaid(folder: Folder) -> None:
     said = folder.run("dump", folder.write("a.nsg", TEXT), "--format", "mmd").stdout
     assert said.startswith("flowchart TB\n")
@@ -171,13 +164,6 @@ def test_dot_draws(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     assert failed.exit_code == 2
     assert failed.stderr == "Error: dot failed: no such font\n"
     assert "b.svg" not in os.listdir()
-
-
-def test_graph_usage(folder: Folder) -> None:
-    assert folder.run("dump", folder.write("a.nsg", TEXT), "--format", "dot", "--diff").exit_code == 2
-    assert "`scenelang dump --format mmd`" in folder.run("graph", "a.nsg").stderr
-    assert folder.run("dump", folder.write("b.nsg", "square { scale(0); }"), "-o", "b.dot").exit_code == 1
-    assert sorted(os.listdir()) == ["a.nsg", "b.nsg"]
 
 
 def test_quotes_in_names_stay_inside_labels(folder: Folder) -> None:

@@ -42,13 +42,6 @@ def test_formulas_in_place_of_the_network(folder: Folder) -> None:
     assert done.exit_code == 0
     assert "formulas in the network's place" in done.stderr
     assert (np.abs(picture("a.png") - picture("b.png")).max(-1) > 1).sum() <= 2
-    for options, why in (
-        (("--device", "cuda"), "not by device cuda"),
-        (("--prove",), "leave out --backend exact"),
-    ):
-        refused = folder.run("render", name, "-o", "c.png", "--backend", "exact", *options)
-        assert refused.exit_code == 2
-        assert why in " ".join(refused.stderr.split())
 
 
 def test_formats_and_sizes(folder: Folder) -> None:
@@ -82,30 +75,6 @@ def test_threads_agree(folder: Folder) -> None:
         assert folder.run("render", name, "-o", f"{threads}.png", "--threads", threads).exit_code == 0
     assert np.abs(picture("1.png") - picture("2.png")).max() <= 1
     assert np.abs(picture("1.png") - picture("5.png")).max() <= 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
-        (("a.nsg", "-o", "a"), "a folder ends in a slash"),
-        (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
-        (("a.nsg", "b/a.nsg", "-o", "out"), "both be written to"),
-        (("a.nsg", "b.nsg", "-o", "a.nsg"), "is a file"),
-        (("a.nsg", "b.nsg", "-o", "out.png"), "names a picture"),
-        (("a.nsg", "-o", "a.png", "--size", "3"), "not a size such as"),
-        (("a.nsg", "-o", "a.png", "--size", "9000x1"), "outside 1..8192"),
-        (("a.nsg", "-o", "a.png", "--threads", "0"), "--threads"),
-    ],
-)
-def test_usage_is_settled_before_any_work(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
-    for name in ("a.nsg", "b.nsg", "b/a.nsg"):
-        folder.write(name)
-    before = sorted(os.listdir())
-    result = folder.run("render", *arguments)
-    assert result.exit_code == 2
-    assert said in result.stderr
-    assert sorted(os.listdir()) == before
 
 
 def test_scenes_with_errors_are_left_out(folder: Folder) -> None:
@@ -216,19 +185,6 @@ def test_damaged_programs(folder: Folder) -> None:
 def test_standard_input(folder: Folder) -> None:
     assert folder.run("render", "-", "-o", "a.png", "--size", "16x16", stdin=GOOD).exit_code == 0
     assert picture("a.png").shape == (16, 16, 3)
-
-
-@pytest.mark.parametrize("arguments", [(), ("-o", "a.png"), ("-o", "none/a.safetensors")])
-def test_compile_usage(folder: Folder, arguments: tuple[str, ...]) -> None:
-    assert folder.run("compile", folder.write("a.nsg"), *arguments).exit_code == 2
-    assert os.listdir() == ["a.nsg"]
-
-
-def test_compile_refuses_errors(folder: Folder) -> None:
-    result = folder.run("compile", folder.write("a.nsg", "square { scale(foo); }"), "-o", "a.safetensors")
-    assert result.exit_code == 1
-    assert "E0201" in result.stderr
-    assert os.listdir() == ["a.nsg"]
 
 
 @pytest.mark.parametrize("options", [("--size", "4096x4096"), ("--max-ms", "5"), ("--device", "cpu")])

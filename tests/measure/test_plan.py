@@ -126,9 +126,3 @@ def test_the_command(tmp_path: Path, kind: str) -> None:
             "union",
             "subtract",
         ]
-
-
-def test_a_scene_with_mistakes_has_no_plan(tmp_path: Path) -> None:
-    file = tmp_path / "scene.nsg"
-    file.write_text("squre { }")
-    assert CliRunner().invoke(cli, ["dump", "--costs", str(file)]).exit_code == 1
