@@ -100,7 +100,7 @@ def _format(scene: str) -> None:
 
 
 def _edit(scene: str) -> None:
-    """What an editor asks for when a document is opened, and again when a letter is typed in it."""
+    """Requests of an editor when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
     from scenelang.editors import completion, context, hover, navigation
@@ -244,7 +244,7 @@ _DATA: Final = (
 
 
 def seeds() -> list[Pump]:
-    """What thought found, for every reader of text in turn."""
+    """Texts by hand, for every reader of text in turn."""
     readers = dict.fromkeys(_OF_TEXT)
     return [*_DATA, *(Pump(reader, *shape) for shape in _SHAPES for reader in readers)]
 

@@ -1,4 +1,4 @@
-"""What was written for revision 090346d still works: Programs it saved, and calls of its public API.
+"""Compatibility with revision 090346d: Programs it saved, and calls of its public API.
 
 `before/api.json` has each public name of that revision and its parameters: ``/x`` by place alone, ``*x`` by
 name alone, ``...x`` and ``***x`` any number, ``x?`` may be left out; null where it was not a call. `render`'s

@@ -199,7 +199,7 @@ def test_every_example_is_shown() -> None:
 
 
 def test_every_transform_operator_and_colour_is_pictured() -> None:
-    """What the language has and a shipped model can draw."""
+    """All that a shipped model can draw."""
     page = (ROOT / "docs/language.md").read_text("utf-8")
     manifest = load_manifest("shapes2d")
     colours = {"color", "grayscale", "hue"}  # the texture transforms have nothing to move in `flat`

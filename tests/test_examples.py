@@ -100,7 +100,7 @@ def test_script_draws(tmp_path: Path) -> None:
 
 
 def test_suggestions_of_comments_work() -> None:
-    """What the comments of examples suggest to try with -D."""
+    """The values that comments of examples suggest to try with -D."""
     found = 0
     for path in SCENES:
         for line in path.read_text("utf-8").splitlines():
