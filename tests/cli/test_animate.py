@@ -21,15 +21,6 @@ def frames(name: str) -> int:
         return getattr(image, "n_frames", 1)
 
 
-@pytest.mark.parametrize("out", ["a.gif", "a.webp", "a.apng"])
-def test_files(folder: Folder, out: str) -> None:
-    result = folder.run("render", folder.write("a.nsg", MOVING), "-o", out)
-    assert result.exit_code == 0
-    assert result.output.startswith(f"{out}: 4 frames, ")
-    assert frames(out) == 4
-    assert sorted(os.listdir()) == sorted(["a.nsg", out])
-
-
 def test_names_of_sequences(folder: Folder) -> None:
     name = folder.write("a.nsg", MOVING)
     result = folder.run("render", name, "-o", "out/", "--frames", "1..2")

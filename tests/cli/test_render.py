@@ -28,13 +28,6 @@ def test_one_scene(folder: Folder) -> None:
     assert np.abs(pixels[3, 3] - 255).max() <= 1
 
 
-def test_the_reference(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
-    assert folder.run("render", name, "-o", "b.png").exit_code == 0
-    assert np.abs(picture("a.png") - picture("b.png")).mean() < 4
-
-
 def test_formulas_in_place_of_the_network(folder: Folder) -> None:
     name = folder.write("a.nsg")
     assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
@@ -67,14 +60,6 @@ def test_one_scene_into_a_folder(folder: Folder) -> None:
     assert folder.run("render", name, "-o", "new/").exit_code == 0
     assert folder.run("render", name, "-o", "new").exit_code == 0
     assert os.listdir("new") == ["a.png"]
-
-
-def test_threads_agree(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    for threads in ("1", "2", "5"):
-        assert folder.run("render", name, "-o", f"{threads}.png", "--threads", threads).exit_code == 0
-    assert np.abs(picture("1.png") - picture("2.png")).max() <= 1
-    assert np.abs(picture("1.png") - picture("5.png")).max() <= 1
 
 
 def test_scenes_with_errors_are_left_out(folder: Folder) -> None:
@@ -180,11 +165,6 @@ def test_damaged_programs(folder: Folder) -> None:
     assert result.exit_code == 1
     assert result.stderr.startswith("Error: b.safetensors: not a program")
     assert os.listdir("out") == ["a.png"]
-
-
-def test_standard_input(folder: Folder) -> None:
-    assert folder.run("render", "-", "-o", "a.png", "--size", "16x16", stdin=GOOD).exit_code == 0
-    assert picture("a.png").shape == (16, 16, 3)
 
 
 @pytest.mark.parametrize("options", [("--size", "4096x4096"), ("--max-ms", "5"), ("--device", "cpu")])

@@ -83,9 +83,7 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 @click.option("--animate", metavar="OUT.gif", help="Write an animation of the way to what was found.")
 @options.count("--seed", low=0, high=2**31 - 1, default=0, help="Seed of the places to look at.")
 @options.positive("--budget", "SECONDS", "Time after which nothing new is begun.", default=300.0)
-@click.pass_context
 def command(
-    ctx: click.Context,
     scene: Path,
     out: str | None,
     params: tuple[str, ...],
@@ -130,4 +128,4 @@ def command(
     for line in result.told():
         click.echo(line, err=out == "-")
     if not result.done:
-        ctx.exit(NOT_CONVERGED)
+        raise click.exceptions.Exit(NOT_CONVERGED)

@@ -68,9 +68,7 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
 @options.drawing()
 @options.film("jobs", "cluster")
 @options.verbose
-@click.pass_context
 def command(
-    ctx: click.Context,
     scene: Path,
     out: str,
     request: options.Request,
@@ -117,4 +115,5 @@ def command(
     click.echo(f"{sweep.table}: {', '.join(parts)}, {time.perf_counter() - started:.1f} s", err=True)
     for line in made.lines() if verbose else ():
         click.echo(f"  {line}", err=True)
-    ctx.exit(1 if sweep.errors else 0)
+    if sweep.errors:
+        raise click.exceptions.Exit(1)
