@@ -101,11 +101,16 @@ def choice(*names: str, words: str, help: str) -> Option:
 
 
 def count(
-    *names: str, low: int = 1, high: int | None = None, default: int | None = None, help: str
+    *names: str,
+    low: int = 1,
+    high: int | None = None,
+    default: int | None = None,
+    metavar: str = "N",
+    help: str,
 ) -> Option:
     """An option that takes a whole number in a range."""
     kind = click.IntRange(low, high)
-    return click.option(*names, type=kind, default=default, show_default=True, metavar="N", help=help)
+    return click.option(*names, type=kind, default=default, show_default=True, metavar=metavar, help=help)
 
 
 class Real(click.FloatRange):

@@ -90,7 +90,6 @@ def command(
         raise click.UsageError("A drawing is of one stage, with --after.")
     if drawn and "syntax" in stages:
         raise click.UsageError("The syntax tree has no drawing.")
-    dot = _find_dot(form) if form in ("svg", "png") else None
     job = prepare_scene(file, request)
     if (costs or drawn) and (job.scene is None or job.program is None or job.failed()):
         ctx.exit(1)
@@ -99,7 +98,7 @@ def command(
         put_out((json.dumps(plan, indent=2) if form == "json" else _costs_text(plan)) + "\n", out)
     elif drawn:
         text = _drawing(job, stages[0] if stages else "scene", form, most)
-        put_out(text if dot is None else _picture(dot, form, text), out)
+        put_out(_picture(form, text) if form in ("svg", "png") else text, out)
     else:
         shown = list(_changes(job, stages) if diff else _whole(job, stages or ("program",), form))
         if form == "json":
@@ -159,18 +158,14 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
     return to_mermaid(drawing) if kind == "mmd" else to_dot(drawing)
 
 
-def _find_dot(kind: str) -> str:
-    """The program that draws."""
-    result = shutil.which("dot")
-    if result is None:
+def _picture(kind: str, text: str) -> bytes:
+    """A picture of DOT text by Graphviz."""
+    dot = shutil.which("dot")
+    if dot is None:
         raise click.UsageError(
             f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."
         )
-    return result
-
-
-def _picture(dot: str, kind: str, text: str) -> bytes:
     try:
         done = subprocess.run(
             [dot, f"-T{kind}"], input=text.encode(), capture_output=True, timeout=_PATIENCE_S, check=False

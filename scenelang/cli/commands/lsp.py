@@ -15,7 +15,7 @@ from scenelang.cli.main import Trouble
 
 @click.command("lsp")
 @click.option("--stdio", is_flag=True, help="Speak over standard input and output; the default.")
-@options.count("--tcp", high=65535, help="Serve one client on a port of this machine.")
+@options.count("--tcp", high=65535, metavar="PORT", help="Serve one client on a port of this machine.")
 @click.option("--log", type=click.Path(dir_okay=False), metavar="FILE", help="Write a log to a file.")
 def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     """Serve an editor over the Language Server Protocol.

@@ -102,7 +102,6 @@ def command(
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
-    from scenelang.cli.animation import animate, moves
     from scenelang.cli.inputs import prepare_all, read_input, unused_defines
 
     outputs, limits = tuple(dict.fromkeys(outputs)), max_ms is not None or max_flip is not None
@@ -119,6 +118,8 @@ def command(
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
+            from scenelang.cli.animation import animate, moves
+
             result = read_input(files[0], request, clock, how)
             if moves(result, target, film, out):
                 if limits or prove:
