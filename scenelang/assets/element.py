@@ -175,11 +175,7 @@ Group = tuple[Part, ...]  # in the order of painting
 def read_group(
     name: str, entry: Any, geometries: Mapping[str, Element], materials: Mapping[str, Element]
 ) -> Group:
-    """Read a group from its entry in a header.
-
-    Raises:
-        TensorError: it is damaged, too large, or has what the file does not hold.
-    """
+    """Read a group from its entry in a header; raises `TensorError`."""
     if not (name.isascii() and name.isidentifier()):
         raise TensorError(f"a group has the name {name[:40]!r}")
     if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:

@@ -100,11 +100,7 @@ _FILES: Final = {"webp": "WEBP", "av1": "AVIF"}
 
 
 def pixels(element: Element) -> bytes:
-    """Red, green and blue, 8 bits, of each texel of a picture, row after row from the top.
-
-    Raises:
-        TensorError: the bytes are damaged, or those of another picture than the sizes tell.
-    """
+    """RGB, 8 bits, of each texel, row after row from the top; raises `TensorError` for another picture."""
     from PIL import Image
 
     height, width = element.sizes

@@ -55,12 +55,7 @@ class Zoo:
 
 
 def load_zoo(path: str | Path) -> Zoo:
-    """Read a file of elements.
-
-    Raises:
-        OSError: it cannot be read.
-        TensorError: it is damaged, foreign or hostile.
-    """
+    """Read a file of elements; raises `OSError`, or `TensorError` for a damaged or hostile one."""
     stat = os.stat(path)
     return _load(os.fspath(path), stat.st_mtime_ns, stat.st_size, stat.st_ino)
 
@@ -81,11 +76,7 @@ _TABLES: Final = {"elements": "", "materials": "material."}
 
 
 def read_zoo(data: bytes) -> Zoo:
-    """The elements in the bytes of a file; every one is unpacked once, so that none is damaged.
-
-    Raises:
-        TensorError: the bytes are not those of such a file.
-    """
+    """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
     file = read_tensors(data, MOST_BYTES, (1, 2))
     known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
     tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
@@ -110,11 +101,7 @@ def read_zoo(data: bytes) -> Zoo:
 
 
 def read_elements(listed: Iterable[tuple[str, Any, Tensor]], body: memoryview) -> tuple[Element, ...]:
-    """The elements of names, header entries and tensors of a file; each is unpacked once as a check.
-
-    Raises:
-        TensorError: they are damaged, do not agree, or are more than can be held.
-    """
+    """The elements of names, header entries and tensors of a file; raises as `read_zoo`."""
     result, held = [], 0
     for name, entry, tensor in listed:
         element = _element(name, entry, tensor, body)

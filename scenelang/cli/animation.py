@@ -42,14 +42,7 @@ def moves(job: Input, target: Target, film: Film, out: str) -> bool:
 def animate(
     job: Input, target: Target, film: Film, out: str, outputs: tuple[Output, ...], strict: bool, verbose: bool
 ) -> None:
-    """Draw an animation and report what was written.
-
-    Args:
-        job: the scene.
-        out: the target, as the user wrote it.
-        outputs: written next to each picture.
-        strict: count warnings as errors.
-        verbose: report times.
+    """Draw an animation and report what was written; ``out`` is the target as the user wrote it.
 
     Raises:
         SceneError: the scene has mistakes.

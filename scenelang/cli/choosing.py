@@ -28,13 +28,9 @@ from scenelang.output.frontier import (
 
 
 def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Input]:
-    """Choose by the frontier how to draw; return the jobs that fit the limits and report the others.
+    """Choose how to draw, by ``model`` alone where it is given; return the jobs that fit and report others.
 
-    Args:
-        model: the only one to choose, where it is given.
-
-    Raises:
-        click.UsageError: an option says what the frontier decides.
+    Raises `click.UsageError` where an option says what the frontier decides.
     """
     for job in jobs:
         if job.how._replace(threads=None, device="auto") != DEFAULT or job.how.device == "cuda":

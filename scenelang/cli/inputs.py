@@ -127,15 +127,8 @@ def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
     return result
 
 
-# ---------------------------------------------------------------- compiled
-
-
 def compile_input(job: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
-    """Compile a scene, if it is one without errors that is not drawn by the reference; ``graphs`` are kept.
-
-    Raises:
-        OSError: a model has no weights.
-    """
+    """Compile a scene without errors that the reference does not draw; raises `OSError` without weights."""
     if job.scene is None or job.how.backend == "reference":
         return
     from scenelang.compiler.choose import why_chosen
@@ -160,7 +153,6 @@ def prepare_all(
     """Every input read and compiled, None where it cannot be read; reports mistakes.
 
     Args:
-        how: how they are drawn.
         strict: warnings count as errors.
         graphs: keep the graph after each pass.
         stored: why compiled programs are refused, if they are.
