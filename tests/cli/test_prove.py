@@ -40,9 +40,3 @@ def test_what_is_not_proved_is_drawn_again(folder: Folder) -> None:
     assert "p.png: 100 % of pixels proved right to 1/255" in ran.stderr
     exact = nsg.render(nsg.loads(TEXT), backend="reference").to_uint8().astype(int)
     assert abs(np.asarray(Image.open("p.png"), int) - exact).max() <= 1
-
-
-def test_a_compiled_program_has_no_proof(folder: Folder) -> None:
-    assert folder.run("compile", folder.write("a.nsg", TEXT), "-o", "a.safetensors").exit_code == 0
-    ran = folder.run("render", "a.safetensors", "-o", "p.png", "--prove")
-    assert (ran.exit_code, "a proof is of a scene" in ran.stderr) == (1, True)
