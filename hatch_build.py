@@ -1,4 +1,4 @@
-"""What a wheel gets beyond the files of the repository: the parse tables, which Lark makes of the grammar."""
+"""The parse tables of a wheel, which Lark makes of the grammar."""
 
 from __future__ import annotations
 

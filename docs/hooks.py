@@ -1,4 +1,4 @@
-"""What mkdocs does for the site beyond turning ``docs/*.md`` into pages.
+"""Steps of mkdocs for the site beyond turning ``docs/*.md`` into pages.
 
 - A page for each diagnostic, ``errors/E0401.html``, from ``scenelang/language/pages/E0401.md``, and the
   changelog and the contributors' guide as pages.
@@ -26,7 +26,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 from lab.docs.blocks import pictured
-from scenelang.cli.main import Commands, cli
+from scenelang.cli.main import COMMANDS, Commands, cli
 from scenelang.language.evaluation import Source
 from scenelang.web.export import View, control_rows, viewed
 from scenelang.web.export import page as page_of
@@ -95,7 +95,7 @@ def live_scenes() -> dict[str, str | Path]:
 
 
 def view_of_scene(scene: str | Path) -> View:
-    """What a page draws of a text or a file."""
+    """The scene of a page, from a text or a file."""
     if isinstance(scene, Path):
         return viewed(Source(scene, root=ROOT / "examples"), scene.stem)[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -113,7 +113,7 @@ def commands_page() -> str:
 
 
 def _told(group: Commands, path: str) -> Iterator[str]:
-    for name, summary in group.table.items():
+    for name, summary in COMMANDS.items():
         command = group.get_command(click.Context(group), name)
         assert command is not None, name
         context = click.Context(command, info_name=f"{path} {name}", terminal_width=100)
@@ -161,7 +161,7 @@ def on_post_template(output_content: str, *, template_name: str, config: MkDocsC
 
 
 def _origin(uri: str) -> Path:
-    """Where in the repository a page of the site comes from."""
+    """The file of the repository that a page of the site comes from."""
     for source, target in ROOT_PAGES.items():
         if uri == target:
             return Path(source)
@@ -171,7 +171,7 @@ def _origin(uri: str) -> Path:
 
 
 def _in_site(goal: Path) -> str | None:
-    """Where in the site a file of the repository is."""
+    """The place of a file of the repository in the site."""
     if not goal.is_relative_to(ROOT):
         return None
     path = goal.relative_to(ROOT)

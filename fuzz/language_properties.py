@@ -1,4 +1,4 @@
-"""What holds of texts that are drawn from the language: sentences, expressions, ranges, strings."""
+"""Properties of texts that are drawn from the language: sentences, expressions, ranges, strings."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _shortest() -> dict[str, list[str]]:
 
 @drawn(sentences())
 def sentences_are_read_and_formatted(text: str) -> None:
-    """What the grammar derives has no syntax mistake and keeps its tree when formatted."""
+    """A sentence of the grammar has no syntax mistake and keeps its tree when formatted."""
     source, found = SourceFile("s.nsg", text), Diagnostics()
     parse(source, found)
     assume(not {d.code for d in found} & {"E0120", *BEYOND})

@@ -10,7 +10,7 @@ from fuzz.target import Failure, Target
 
 
 def signature_of(error: BaseException) -> str:
-    """What and where a target failed: the same for the same mistake."""
+    """Error and place of a failure: the same for the same mistake."""
     if isinstance(error, Failure):
         return error.oracle
     place = "outside"

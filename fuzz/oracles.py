@@ -1,4 +1,4 @@
-"""What must hold of trees and diagnostics, whatever the text."""
+"""Invariants of trees and diagnostics, whatever the text."""
 
 from __future__ import annotations
 

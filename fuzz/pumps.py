@@ -13,8 +13,8 @@ from typing import Final
 from fuzz import text
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import read_zoo
-from scenelang.cli.checking import Scenes
-from scenelang.cli.inputs import Request
+from scenelang.cli.commands.check import Scenes
+from scenelang.cli.options import Request
 from scenelang.compiler.program import ProgramError, parse_program
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import Source
@@ -100,7 +100,7 @@ def _format(scene: str) -> None:
 
 
 def _edit(scene: str) -> None:
-    """What an editor asks for when a document is opened, and again when a letter is typed in it."""
+    """Requests of an editor when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
     from scenelang.editors import completion, context, hover, navigation
@@ -244,7 +244,7 @@ _DATA: Final = (
 
 
 def seeds() -> list[Pump]:
-    """What thought found, for every reader of text in turn."""
+    """Texts by hand, for every reader of text in turn."""
     readers = dict.fromkeys(_OF_TEXT)
     return [*_DATA, *(Pump(reader, *shape) for shape in _SHAPES for reader in readers)]
 

@@ -1,4 +1,4 @@
-"""What a fuzz target is, and what it says when an oracle does not hold."""
+"""Fuzz targets, and their report when an oracle does not hold."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TARGETS: Final = (
 PUMPED: Final = "slow"
 """The target that `fuzz.hunt` drives, without atheris."""
 PROPERTIES: Final = "properties"
-"""What Hypothesis drives, in `fuzz.properties`."""
+"""Targets that Hypothesis drives, in `fuzz.properties`."""
 
 
 class Failure(AssertionError):

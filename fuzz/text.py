@@ -161,7 +161,7 @@ def seeds() -> list[bytes]:
 
 @cache
 def words() -> tuple[str, ...]:
-    """What the language knows by name, and signs."""
+    """Names and signs of the language."""
     own = ["square", "triangle", "star", "pentagon", "flat", "sphere", "diffuse", "shapes2d", "loop", "axis"]
     units = ["deg", "rad", "turn", "s", "ms", *UNIT_ALIASES]
     signs = [*tables().literals, *FOREIGN]

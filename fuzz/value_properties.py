@@ -1,4 +1,4 @@
-"""What holds of whole values that are drawn: Scenes, Programs, weights, manifests, diagnostics."""
+"""Properties of whole values that are drawn: Scenes, Programs, weights, manifests, diagnostics."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def programs(draw: st.DrawFn) -> Program:
 
 @drawn(programs())
 def programs_stay_in_their_files_and_can_be_drawn(program: Program) -> None:
-    """What the fuzz target asks of files it did not make; digests tell Programs apart."""
+    """The fuzz target's demands on files it did not make; digests tell Programs apart."""
     written = program_bytes(program)
     load_target("program").check(written)
     again = parse_program(written)
@@ -134,7 +134,7 @@ _WORDS: Final = st.lists(
 
 @drawn(st.data())
 def manifests_of_any_names_and_ranges_are_read(data: st.DataObject) -> None:
-    """What a manifest may hold it may hold, and scenes compile or are refused with it."""
+    """A manifest of allowed values is read, and scenes compile or are refused with it."""
     shipped = load_manifest("shapes2d")
     materials = data.draw(_WORDS.filter(bool))
     line = st.text(st.characters(categories=("L", "N", "P")), min_size=1, max_size=9).filter(str.isprintable)

@@ -17,7 +17,7 @@ import click
 from lab import ROOT
 from lab.about import about, write_json
 from scenelang.assets.files import read_regular, write_whole
-from scenelang.cli import inputs
+from scenelang.cli import options
 from scenelang.cli.main import Reporting
 from scenelang.cli.say import Bar, need_metrics
 
@@ -122,7 +122,7 @@ def command() -> None:
 @_count("--scenes", 1000, 1, 1_000_000, "Number of scenes.")
 @_count("--side", None, 1, 8192, "Shorter side of the canvas in pixels; by default as the set says.")
 @_kept
-@inputs.originals
+@options.originals
 @_seed
 @_out
 @_weights
@@ -437,7 +437,7 @@ def _verify(
 @click.option(
     "--budget",
     "budget_s",
-    type=inputs.Real(0, min_open=True),
+    type=options.Real(0, min_open=True),
     callback=lambda ctx, param, minutes: math.inf if minutes is None else 60 * minutes,
     metavar="MINUTES",
     help="Stop after this time, with a checkpoint; of long trainings processor time.",
@@ -448,8 +448,8 @@ def _verify(
     metavar="WEIGHTS",
     help="Weights that a long training begins from; their time and curve go on.",
 )
-@inputs.device
-@inputs.threads
+@options.field("device")
+@options.field("threads")
 @click.option(
     "--every",
     type=click.IntRange(1),
@@ -460,7 +460,7 @@ def _verify(
 )
 @click.option(
     "--save-every",
-    type=inputs.Real(0),
+    type=options.Real(0),
     default=60.0,
     show_default=True,
     metavar="SECONDS",
@@ -641,7 +641,7 @@ def _say_begin(model: str, reached: str, done: int, device: str, out: Path) -> N
     "--budget",
     default=0.01,
     show_default=True,
-    type=inputs.Real(0, min_open=True),
+    type=options.Real(0, min_open=True),
     metavar="MINUTES",
     help="Processor time of each training.",
 )

@@ -28,7 +28,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def _path() -> str:
-    """Where Chromium lies; skips the test where it or Playwright is missing."""
+    """The path of Chromium; skips the test where it or Playwright is missing."""
     pytest.importorskip("playwright.sync_api")
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if path is None:

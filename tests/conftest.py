@@ -1,4 +1,4 @@
-"""What all tests share."""
+"""Settings, fixtures and marks of all tests."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 TESTS = Path(__file__).parent
-USUAL = "not slow and not browser"  # marks of a run that asks for none, in pyproject.toml
 MORE = {"assets", "editors", "fuzz", "inverse", "lab", "output", "play", "web"}
-"""Folders whose tests are marked `more`: a run of all tests leaves them to ``-m more``, as `.ci/run` says."""
+"""Folders whose tests are marked `more`: plain ``pytest`` leaves them to ``-m more``, as `.ci/run` says."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.relative_to(TESTS).parts[0] in MORE:
             item.add_marker("more")
-    if config.option.markexpr != USUAL or any(Path(arg).resolve() != TESTS for arg in config.args):
+    asked = config.option.markexpr not in config.getini("addopts")  # -m, unless it says what is usual
+    if asked or any(Path(arg).resolve() != TESTS for arg in config.args):
         return
     left = [item for item in items if item.get_closest_marker("more")]
     config.hook.pytest_deselected(items=left)

@@ -1,4 +1,4 @@
-"""Which small mistakes the tests would not notice: ``python -m tests.mutants [PATH…] [--share S]``.
+"""Small mistakes that the tests would not notice: ``python -m tests.mutants [PATH…] [--share S]``.
 
 Changes one number, sign, operator, comparison or limit at a time in files of `TARGETS`, and runs the tests
 that are to notice, in a process of its own. No file is written: the process compiles the changed text as it
@@ -186,7 +186,7 @@ def _changes(
 
 
 def _instead(node: ast.AST, test: bool) -> Iterator[ast.expr]:
-    """What may stand in place of an expression."""
+    """Replacements of an expression."""
     if isinstance(node, ast.Constant):
         yield from (ast.Constant(value) for value in _numbers(node.value))
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.Not)):

@@ -1,4 +1,4 @@
-"""How tests compare pictures."""
+"""Comparison of pictures."""
 
 from __future__ import annotations
 

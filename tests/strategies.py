@@ -26,8 +26,7 @@ rotations = st.builds(
     nsg.Rotate,
     angle=angles,
     axis=st.one_of(
-        st.sampled_from([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)]),
-        st.tuples(numbers, numbers, numbers).filter(any),
+        st.sampled_from([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)]), st.tuples(numbers, numbers, numbers).filter(any)
     ),
 )
 scales = st.one_of(st.builds(nsg.Scale, x=factors, y=factors, z=factors), factors.map(nsg.Scale.uniform))
@@ -60,10 +59,7 @@ materials = st.none() | st.builds(
     name=st.sampled_from(["flat", "diffuse", "volumetric"]),
     ops=st.lists(operations, max_size=3).map(tuple),
 )
-common: dict[str, Any] = {
-    "transforms": st.lists(transforms, max_size=3).map(tuple),
-    "material": materials,
-}
+common: dict[str, Any] = {"transforms": st.lists(transforms, max_size=3).map(tuple), "material": materials}
 joins = st.sampled_from([(op, 0.15) for op in ("union", "smooth", "subtract", "intersect")]) | st.tuples(
     st.just("smooth"), st.floats(1e-6, 100)
 )

@@ -1,4 +1,4 @@
-"""What was written for revision 090346d still works: Programs it saved, and calls of its public API.
+"""Compatibility with revision 090346d: Programs it saved, and calls of its public API.
 
 `before/api.json` has each public name of that revision and its parameters: ``/x`` by place alone, ``*x`` by
 name alone, ``...x`` and ``***x`` any number, ``x?`` may be left out; null where it was not a call. `render`'s
@@ -67,52 +67,48 @@ def test_pages_of_saved_programs_have_their_weights() -> None:
     assert old.blob != new.blob
 
 
-@pytest.mark.parametrize("model", ["solids3d", "shapes2d-streaming"])
-def test_weights_of_another_model_are_refused(model: str, tmp_path: Path) -> None:
-    forged = replace(nsg.load_program(BEFORE / "trees.safetensors"), model=model)
-    forged.save(tmp_path / "forged.safetensors")
-    with pytest.raises(nsg.ProgramError, match="weights of another model"):
-        nsg.load_program(tmp_path / "forged.safetensors")
-    for device in ("auto", "cpu"):
-        with pytest.raises(nsg.RenderError):
-            nsg.render(forged, device=device)
+def test_weights_of_another_model_are_refused(tmp_path: Path) -> None:
+    for model in ("solids3d", "shapes2d-streaming"):
+        forged = replace(nsg.load_program(BEFORE / "trees.safetensors"), model=model)
+        forged.save(tmp_path / "forged.safetensors")
+        with pytest.raises(nsg.ProgramError, match="weights of another model"):
+            nsg.load_program(tmp_path / "forged.safetensors")
+        for device in ("auto", "cpu"):
+            with pytest.raises(nsg.RenderError):
+                nsg.render(forged, device=device)
 
 
-@pytest.mark.parametrize("weights", ["", "0" * 64, "..", "../shapes2d"])
-def test_other_digests_lead_nowhere(weights: str) -> None:
-    assert replaced(weights) == ""
-    assert weights_path("shapes2d", weights) == weights_path("shapes2d")
+def test_other_digests_lead_nowhere() -> None:
+    for weights in ("", "0" * 64, "..", "../shapes2d"):
+        assert replaced(weights) == ""
+        assert weights_path("shapes2d", weights) == weights_path("shapes2d")
 
 
-@pytest.mark.parametrize("name", sorted(name for name in API if "." not in name))
-def test_public_names_are_there(name: str) -> None:
-    assert name in nsg.__all__
-    assert hasattr(nsg, name)
+def test_public_names_and_members_are_there() -> None:
+    for name in API:
+        owner, _, member = name.partition(".")
+        assert owner in nsg.__all__, name
+        cls = getattr(nsg, owner)
+        fields = {f for base in getattr(cls, "__mro__", ()) for f in getattr(base, "__annotations__", ())}
+        assert not member or hasattr(cls, member) or member in fields, name
 
 
-@pytest.mark.parametrize("name", sorted(name for name in API if "." in name))
-def test_members_are_there(name: str) -> None:
-    owner, _, member = name.partition(".")
-    cls = getattr(nsg, owner)
-    fields = {f for base in cls.__mro__ for f in getattr(base, "__annotations__", ())}
-    assert hasattr(cls, member) or member in fields
-
-
-@pytest.mark.parametrize("name", sorted(name for name, params in API.items() if params is not None))
-def test_calls_are_taken(name: str) -> None:
+def test_calls_are_taken() -> None:
     """All arguments by place where they were taken so, all by name, and only those that were required."""
-    owner, _, member = name.partition(".")
-    called = getattr(nsg, owner) if not member else getattr(getattr(nsg, owner), member)
-    takes = inspect.signature(called)
-    words = [word for word in (API[name] or "").split() if word.strip("?*/") not in GONE.get(name, ())]
-    plain = [word for word in words if not word.startswith(("...", "***"))]
-    placed = [word for word in plain if word[0] != "*"]
-    named = {word.strip("*?"): None for word in plain if word[0] not in "/"}
-    alone = [None for word in plain if word[0] == "/"]
-    if "***data" in words:  # fields of a model, which `test_members_are_there` looks for
-        takes.bind_partial(*alone)
-        return
-    takes.bind(*[None] * len(placed), **{word.strip("*?"): None for word in plain if word[0] == "*"})
-    takes.bind(*alone, **named)
-    required = [word for word in placed if word[-1] != "?"]
-    takes.bind(*[None] * len(required), **{w[1:]: None for w in plain if w[0] == "*" and w[-1] != "?"})
+    for name, params in API.items():
+        if params is None:
+            continue
+        owner, _, member = name.partition(".")
+        takes = inspect.signature(getattr(getattr(nsg, owner), member) if member else getattr(nsg, owner))
+        words = [word for word in params.split() if word.strip("?*/") not in GONE.get(name, ())]
+        plain = [word for word in words if not word.startswith(("...", "***"))]
+        placed = [word for word in plain if word[0] != "*"]
+        named = {word.strip("*?"): None for word in plain if word[0] not in "/"}
+        alone = [None for word in plain if word[0] == "/"]
+        if "***data" in words:  # fields of a model, which are among the members
+            takes.bind_partial(*alone)
+            continue
+        takes.bind(*[None] * len(placed), **{word.strip("*?"): None for word in plain if word[0] == "*"})
+        takes.bind(*alone, **named)
+        required = [word for word in placed if word[-1] != "?"]
+        takes.bind(*[None] * len(required), **{w[1:]: None for w in plain if w[0] == "*" and w[-1] != "?"})

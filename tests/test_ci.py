@@ -22,12 +22,7 @@ def program(path: Path, text: str) -> Path:
 
 @pytest.mark.parametrize(
     ("mark", "skip", "fine", "code"),
-    [
-        ("oracle", "", True, 0),
-        ("oracle", "", False, 1),
-        ("oracle", SKIPPED, True, 1),
-        ("other", "", True, 5),
-    ],
+    [("oracle", "", True, 0), ("oracle", "", False, 1), ("oracle", SKIPPED, True, 1), ("other", "", True, 5)],
 )
 def test_marked_tests_have_to_run(tmp_path: Path, mark: str, skip: str, fine: bool, code: int) -> None:
     python = program(tmp_path / "python", f'exec "{sys.executable}" "$@"')

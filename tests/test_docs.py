@@ -13,8 +13,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import scenelang
+from lab.cli import command as command_of_lab
+from scenelang.cli.main import cli
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.passes import check_scene
@@ -26,6 +29,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "tests").rglob("*.md")])
 README = (ROOT / "README.md").read_text("utf-8")
 VENV = ".venv/bin/"
+PROGRAMS = {"python3", "python", "pip", "pytest", "ruff", "mypy", "bash", "git", "scenelang"}
 
 
 @dataclass(frozen=True)
@@ -62,25 +66,26 @@ def of(language: str) -> list[Block]:
     return [block for block in BLOCKS if block.language == language]
 
 
-@pytest.mark.parametrize("block", of("nsg"), ids=str)
-def test_scenes_give_what_the_page_says(block: Block) -> None:
-    """A block of ``nsg`` has no errors, one of ``nsg E0402 …`` those that it names."""
+def errors_of(block: Block) -> tuple[str, ...]:
+    """Codes of the errors in a block of ``nsg``."""
     found = Diagnostics()
     source = SourceFile(str(block), block.text)
     scene, spans = Source(text=source, root=ROOT / "examples").scene(found)
-    if scene is not None:
-        manifest = find_model(scene, found, spans=spans)
-        if manifest is not None:
-            check_scene(scene, spans, found, manifest)
-    assert tuple(d.code for d in found.errors) == block.words, [(d.message, d.span) for d in found]
+    manifest = None if scene is None else find_model(scene, found, spans=spans)
+    if scene is not None and manifest is not None:
+        check_scene(scene, spans, found, manifest)
+    return tuple(d.code for d in found.errors)
 
 
-def test_json_is_json() -> None:
+def test_scenes_give_what_the_page_says() -> None:
+    """A block of ``nsg`` has no errors, one of ``nsg E0402 …`` those that it names; JSON is JSON."""
+    wrong = [f"{b}: {found}" for b in of("nsg") if (found := errors_of(b)) != b.words]
     for block in of("json"):
         try:
             json.loads(block.text)
         except ValueError as error:
-            pytest.fail(f"{block}: {error}")
+            wrong.append(f"{block}: {error}")
+    assert not wrong, "\n".join(wrong)
 
 
 def test_blocks_say_their_language() -> None:
@@ -101,32 +106,29 @@ def commands() -> list[tuple[str, str]]:
 
 
 @cache
-def help_of(module: str, *subcommand: str) -> str:
-    arguments = [sys.executable, "-m", module, *subcommand, "--help"]
-    shown = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert shown.returncode == 0, shown.stderr
-    return shown.stdout
+def help_of(program: str, subcommand: str) -> str:
+    shown = CliRunner().invoke(cli if program == "scenelang" else command_of_lab, [subcommand, "--help"])
+    assert shown.exit_code == 0, shown.output
+    return shown.output
 
 
-@pytest.mark.parametrize(("place", "command"), commands())
-def test_commands_name_what_exists(place: str, command: str) -> None:
+def test_commands_name_what_exists() -> None:
     """Scripts and files exist; subcommands and options are ones that `scenelang` or the laboratory has."""
-    words = shlex.split(command)
-    output = {words[i + 1] for i, word in enumerate(words[:-1]) if word == "-o"}
-    for word in words[1:]:
-        if word.startswith(("examples/", "docs/", "tests/", "lab/", ".ci/")) and word not in output:
-            assert (ROOT / word).exists(), f"{place}: {word}"
-    program = words[0].removeprefix(VENV)
-    assert program in {"python3", "python", "pip", "pytest", "ruff", "mypy", "bash", "git", "scenelang"}, (
-        place
-    )
-    if program == "scenelang" or words[1:3] == ["-m", "lab"]:
-        first = 1 if program == "scenelang" else 3
-        options = help_of("scenelang" if program == "scenelang" else "lab", words[first])
-        for word in words[first + 1 :] if words[first] not in ("bench", "docs") else ():
-            if re.match(r"-{1,2}[A-Za-z]", word):
-                name = word.partition("=")[0]
-                assert re.search(rf"(?<!\S){re.escape(name)}\b", options), f"{place}: {word}"
+    for place, command in commands():
+        words = shlex.split(command)
+        output = {words[i + 1] for i, word in enumerate(words[:-1]) if word == "-o"}
+        for word in words[1:]:
+            if word.startswith(("examples/", "docs/", "tests/", "lab/", ".ci/")) and word not in output:
+                assert (ROOT / word).exists(), f"{place}: {word}"
+        program = words[0].removeprefix(VENV)
+        assert program in PROGRAMS, place
+        if program == "scenelang" or words[1:3] == ["-m", "lab"]:
+            first = 1 if program == "scenelang" else 3
+            options = help_of("scenelang" if program == "scenelang" else "lab", words[first])
+            for word in words[first + 1 :] if words[first] not in ("bench", "docs") else ():
+                if re.match(r"-{1,2}[A-Za-z]", word):
+                    name = word.partition("=")[0]
+                    assert re.search(rf"(?<!\S){re.escape(name)}\b", options), f"{place}: {word}"
 
 
 @pytest.mark.parametrize("block", [b for b in of("python") if b.page == "README.md"], ids=str)
@@ -150,19 +152,17 @@ def headings(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_somewhere(page: Path) -> None:
-    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
-    text = re.sub(r"`[^`\n]*`", "", text)
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if re.match(r"https?://", target):
-            continue
-        path, _, anchor = target.partition("#")
-        goal = (page.parent / path).resolve() if path else page
-        assert goal.exists(), f"{page.name}: {target}"
-        assert goal.is_relative_to(ROOT), f"{page.name}: {target}"
-        if anchor:
-            assert anchor in headings(goal), f"{page.name}: {target}"
+def test_links_lead_somewhere() -> None:
+    for page in PAGES:
+        text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+        for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", text)):
+            if re.match(r"https?://", target):
+                continue
+            path, _, anchor = target.partition("#")
+            goal = (page.parent / path).resolve() if path else page
+            assert goal.exists(), f"{page.name}: {target}"
+            assert goal.is_relative_to(ROOT), f"{page.name}: {target}"
+            assert not anchor or anchor in headings(goal), f"{page.name}: {target}"
 
 
 def test_ci_runs_the_commands_of_the_readme() -> None:
@@ -199,7 +199,7 @@ def test_every_example_is_shown() -> None:
 
 
 def test_every_transform_operator_and_colour_is_pictured() -> None:
-    """What the language has and a shipped model can draw."""
+    """All that a shipped model can draw."""
     page = (ROOT / "docs/language.md").read_text("utf-8")
     manifest = load_manifest("shapes2d")
     colours = {"color", "grayscale", "hue"}  # the texture transforms have nothing to move in `flat`
@@ -243,6 +243,7 @@ def build_site(folder: Path) -> None:
     assert built.returncode == 0, built.stderr
 
 
+@pytest.mark.more
 def test_site_is_built(tmp_path: Path) -> None:
     """Nothing in it is fetched from elsewhere."""
     build_site(tmp_path)

@@ -42,7 +42,7 @@ _OTHERS = {"python3", "python", "pip", "git", "mkdocs"}  # parsed by test_docs.p
 
 
 def run(arguments: list[str]) -> tuple[int, str]:
-    """What a command exits with and prints."""
+    """A command's exit code and output."""
     data, code = io.BytesIO(), 0
     printed = io.TextIOWrapper(data, "utf-8", write_through=True)
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):

@@ -1,4 +1,4 @@
-"""What the package asks for is open upwards, and what it was tested with is pinned."""
+"""Requirements are open upwards, and the versions that were tested are pinned."""
 
 from __future__ import annotations
 

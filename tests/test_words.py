@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 from lab.docs.make_words import made
-from scenelang.assets.textures import load_textures
+from scenelang.assets.zoo import load_textures
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.editors.highlighting import OPERATORS
 from scenelang.language import modifiers, values, words
@@ -42,20 +40,17 @@ def test_everything_called_has_a_meaning() -> None:
     assert (*load_textures(),) == words.TEXTURES
 
 
-CALLED = words.FUNCTIONS | words.TRANSFORMS | words.OPERATIONS | words.SETTINGS
-
-
-@pytest.mark.parametrize("word", CALLED.values(), ids=CALLED)
-def test_heads_show_the_parameters(word: words.Word) -> None:
+def test_heads_show_the_parameters() -> None:
     """In their order, the optional ones in brackets or with a default, unless the head is an example."""
-    assert len(word.about) in (0, len(word.params))
-    assert 0 <= word.required <= len(word.params)
-    if word.name not in ("shear", "matrix"):
-        shown = re.sub(r" = \w+", "", word.head[word.head.rindex("(") :])
-        assert tuple(re.findall(r"\w+", shown)) == word.params
-        needed = re.split(r"\[|, \w+ = ", word.head[word.head.rindex("(") :])[0]
-        assert tuple(re.findall(r"\w+", needed)) == word.params[: word.required]
-        assert word.variadic == word.head.endswith("…)")
+    for word in (words.FUNCTIONS | words.TRANSFORMS | words.OPERATIONS | words.SETTINGS).values():
+        assert len(word.about) in (0, len(word.params)), word.name
+        assert 0 <= word.required <= len(word.params), word.name
+        if word.name not in ("shear", "matrix"):
+            head = word.head[word.head.rindex("(") :]
+            assert tuple(re.findall(r"\w+", re.sub(r" = \w+", "", head))) == word.params
+            needed = re.split(r"\[|, \w+ = ", head)[0]
+            assert tuple(re.findall(r"\w+", needed)) == word.params[: word.required]
+            assert word.variadic == word.head.endswith("…)"), word.name
 
 
 def test_what_is_made_of_them_is_current() -> None:

@@ -1,4 +1,4 @@
-"""How much work a function does: counted, as seconds hang on the machine and on what else it does."""
+"""Work of a function: counted, as seconds hang on the machine and on what else it does."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KILLED_S = 120
 
 
 def lines_run(function: Callable[[], object]) -> int:
-    """How many lines of Python a call runs in this thread, loops counted each time round.
+    """Number of lines of Python that a call runs in this thread, loops counted each time round.
 
     The number is the same each time, but for what is only done at the first call: imports and caches. Work
     inside of C, as that of a regular expression, is not in it; `ends` is for that.

@@ -20,8 +20,7 @@ from PIL import Image as Pillow
 
 from scenelang.assets.files import write_whole
 from scenelang.assets.picture import painted
-from scenelang.assets.textures import FILE
-from scenelang.assets.zoo import zoo_bytes
+from scenelang.assets.zoo import TEXTURES_FILE, zoo_bytes
 
 ABOUT: dict[str, str | float] = {"license": "MIT", "source": "docs/make_textures.py of scenelang"}
 SIDE = 256  # texels
@@ -327,4 +326,4 @@ if __name__ == "__main__":
         sheet().save(sys.argv[2])
     else:
         made = [painted(name, drawn(name), ABOUT) for name in TEXTURES]
-        write_whole(FILE, zoo_bytes(made))
+        write_whole(TEXTURES_FILE, zoo_bytes(made))

@@ -75,11 +75,7 @@ def _around(near: npt.NDArray[np.bool_], apart: int) -> npt.NDArray[np.bool_]:
 
 
 def unpacked(element: Element) -> Grid:
-    """The colours (3, n, n, n), 0 to 1; any bytes give finite numbers.
-
-    Raises:
-        TensorError: the element is damaged.
-    """
+    """The colours (3, n, n, n), 0 to 1; any bytes give finite numbers. Raises `TensorError` for damage."""
     flat, first, grid = np.frombuffer(element.inflated(), np.int8), 0, None
     widths = _widths(element)
     for side in element.sides:

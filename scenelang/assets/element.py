@@ -18,17 +18,11 @@ TEXELS: Final = 256  # along the longer side of one that is learned, where nothi
 
 
 class Form(NamedTuple):
-    """Form of elements: the fields of a header and the codings of the bytes.
+    """Form of elements."""
 
-    Args:
-        sizes: names of its numbers in headers.
-        codings: codings of its bytes; the first is the default of a header without one.
-        kinds: its names in manifests, by dimension.
-    """
-
-    sizes: tuple[str, ...]
-    codings: tuple[str, ...]
-    kinds: dict[int, str]
+    sizes: tuple[str, ...]  # names of its numbers in headers
+    codings: tuple[str, ...]  # of its bytes; the first is the default of a header without one
+    kinds: dict[int, str]  # its names in manifests, by dimension
 
 
 FORMS: Final = {
@@ -165,23 +159,14 @@ Painted = tuple[()] | tuple[float, float, float]  # a colour of sRGB, 0 to 1, or
 
 
 class Part(NamedTuple):
-    """A geometry, where it lies in the unit ball or disc of the whole, and what it looks like.
+    """A geometry, where it lies in the unit ball or disc of the whole, and its look."""
 
-    Args:
-        geometry: its name in the file.
-        place: of its middle.
-        size: of its unit ball or disc.
-        turn: rows of a rotation or reflection that is applied first; empty for none.
-        color: sRGB, 0 to 1; empty for none.
-        material: the name of one in the file; empty for none.
-    """
-
-    geometry: str
-    place: _Numbers
-    size: float
-    turn: tuple[_Numbers, ...] = ()
+    geometry: str  # its name in the file
+    place: _Numbers  # of its middle
+    size: float  # of its unit ball or disc
+    turn: tuple[_Numbers, ...] = ()  # rows of a rotation or reflection that is applied first; empty for none
     color: Painted = ()
-    material: str = ""
+    material: str = ""  # the name of one in the file; empty for none
 
 
 Group = tuple[Part, ...]  # in the order of painting
@@ -190,25 +175,21 @@ Group = tuple[Part, ...]  # in the order of painting
 def read_group(
     name: str, entry: Any, geometries: Mapping[str, Element], materials: Mapping[str, Element]
 ) -> Group:
-    """Read a group from its entry in a header.
-
-    Raises:
-        TensorError: it is damaged, too large, or has what the file does not hold.
-    """
+    """Read a group from its entry in a header; raises `TensorError`."""
     if not (name.isascii() and name.isidentifier()):
         raise TensorError(f"a group has the name {name[:40]!r}")
     if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:
         raise TensorError(f"group `{name}` is not a list of 1 to {MOST_PARTS} parts")
     group: list[Part] = []
     for fields in entry:
-        if not isinstance(fields, dict) or not {"geometry", "place", "size"} <= fields.keys() <= _FIELDS:
+        if not isinstance(fields, dict) or not {"geometry", "place", "size"} <= fields.keys() <= {
+            *Part._fields
+        }:
             raise TensorError(f"a part of group `{name}` has missing or unknown fields")
         part = Part(**{key: _frozen(value) for key, value in fields.items()})
         shape = geometries.get(part.geometry) if isinstance(part.geometry, str) else None
-        if (
-            shape is None
-            or shape.dimension != geometries[group[0].geometry if group else shape.name].dimension
-        ):
+        first = geometries[group[0].geometry] if group else shape
+        if shape is None or first is None or shape.dimension != first.dimension:
             raise TensorError(f"group `{name}` has a part that is not a geometry of its dimension")
         worn = materials.get(part.material) if isinstance(part.material, str) else None
         if part.material and (worn is None or worn.dimension > shape.dimension):
@@ -217,9 +198,6 @@ def read_group(
             raise TensorError(f"group `{name}` has numbers out of range")
         group.append(part)
     return tuple(group)
-
-
-_FIELDS: Final = frozenset(Part._fields)
 
 
 def told(group: Group) -> str:

@@ -14,8 +14,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
+# Places where shells put the pipes of ``<(…)``; somebody writes to them.
 _PIPES: Final = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
-"""Where shells put the pipes of ``<(…)``; somebody writes to them."""
 _FLAGS: Final = sum(getattr(os, f"O_{name}", 0) for name in ("NOFOLLOW", "NONBLOCK", "CLOEXEC", "BINARY"))
 _INPUTS: Final[ContextVar[set[str] | None]] = ContextVar("inputs", default=None)
 _JSON_DEPTH: Final = 64

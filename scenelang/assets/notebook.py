@@ -1,8 +1,4 @@
-"""Scenes and Programs as notebooks show them.
-
-This module comes before the renderers in the order of the package. So it imports the public `render` and the
-viewer by name when a notebook asks.
-"""
+"""Scenes and Programs as notebooks show them; renderers come later, so they are imported by name."""
 
 from __future__ import annotations
 
@@ -32,10 +28,7 @@ def set_notebook(shows: Shows) -> None:
 
 
 def bundle(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
-    """Representations of a value by media type: a viewer, a picture, text; never raises.
-
-    Frontends choose the richest that they support and trust.
-    """
+    """Representations of a value by media type: a viewer, a picture, text; never raises."""
     width, height = canvas
     text = f"{said}, {width} × {height} pixels"
     if width * height > MOST_PIXELS:

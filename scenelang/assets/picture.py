@@ -24,11 +24,7 @@ _SEQUENCE, _FRAME, _BEGIN = b"\x0a", b"\x32", b"\x12\x00"  # headers of units th
 
 
 def frame_of(avif: bytes) -> bytes:
-    """The sequence header and the frame in an AVIF file of one picture, as Pillow writes it.
-
-    Raises:
-        ValueError: it is not laid out so.
-    """
+    """The sequence header and the frame in an AVIF file of one picture; raises `ValueError` without one."""
     at = 0
     while at + 8 <= len(avif):
         size, kind = struct.unpack_from(">I4s", avif, at)
@@ -39,11 +35,7 @@ def frame_of(avif: bytes) -> bytes:
 
 
 def size_of(data: bytes) -> tuple[int, int]:
-    """Height and width of the one frame, of 8 bits and as many samples of colour as of light.
-
-    Raises:
-        ValueError: it is another kind of picture, or more than one.
-    """
+    """Height and width of the one frame, 8 bits, 4:4:4; raises `ValueError` for another kind of picture."""
     sequence, rest = _unit(data, _SEQUENCE)
     _, more = _unit(rest, _FRAME)
     if more:
@@ -70,11 +62,7 @@ def _unit(data: bytes, header: bytes) -> tuple[bytes, bytes]:
 
 
 def contained(data: bytes) -> bytes:
-    """The AVIF file of a frame.
-
-    Raises:
-        ValueError: as `size_of`.
-    """
+    """The AVIF file of a frame; raises as `size_of`."""
     height, width = size_of(data)
     level = (int.from_bytes(data[2:4]) >> 6) & 31
     properties = (
@@ -112,11 +100,7 @@ _FILES: Final = {"webp": "WEBP", "av1": "AVIF"}
 
 
 def pixels(element: Element) -> bytes:
-    """Red, green and blue, 8 bits, of each texel of a picture, row after row from the top.
-
-    Raises:
-        TensorError: the bytes are damaged, or those of another picture than the sizes tell.
-    """
+    """RGB, 8 bits, of each texel, row after row from the top; raises `TensorError` for another picture."""
     from PIL import Image
 
     height, width = element.sizes

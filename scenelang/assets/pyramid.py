@@ -102,11 +102,7 @@ def has_finer(element: Element) -> bool:
 
 
 def unpacked(element: Element) -> Grid:
-    """The finest grid of an element, as it is drawn; any bytes give finite numbers.
-
-    Raises:
-        TensorError: the element is damaged.
-    """
+    """The finest grid of an element, as it is drawn; any bytes give finite numbers. Raises `TensorError`."""
     flat, first, grid = np.frombuffer(element.inflated(), np.int8), 0, None
     for side in element.sides:
         shape = (side,) * element.dimension

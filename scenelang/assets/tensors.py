@@ -1,8 +1,7 @@
 """Files of tensors, read as a stranger's: safetensors with a JSON header of ours.
 
-Programs, weights and checkpoints are such files. A file is checked before anything is read from it: no key
-occurs twice, each tensor has a type, a shape and bytes that agree, and the tensors fill the file without a
-gap.
+A file is checked before anything is read from it: no key occurs twice, each tensor has a type, a shape and
+bytes that agree, and the tensors fill the file without a gap.
 """
 
 from __future__ import annotations
@@ -69,11 +68,7 @@ class TensorFile:
 
 
 def read_tensors(data: bytes, most_bytes: int, formats: Collection[int] = (FORMAT,)) -> TensorFile:
-    """The tensors and the header in the bytes of a file, or in its first ``most_bytes`` + 1.
-
-    Raises:
-        TensorError: the file is larger than ``most_bytes``, damaged or not one of ours.
-    """
+    """The tensors and the header in a file's bytes; raises `TensorError` for a damaged or too large one."""
     if len(data) > most_bytes:
         raise TensorError(f"more than {most_bytes:,} bytes")
     length = int.from_bytes(data[:8], "little")

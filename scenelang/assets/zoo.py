@@ -24,6 +24,7 @@ from scenelang.assets.picture import pixels
 from scenelang.assets.tensors import Tensor, TensorError, read_tensors
 
 SUFFIX: Final = ".safetensors"
+TEXTURES_FILE: Final = Path(__file__).with_name("textures.safetensors")
 MOST_BYTES: Final = 32 << 20
 MOST_ELEMENTS: Final = 1000
 MOST_HELD: Final = 128 << 20  # bytes that all elements of a file take unpacked
@@ -54,14 +55,14 @@ class Zoo:
 
 
 def load_zoo(path: str | Path) -> Zoo:
-    """Read a file of elements.
-
-    Raises:
-        OSError: it cannot be read.
-        TensorError: it is damaged, foreign or hostile.
-    """
+    """Read a file of elements; raises `OSError`, or `TensorError` for a damaged or hostile one."""
     stat = os.stat(path)
     return _load(os.fspath(path), stat.st_mtime_ns, stat.st_size, stat.st_ino)
+
+
+def load_textures() -> dict[str, Element]:
+    """The sixteen textures that ship, by name, materials of every model; raises as `load_zoo`."""
+    return load_zoo(TEXTURES_FILE).materials
 
 
 @lru_cache(maxsize=16)
@@ -75,11 +76,7 @@ _TABLES: Final = {"elements": "", "materials": "material."}
 
 
 def read_zoo(data: bytes) -> Zoo:
-    """The elements in the bytes of a file; every one is unpacked once, so that none is damaged.
-
-    Raises:
-        TensorError: the bytes are not those of such a file.
-    """
+    """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
     file = read_tensors(data, MOST_BYTES, (1, 2))
     known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
     tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
@@ -104,11 +101,7 @@ def read_zoo(data: bytes) -> Zoo:
 
 
 def read_elements(listed: Iterable[tuple[str, Any, Tensor]], body: memoryview) -> tuple[Element, ...]:
-    """The elements of names, header entries and tensors of a file; each is unpacked once as a check.
-
-    Raises:
-        TensorError: they are damaged, do not agree, or are more than can be held.
-    """
+    """The elements of names, header entries and tensors of a file; raises as `read_zoo`."""
     result, held = [], 0
     for name, entry, tensor in listed:
         element = _element(name, entry, tensor, body)

@@ -1,51 +1,38 @@
-"""Scenes that the command line names, and options that several commands share."""
+"""Scenes and compiled programs that the command line names, read, evaluated and compiled."""
 
 from __future__ import annotations
 
-import math
-import os
-import re
 import sys
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import field, replace
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import click
 
 from scenelang.assets.files import note_input
 from scenelang.assets.records import Record
-from scenelang.cli.say import Clock
-from scenelang.drawing.how import CHOICES, DEFAULT, HELP, How
+from scenelang.cli.files import PROGRAM, STDIN
+from scenelang.cli.main import describe
+from scenelang.cli.options import Request
+from scenelang.cli.say import Clock, say_diagnostics, say_trouble
+from scenelang.compiler.compile import compile_scene
+from scenelang.drawing.how import DEFAULT, How
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
-from scenelang.language.evaluation import Evaluation, Source, report_unreadable
+from scenelang.language.evaluation import Evaluation, report_unreadable
 from scenelang.language.library import SpanMap
 from scenelang.language.limits import MAX_BYTES
+from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 from scenelang.language.session import Defines, Unreadable, decode_source, read_source
+from scenelang.language.words import COMBINE
 
 if TYPE_CHECKING:
     from scenelang.compiler.graph import Graph
     from scenelang.compiler.program import Program
-
-
-STDIN = "-"
-JSON = ".json"
-
-
-class Request(Record):
-    """Options of the command line that hold for every scene."""
-
-    source: Source  # all but its text; values for params are shared by all scenes
-    frame: int | None = None  # of an animation, to be drawn as a picture
-
-    def named(self) -> dict[str, Any]:
-        """The same by the names that `scenelang.load` has for them."""
-        given = self.source
-        own = {"params": given.values, "model": given.model, "root": given.root, "size": given.size}
-        return {**own, "frame": self.frame or 0}
 
 
 class Input(Record, frozen=False):
@@ -67,11 +54,6 @@ class Input(Record, frozen=False):
     def failed(self, strict: bool = False) -> bool:
         """True where there is nothing to draw."""
         return self.trouble is not None or any(d.severity == "error" or strict for d in self.diagnostics)
-
-
-def stem_of(name: str) -> str:
-    """The stem of names of files that are made from a scene."""
-    return "stdin" if name == STDIN else Path(name).stem
 
 
 def read_text(name: str, diagnostics: Diagnostics) -> SourceFile | None:
@@ -103,7 +85,7 @@ def read_input(
         return result
     path, root = (None, ".") if name == STDIN else (name, None)
     source = replace(request.source, path=path, text=text, root=request.source.root or root)
-    if name.endswith(JSON) or (path is None and text.text.lstrip()[:1] == "{"):
+    if name.endswith(".json") or (path is None and text.text.lstrip()[:1] == "{"):
         from scenelang.language.scene import load_json
 
         if frame:
@@ -132,8 +114,7 @@ def read_input(
 def unused_defines(request: Request) -> list[Diagnostic]:
     """An error for every ``-D`` that no scene read so far has a param for."""
     result = Diagnostics()
-    params = request.source.params
-    if isinstance(params, Defines):
+    if isinstance(params := request.source.params, Defines):
         params.report_unused(result)
     return result.items
 
@@ -146,182 +127,124 @@ def merged(parts: list[list[Diagnostic]]) -> Diagnostics:
     return result
 
 
-Color = Literal["auto", "always", "never"]
+def compile_input(job: Input, request: Request, clock: Clock, graphs: bool = False) -> None:
+    """Compile a scene without errors that the reference does not draw; raises `OSError` without weights."""
+    if job.scene is None or job.how.backend == "reference":
+        return
+    from scenelang.compiler.compile import why_chosen
+
+    with suppress(SceneError), clock("compile"):  # its diagnostics are the input's
+        after = job.graphs.__setitem__ if graphs else None
+        job.program = compile_scene(job.scene, spans=job.spans, diagnostics=job.diagnostics, after=after)
+        job.notes = program_notes(job.program, why_chosen(job.scene, request.source.model is not None))
 
 
-class Sectioned(click.Command):
-    """A command whose help shows its options under headings.
+def prepare_all(
+    files: Sequence[str],
+    request: Request,
+    clock: Clock,
+    how: How = DEFAULT,
+    *,
+    strict: bool = False,
+    graphs: bool = False,
+    stored: str | None = None,
+    first: Input | None = None,
+) -> tuple[list[Input | None], int]:
+    """Every input read and compiled, None where it cannot be read; reports mistakes.
 
     Args:
-        sections: options by headings; the others come first.
+        strict: warnings count as errors.
+        graphs: keep the graph after each pass.
+        stored: why compiled programs are refused, if they are.
+        first: the only one, where it was read before.
+
+    Returns:
+        The inputs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
     """
-
-    def __init__(self, *arguments: Any, sections: Mapping[str, str], **given: Any) -> None:
-        super().__init__(*arguments, **given)
-        self.sections = sections
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        heading = {name: title for title, names in self.sections.items() for name in names.split()}
-        result: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Options", *self.sections)}
-        for param in self.get_params(ctx):
-            if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
-                result[heading.get(max(param.opts, key=len), "Options")].append(record)
-        for title, records in result.items():
-            with formatter.section(title):
-                formatter.write_dl(records)
-
-
-def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    if value is None:
-        return None
-    result = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
-    if result is None:
-        raise click.BadParameter(f"`{value}` is not a size such as 320x192", ctx, param)
-    width, height = int(result[1]), int(result[2])
-    if not (1 <= width <= 8192 and 1 <= height <= 8192):
-        raise click.BadParameter(f"`{value}` has a side outside 1..8192", ctx, param)
-    return width, height
+    inputs: list[Input | None] = []
+    code = 0
+    for name in files:
+        try:
+            if name.endswith(PROGRAM):
+                result = _stored(name, request, clock, how)
+                result.trouble = stored or result.trouble
+            else:
+                result = first or read_input(name, request, clock, how)
+                compile_input(result, request, clock, graphs)
+        except OSError as error:
+            say_trouble(describe(error))
+            inputs.append(None)
+            code = 2
+            continue
+        if result.trouble is not None:
+            say_trouble(f"{name}: {result.trouble}")
+        inputs.append(result)
+    read = [result for result in inputs if result is not None]
+    unused = unused_defines(request) if read else []
+    say_diagnostics(merged([*(result.diagnostics.items for result in read), unused]))
+    if unused:
+        return [None] * len(inputs), max(code, 1)
+    return inputs, max(code, int(any(result.failed(strict) for result in read)))
 
 
-def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """A dictionary from an option NAME=VALUE that may be given several times."""
-    result: dict[str, str] = {}
-    for value in values:
-        name, equals, text = value.partition("=")
-        if not equals or not re.fullmatch(r"[A-Za-z_][\w.]*", name.strip()):
-            raise click.BadParameter(f"`{value}` is not NAME=value", ctx, param)
-        result[name.strip()] = text.strip()
+def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
+    """Compile the one scene of a command, keep its graphs and report its mistakes.
+
+    Raises:
+        OSError: it cannot be read, or a model has no weights.
+        click.UsageError: it is a compiled program.
+    """
+    if name.endswith(PROGRAM):
+        raise click.UsageError(f"`{name}` is a compiled program already.")
+    clock = clock or Clock()
+    result = read_input(name, request, clock)
+    compile_input(result, request, clock, graphs=True)
+    result.diagnostics.items.extend(unused_defines(request))
+    say_diagnostics(result.diagnostics)
     return result
 
 
-def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    return Defines(assignments(ctx, param, values))
+def _stored(name: str, request: Request, clock: Clock, how: How) -> Input:
+    """A compiled program."""
+    from scenelang.compiler.program import ProgramError, load_program
+
+    result, size, model = Input(name, how), request.source.size, request.source.model
+    try:
+        with clock("load program"):
+            program = load_program(Path(name))
+    except ProgramError as error:
+        result.trouble = str(error)
+        return result
+    if model not in (None, program.model):
+        result.trouble = f"compiled for model `{program.model}`, not `{model}`"
+    elif request.frame:
+        result.trouble = f"a program is a single frame, and --frame asks for {request.frame}"
+    elif size is not None:
+        (width, height), (old_width, old_height) = size, program.canvas
+        if width * old_height != height * old_width:
+            old = f"the {old_width}x{old_height} it was compiled for"
+            advice = "objects outside it are gone: compile the scene again"
+            result.trouble = f"{width}x{height} has another shape than {old}; {advice}"
+        program = replace(program, canvas=size)
+    result.program, result.notes = program, program_notes(program, "named by the program")
+    return result
 
 
-def _originals(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
-    if value is not None:  # as every process that draws frames sees it
-        os.environ["SCENELANG_ORIGINALS"] = value
+def program_notes(program: Program, why: str) -> list[str]:
+    """Lines about a compiled scene."""
+    from scenelang.compiler.groups import OPERATOR
+
+    shapes = Counter(program.objects)
+    words = Counter((program.tokens & OPERATOR).tolist())
+    width, height = program.canvas
+    return [
+        f"{width} x {height} pixels, model {program.model} ({why}), weights {program.weights[:12]}",
+        f"objects: {len(program)}" + _counts(shapes),
+        "tokens: " + (_counts({COMBINE[t]: n for t, n in sorted(words.items())})[2:-1] or "none"),
+    ]
 
 
-def choice(*names: str, words: str, help: str) -> Callable[..., Any]:
-    """An option that takes one of some words, the first of them by default."""
-    known = words.split()
-    return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
-
-
-class Real(click.FloatRange):
-    """A number in a range, within whose bounds `nan` would be too."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = float(super().convert(value, param, ctx))
-        if math.isnan(number):
-            self.fail(f"`{value}` is not a number.", param, ctx)
-        return number
-
-
-define = click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    callback=_defines,
-    help="Set a param of the scene; may be given several times.",
-)
-model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
-root = click.option(
-    "--root",
-    type=click.Path(exists=True, file_okay=False),
-    help="Folder that imports cannot leave; by default the scene's.",
-)
-size = click.option(
-    "--size", metavar="WxH", callback=_size, help="Canvas size in pixels instead of the scene's."
-)
-frame = click.option(
-    "--frame",
-    type=click.IntRange(0),
-    metavar="N",
-    help="Frame of the animation, from 0; as a picture, which is drawn alone.",
-)
-frames = click.option(
-    "--frames",
-    metavar="A..B",
-    help="Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
-)
-fps = click.option(
-    "--fps",
-    type=Real(0, 1000, min_open=True),
-    metavar="N",
-    help="Frames a second instead of the scene's; the length in seconds stays.",
-)
-out = click.option("-o", "--out", metavar="OUT", help="File to write instead of standard output.")
-color = choice(
-    "--color",
-    words="auto always never",
-    help="Colour what is printed; auto does so on terminals, unless NO_COLOR is set.",
-)
-strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
-originals = click.option(
-    "--originals",
-    type=click.Path(exists=True, file_okay=False),
-    metavar="FOLDER",
-    expose_value=False,
-    callback=_originals,
-    help="Folder with the files that elements were made from, which exact pictures need; by "
-    "default that of the elements.",
-)
-jobs = click.option(
-    "--jobs",
-    type=click.IntRange(1, 256),
-    metavar="N",
-    help="Processes that draw frames; by default one, and more where that is faster.",
-)
-cluster = click.option(
-    "--cluster",
-    metavar="ADDRESS",
-    help="Address of a dask scheduler whose workers do the work, or local for workers on this machine.",
-)
-verbose = click.option("-v", "--verbose", is_flag=True, help="Say what was compiled and where the time went.")
-
-
-def request(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Options to read scenes by, -D, --size, --frame, --model and --root, handed over as a `Request`."""
-
-    @define
-    @size
-    @frame
-    @model
-    @root
-    @wraps(command)
-    def with_request(*arguments: Any, **given: Any) -> Any:
-        frame, params = given.pop("frame"), given.pop("defines")
-        own = {name: given.pop(name) for name in ("model", "root", "size")}
-        return command(*arguments, request=Request(Source(params=params, **own), frame), **given)
-
-    return with_request
-
-
-def _field(name: str) -> Callable[..., Any]:
-    """The option for a field of `How`."""
-    if name in CHOICES:
-        return choice(f"--{name}", words=" ".join(CHOICES[name]), help=HELP[name])
-    return click.option(f"--{name}", type=click.IntRange(1), metavar="N", help=HELP[name])
-
-
-device, threads = _field("device"), _field("threads")
-
-
-def drawing(*names: str) -> Callable[..., Any]:
-    """Options for these fields of `How`, all by default, handed over as ``how``."""
-    fields = names or How._fields
-
-    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
-        @wraps(command)
-        def with_how(*arguments: Any, **given: Any) -> Any:
-            how = How(**{name: given.pop(name) for name in fields})
-            return command(*arguments, how=how.checked(), **given)
-
-        for name in reversed(fields):
-            with_how = _field(name)(with_how)
-        return with_how
-
-    return with_options
+def _counts(counts: dict[str, int]) -> str:
+    """`` (2 star, 1 square)``, or nothing."""
+    listed = ", ".join(f"{number} {name}" for name, number in counts.items())
+    return f" ({listed})" if listed else ""

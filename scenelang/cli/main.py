@@ -5,18 +5,18 @@ from __future__ import annotations
 import importlib
 import io
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import MappingProxyType
 from typing import Any, Final
 
 import click
 
 from scenelang.assets.files import NotWritten, inputs_kept
+from scenelang.cli.say import say_diagnostics
 from scenelang.drawing.how import RenderError
+from scenelang.language.reports import SceneError
 
-# Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called; a dash
-# is an underscore there.
+# Command -> what `--help` says. Each is `command` in a file of its name, imported when it is called.
 COMMANDS: Final = {
     "render": "Draw scenes or compiled programs.",
     "sweep": "Draw a scene with many values of its params.",
@@ -42,8 +42,6 @@ GROUPS: Final = {
     "Measure": "compare dump models",
     "Develop": "compile schema lsp",
 }
-"""Commands as `--help` lists them; those for the development of scenelang itself it leaves out."""
-ELSEWHERE: Final = {"sweep": "scenelang.cli.animation"}  # commands whose modules do not lie among the others
 MOVED: Final = {
     "explain-plan": "is now `scenelang dump --costs`",
     "graph": "is now `scenelang dump --format mmd`",
@@ -59,53 +57,6 @@ class Trouble(click.ClickException):
     """An error that is neither a scene's mistake nor a bug: an unreadable file, a missing device."""
 
     exit_code = 2
-
-
-class Commands(click.Group):
-    """Commands that are imported when they are called."""
-
-    def __init__(
-        self,
-        *,
-        package: str,  # that their files lie in
-        table: Mapping[str, str],  # command -> what `--help` says
-        elsewhere: Mapping[str, str] = MappingProxyType({}),  # modules of commands that do not lie there
-        moved: Mapping[str, str] = MappingProxyType({}),  # what commands of earlier versions answer with
-        groups: Mapping[str, str] = MappingProxyType({}),  # those that `--help` lists, by headings
-        **options: Any,
-    ) -> None:
-        super().__init__(**options)
-        self.package, self.table, self.elsewhere, self.moved = package, table, elsewhere, moved
-        self.groups = groups or {"Commands": " ".join(table)}
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.table)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in self.table:
-            return None
-        module = self.elsewhere.get(cmd_name, f"{self.package}.{cmd_name.replace('-', '_')}")
-        command: click.Command = importlib.import_module(module).command
-        return command
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        widest = max(map(len, self.table))  # so that all groups have their words in one column
-        for title, names in self.groups.items():
-            with formatter.section(title):
-                formatter.write_dl([(name.ljust(widest), self.table[name]) for name in names.split()])
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in self.table and not args[0].startswith("-"):
-            from difflib import get_close_matches
-
-            if args[0] in self.moved:
-                ctx.fail(f"`{args[0]}` {self.moved[args[0]]}.")
-            near = get_close_matches(args[0], self.table, 1)
-            advice = f" Did you mean `{near[0]}`?" if near else ""
-            ctx.fail(f"No such command `{args[0]}`.{advice}")
-        return super().resolve_command(ctx, args)
 
 
 class Reporting(click.Group):
@@ -124,7 +75,6 @@ class Reporting(click.Group):
 
 @contextmanager
 def _reporting() -> Iterator[None]:
-    """Report errors in one line, unless they are bugs."""
     try:
         yield
     except KeyboardInterrupt:
@@ -135,6 +85,9 @@ def _reporting() -> Iterator[None]:
         raise Trouble(describe(error)) from None
     except RenderError as error:
         raise Trouble(str(error)) from None
+    except SceneError as error:
+        say_diagnostics(error.diagnostics)
+        raise click.exceptions.Exit(1) from None
     except (click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
         raise
     except Exception as error:
@@ -147,8 +100,36 @@ def _reporting() -> Iterator[None]:
         raise
 
 
-class _Commands(Reporting, Commands):
-    """The commands of this package."""
+class Commands(Reporting):
+    """The commands of this package, each imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"scenelang.cli.commands.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        widest = max(map(len, COMMANDS))  # so that all groups have their words in one column
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(widest), COMMANDS[name]) for name in names.split()])
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            if args[0] in MOVED:
+                ctx.fail(f"`{args[0]}` {MOVED[args[0]]}.")
+            near = get_close_matches(args[0], COMMANDS, 1)
+            advice = f" Did you mean `{near[0]}`?" if near else ""
+            ctx.fail(f"No such command `{args[0]}`.{advice}")
+        return super().resolve_command(ctx, args)
 
 
 def describe(error: OSError) -> str:
@@ -159,15 +140,7 @@ def describe(error: OSError) -> str:
     return f"{error.filename}: {reason}" if error.filename else reason
 
 
-@click.group(
-    cls=_Commands,
-    package="scenelang.cli.commands",
-    table=COMMANDS,
-    elsewhere=ELSEWHERE,
-    moved=MOVED,
-    groups=GROUPS,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="scenelang", message="%(prog)s %(version)s")
 def cli() -> None:
     """Draw 2D and 3D scenes, written as text, with trained neural networks.

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import IO, TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from scenelang.assets.files import write_output
 from scenelang.language.diagnostics import Diagnostic
+from scenelang.language.reports import WIDTH, paint, printable, render_text
 
 if TYPE_CHECKING:
     from rich.progress import Progress
-
-SUFFIX: Final = ".nsg"
-
 
 _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
@@ -37,8 +37,6 @@ def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
 
 def width_of(stream: IO[Any]) -> int:
     """Cells of a line: the terminal's, or enough for most where there is none."""
-    from scenelang.language.reports import WIDTH
-
     if not stream.isatty():
         return WIDTH
     return shutil.get_terminal_size((WIDTH, 24)).columns
@@ -46,8 +44,6 @@ def width_of(stream: IO[Any]) -> int:
 
 def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics for people, with carets, to standard error."""
-    from scenelang.language.reports import render_text
-
     text = render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr))
     if text:
         click.echo(text, err=True, nl=False, color=True)
@@ -63,8 +59,6 @@ def put_out(result: str | bytes, out: str | None) -> None:
     if out is None or out == "-":
         click.echo(result, nl=False)
         return
-    from scenelang.assets.files import write_output
-
     write_output(out, result.encode() if isinstance(result, str) else result)
 
 
@@ -75,32 +69,26 @@ def need_metrics() -> None:
             raise click.UsageError(f"{name} is missing; pip install 'scenelang[eval]'")
 
 
-def difference(name: str, before: str, after: str) -> str:
-    """A unified diff, as `patch -p0` takes it; lines end at line feeds and nowhere else."""
+def show_difference(name: str, before: str, after: str, color: str = "auto") -> None:
+    """Print a unified diff, as `patch -p0` takes it; lines end at line feeds and nowhere else.
+
+    It is exact into files and pipes, and coloured, without control characters, on terminals.
+    """
     from difflib import unified_diff
 
-    return "".join(
-        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-        for line in unified_diff(_lines(before), _lines(after), name, name)
-    )
+    painted = wants_color(sys.stdout, color)
+    for line in unified_diff(_lines(before), _lines(after), name, name):
+        style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
+        text = line.removesuffix("\n")
+        safe = printable(text) if painted or sys.stdout.isatty() else text
+        click.echo(paint(style, safe, painted), color=True)
+        if text == line:
+            click.echo("\\ No newline at end of file")
 
 
 def _lines(text: str) -> list[str]:
     """Lines with their ends; text after the last line feed is a line unless it is empty."""
-    lines = [f"{line}\n" for line in text.split("\n")]
-    last = lines.pop()[:-1]
-    return [*lines, last] if last else lines
-
-
-def show_difference(name: str, before: str, after: str, color: str = "auto") -> None:
-    """Print a unified diff: exact into files and pipes, coloured, without control characters on terminals."""
-    from scenelang.language.reports import paint, printable
-
-    painted = wants_color(sys.stdout, color)
-    for line in difference(name, before, after).removesuffix("\n").split("\n"):
-        style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
-        safe = printable(line) if painted or sys.stdout.isatty() else line
-        click.echo(paint(style, safe, painted), color=True)
+    return re.findall(r"[^\n]*\n|[^\n]+", text)
 
 
 PATIENCE_S = 1.0
@@ -162,23 +150,3 @@ class Bar:
                 self._shown.reset(task)
             self._done = done
             self._shown.update(task, description=what, completed=done, total=total)
-
-
-def named(paths: Iterable[str], lost: Callable[[OSError], None]) -> Iterator[str]:
-    """The scenes of a command line: files, ``-`` too, and those in folders by name; no hidden ones or links.
-
-    ``lost`` is told of folders that cannot be listed.
-    """
-    for path in paths:
-        if not os.path.isdir(path):
-            yield path
-            continue
-        try:
-            with os.scandir(path) as entries:
-                found = sorted(entries, key=lambda entry: entry.name)
-        except OSError as error:
-            lost(error)
-            continue
-        shown = [entry for entry in found if not (entry.name.startswith(".") or entry.is_symlink())]
-        inside = [e.path for e in shown if e.is_dir() or (e.name.endswith(SUFFIX) and e.is_file())]
-        yield from named(inside, lost)

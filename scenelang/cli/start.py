@@ -18,11 +18,7 @@ _UNLESS_SET = {
 
 
 class Interruption(KeyboardInterrupt):
-    """Ctrl-C.
-
-    Python remembers a plain `KeyboardInterrupt` that leaves a text given to `exec`, as dataclasses and named
-    tuples are made by, and ends the process by the signal whatever catches it later.
-    """
+    """Ctrl-C; a plain `KeyboardInterrupt` that leaves `exec` ends the process whatever catches it later."""
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.neural.draw import Kept
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Source
-from scenelang.language.reports import SceneError
+from scenelang.language.reports import SceneError, render_text
 from scenelang.language.session import Defines
 from scenelang.output.animate import make
 from scenelang.output.frames import Clip, FrameRange
@@ -233,8 +233,6 @@ class Screen:
 
     def say_diagnostics(self, diagnostics: list[Diagnostic]) -> None:
         """Print diagnostics with carets."""
-        from scenelang.language.reports import render_text
-
         self._write(render_text(diagnostics, self.colour))
 
     def show(self, picture: PIL.Image.Image) -> None:

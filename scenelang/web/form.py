@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from scenelang.assets.element import Element
 from scenelang.assets.records import Record, deep_stack
-from scenelang.assets.textures import load_textures
+from scenelang.assets.zoo import load_textures
 from scenelang.compiler.manifest import Manifest
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place

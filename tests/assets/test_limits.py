@@ -49,10 +49,7 @@ LIMITS = {
     "modules": ("module m(n) { if (n > 0) { m(n - 1); } square; } m(300);", ["E0321"]),
     "endless": ("module m() { m(); } m();", ["E0321"]),
     "steps": ("for (i in 0..<20000) { for (j in 0..<20000) { let a = i * j; } }", ["E0322"]),
-    "vector": (
-        "fn d(v, n) = n < 1 ? v : d([v, v, v, v, v, v, v, v], n - 1); let a = d(1, 7);",
-        ["E0323"],
-    ),
+    "vector": ("fn d(v, n) = n < 1 ? v : d([v, v, v, v, v, v, v, v], n - 1); let a = d(1, 7);", ["E0323"]),
     "brackets": ("let a = " + "(" * 5000 + "1" + ")" * 5000 + ";", ["E0120"]),
     "braces": ("group {" * 5000 + "square;" + "}" * 5000, ["E0120"]),
     "operators": ("let a = " + "-" * 50_000 + "1;", ["E0120"]),

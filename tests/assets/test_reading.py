@@ -1,4 +1,4 @@
-"""What is named as a scene, program, weights or import may be anything: refused in a line, unread."""
+"""Odd files in place of scenes, programs, weights and imports: refused in a line, unread."""
 
 from __future__ import annotations
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import struct
+from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -134,18 +136,23 @@ OF_THE_NETWORK = {
 }
 
 
-@pytest.mark.parametrize("name", HARM)
-def test_codes(name: str) -> None:
-    with pytest.raises(ModelError):
-        codes_of(SHAPES, HARM[name])
+def taken(readers: dict[str, Callable[[bytes], object]], files: dict[str, bytes]) -> list[tuple[str, str]]:
+    """The readers that do not refuse a file in words, and its name."""
+    wrong = []
+    for (reader, read), (name, data) in product(readers.items(), files.items()):
+        try:
+            read(data)
+        except ModelError as error:
+            if str(error):
+                continue
+        wrong.append((reader, name))
+    return wrong
 
 
-@pytest.mark.parametrize("name", [*HARM, *OF_THE_NETWORK])
-def test_networks(name: str) -> None:
-    for load_with in (load_network, framed_arrays):
-        with pytest.raises(ModelError) as caught:
-            load_with({**HARM, **OF_THE_NETWORK}[name], SHAPES)
-        assert str(caught.value)
+def test_harm_is_refused() -> None:
+    assert not taken({"codes": lambda data: codes_of(SHAPES, data)}, HARM)
+    networks = {"torch": lambda data: load_network(data, SHAPES), "numpy": lambda d: framed_arrays(d, SHAPES)}
+    assert not taken(networks, HARM | OF_THE_NETWORK)
 
 
 def test_the_shipped_weights_are_none_of_these() -> None:
@@ -182,7 +189,7 @@ def test_tensors_that_nothing_asks_for(name: str, extra: str) -> None:
 
 def test_what_is_taken_is_what_safetensors_takes() -> None:
     """Files damaged at random are refused, or hold what another reader of them finds."""
-    random, taken = Random(4), 0
+    random, count = Random(4), 0
     for _ in range(400):
         data = mutate(DATA, random)
         try:
@@ -193,34 +200,31 @@ def test_what_is_taken_is_what_safetensors_takes() -> None:
             known = load(data)
         except SafetensorError as error:
             pytest.fail(f"taken, where safetensors says: {error}")
-        taken += 1
+        count += 1
         assert found.keys() == known.keys()
         for key, array in found.items():
             np.testing.assert_array_equal(array, known[key])
-    assert 40 < taken < 360
+    assert 40 < count < 360
 
 
-@pytest.mark.parametrize(
-    "name", ["nothing", "a header of 2^63 bytes", "cut short", "deep brackets", "no codes"]
-)
-def test_commands_say_so(folder: Folder, name: str) -> None:
-    Path("bad.safetensors").write_bytes(HARM[name])
+def test_commands_say_so(folder: Folder) -> None:
+    Path("bad.safetensors").write_bytes(HARM["deep brackets"])
     result = run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
     assert result.stderr.startswith("Error: ")
 
 
-@pytest.mark.parametrize("name", HARM)
-def test_checkpoints(tmp_path: Path, name: str) -> None:
-    """What the file says is tested against the training later; here nothing may break."""
+def test_checkpoints(tmp_path: Path) -> None:
+    """Their tensors are compared with the training's later; here nothing may break."""
     path = tmp_path / "checkpoint.safetensors"
-    path.write_bytes(HARM[name])
-    if name.startswith(("codes", "no codes")):  # numbers that are not finite too: those of a training may be
+
+    def read(data: bytes) -> None:
+        path.write_bytes(data)
         load_tensors(path)
-        return
-    with pytest.raises(ModelError):
-        load_tensors(path)
+
+    fine = {name for name in HARM if name.startswith(("codes", "no codes"))}
+    assert {name for _, name in taken({"checkpoint": read}, HARM)} == fine
 
 
 MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))

@@ -1,4 +1,4 @@
-"""What the tests of commands share."""
+"""A folder of scenes to run commands in."""
 
 from __future__ import annotations
 

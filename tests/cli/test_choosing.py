@@ -11,7 +11,7 @@ from PIL import Image
 
 import scenelang as nsg
 from lab.frontier.record import Errors, Frontier
-from scenelang.cli import jobs
+from scenelang.cli import choosing
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import available
 from scenelang.drawing.small import load_of
@@ -40,7 +40,7 @@ def shipped(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Folder:
     path = folder.path / "shipped.json"
     path.write_text(ladder().to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.cli.choosing.yardstick", lambda: 1.0)
     return folder
 
 
@@ -118,28 +118,8 @@ def test_compiled_programs_take_their_own_model(shipped: Folder) -> None:
     assert "a compiled program keeps only what the network needs" in result.stderr
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--max-ms", "9", "--backend", "exact"), "--max-ms chooses how to draw"),
-        (("--max-ms", "9", "--samples", "one"), "leave out --backend and --samples"),
-        (("--max-ms", "9", "--device", "cuda"), "leave out --device cuda"),
-        (("--max-ms", "0"), "0.0 is not in the range"),
-        (("--max-flip", "2"), "2.0 is not in the range"),
-        (("--backend", "reference", "--samples", "one"), "the reference always takes four samples"),
-    ],
-)
-def test_what_does_not_go_together(shipped: Folder, options: tuple[str, ...], words: str) -> None:
-    result = shipped.run("render", shipped.write("a.nsg"), "-o", "a.png", *options)
-    assert result.exit_code == 2
-    assert words in result.stderr
-
-
-def test_animations_are_not_chosen_for(shipped: Folder) -> None:
+def test_frames_are_chosen_for(shipped: Folder) -> None:
     name = shipped.write("a.nsg", "animate(1, 4); square { scale(0.2 + 0.1 * u); }\n")
-    result = shipped.run("render", name, "-o", "a.gif", "--max-ms", "20")
-    assert result.exit_code == 2
-    assert "for single pictures; --frame draws one" in result.stderr
     assert shipped.run("render", name, "-o", "a.png", "--frame", "1", "--max-ms", "20").exit_code == 0
 
 
@@ -153,21 +133,6 @@ def test_a_missing_or_damaged_frontier(shipped: Folder) -> None:
     result = shipped.run("render", "a.nsg", "-o", "a.png", "--max-ms", "20")
     assert result.exit_code == 2
     assert "model `shapes2d` ships no frontier to choose from" in result.stderr
-
-
-def test_costs_of_points_are_their_own(shipped: Folder) -> None:
-    """A way that costs by objects is left for one that costs by pixels, as objects become many."""
-    made = ladder()
-    points = [
-        replace(made.points[0], cost=Cost(1, 1000, 0, 0, 0, 1)),
-        replace(made.points[1], cost=Cost(0, 0, 200, 0, 0, 1)),
-    ]
-    (shipped.path / "shipped.json").write_text(replace(made, points=tuple(points)).to_json(), "utf-8")
-    few = said(shipped, "--max-flip", "0.1")
-    assert "chosen by the frontier: shapes2d, one sample: 3.0 ms" in few
-    many = "for (i in 0..<30) { star { scale(0.1); translate(-0.9 + 0.06 * i, 0.3); } }\n"
-    result = shipped.run("render", shipped.write("m.nsg", many), "-o", "m.png", "--max-flip", "1", "-v")
-    assert "chosen by the frontier: shapes2d: 13 ms" in result.stderr
 
 
 def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,7 +154,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
             options["diagnostics"].add("W0501", "4 objects, trained on 3", None)  # type: ignore[attr-defined]
         return made
 
-    monkeypatch.setattr(jobs, "compile_scene", warns)
+    monkeypatch.setattr(choosing, "compile_scene", warns)
     text = said(shipped, "--max-flip", "0.05")
     assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text
@@ -212,7 +177,7 @@ def test_solids_are_chosen_for(
     path = folder.path / "solids.json"
     path.write_text(replace(frontier(*found), set="mixed").to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.cli.choosing.yardstick", lambda: 1.0)
     result = folder.run("render", folder.write("ball.nsg", ball), "-o", "a.png", "-v", *limit)
     assert result.exit_code == 0, result.output
     assert f"chosen by the frontier: solids3d, {samples}: " in result.stderr

@@ -14,15 +14,13 @@ from pathlib import Path
 import click
 import pytest
 
-from scenelang.cli.inputs import Sectioned
-from scenelang.cli.main import cli
+from scenelang.cli.main import COMMANDS, cli
+from scenelang.cli.options import Real, Sectioned
 from scenelang.compiler.manifest import available
 from tests.cli.conftest import Folder
 
 
 def test_help_lists_every_command(folder: Folder) -> None:
-    from scenelang.cli.main import COMMANDS
-
     said = folder.run("--help").stdout
     assert "Draw 2D and 3D scenes" in said
     for name, words in COMMANDS.items():
@@ -67,8 +65,6 @@ def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> Non
 
 def test_no_option_takes_what_is_not_a_number() -> None:
     """Whose bounds `nan` would pass, as it is neither below nor above them."""
-    from scenelang.cli.inputs import Real
-
     found = 0
     context = click.Context(cli)
     for name, option in options_of(cli):
@@ -89,7 +85,6 @@ def test_models(folder: Folder) -> None:
     said = folder.run("models", "shapes2d").stdout
     for words in ("square, triangle, star, pentagon", "digest", "seed", "revision", "parameters"):
         assert words in said
-    assert folder.run("models", "shapes").exit_code == 2
     listed = json.loads(folder.run("models", "--format", "json").stdout)
     facts = json.loads(folder.run("models", "shapes2d", "--format", "json").stdout)
     assert [each["manifest"]["name"] for each in listed] == available()
@@ -102,29 +97,6 @@ def test_models(folder: Folder) -> None:
 def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenelang.compiler.weights.weights_path", lambda name: folder.path / "none")
     assert "missing or damaged" in folder.run("models", "shapes2d").stdout
-
-
-def test_explain(folder: Folder) -> None:
-    assert folder.run("explain", "e0401").stdout.startswith("error[E0401]: ")
-    assert folder.run("explain", "W0501").stdout.startswith("warning[W0501]: ")
-    assert folder.run("explain", "E9999").exit_code == 2
-
-
-@pytest.mark.parametrize("name", ["lab", "train", "eval", "frontier", "stability"])
-def test_old_names_answer_with_the_new_ones(folder: Folder, name: str) -> None:
-    result = folder.run(name, "shapes2d")
-    assert result.exit_code == 2
-    assert f"`{name}` is now `python -m lab{'' if name == 'lab' else f' {name}'}`." in result.stderr
-    assert f"\n  {name} " not in folder.run("--help").stdout
-
-
-def test_commands_that_are_gone_say_what_to_use_instead(folder: Folder) -> None:
-    result = folder.run("import", "flower.glb")
-    assert result.exit_code == 2
-    assert "`import` is gone: `scenelang learn --parts` makes elements" in result.stderr
-    result = folder.run("convert", "a.nsg", "-o", "a.py")
-    assert result.exit_code == 2
-    assert "--to nsg or json" in result.stderr
 
 
 def process(*arguments: str, **options: object) -> subprocess.Popen[str]:

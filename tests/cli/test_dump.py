@@ -115,13 +115,6 @@ def test_scenes_with_mistakes_are_shown_as_far_as_they_go(folder: Folder) -> Non
     assert result.stdout.startswith("scene 256x256")
 
 
-def test_unknown_stages(folder: Folder) -> None:
-    result = folder.run("dump", folder.write("a.nsg", TEXT), "--after", "flaten")
-    assert result.exit_code == 2
-    assert "'flatten'" in result.stderr
-    assert folder.run("dump", "a.nsg", "--after", "syntax", "--format", "mmd").exit_code == 2
-
-
 def test_mermaid(folder: Folder) -> None:
     said = folder.run("dump", folder.write("a.nsg", TEXT), "--format", "mmd").stdout
     assert said.startswith("flowchart TB\n")
@@ -140,16 +133,15 @@ def test_mermaid(folder: Folder) -> None:
     assert not re.search(r"[{}]", re.sub(r"#\d+;", "", said)), "what means something to Mermaid is escaped"
 
 
-@pytest.mark.parametrize("stage", ["scene", "lower", "flatten", "program"])
-@pytest.mark.parametrize("kind", ["mmd", "dot"])
-def test_large_scenes_are_cut(folder: Folder, stage: str, kind: str) -> None:
+def test_large_scenes_are_cut(folder: Folder) -> None:
     square = "square { scale(0.01 + i / 100); translate(i / 50, j / 60); }"
     text = f"for (i in 0..<30) {{ group {{ for (j in 0..<50) {{ {square} }} }} }}"
-    arguments = ("--after", stage, "--format", kind, "--most", "100")
-    said = folder.run("dump", folder.write("a.nsg", text), *arguments).stdout
-    boxes = re.findall(r"^  n\d+ ?[\[(]", said, re.MULTILINE)
-    assert 40 < len(boxes) <= 140
-    assert " more" in said
+    name = folder.write("a.nsg", text)
+    for stage, kind in (("scene", "mmd"), ("lower", "dot"), ("flatten", "mmd"), ("program", "dot")):
+        said = folder.run("dump", name, "--after", stage, "--format", kind, "--most", "100").stdout
+        boxes = re.findall(r"^  n\d+ ?[\[(]", said, re.MULTILINE)
+        assert 40 < len(boxes) <= 140, stage
+        assert " more" in said
 
 
 def test_dot_draws(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,13 +163,6 @@ def test_dot_draws(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     assert failed.exit_code == 2
     assert failed.stderr == "Error: dot failed: no such font\n"
     assert "b.svg" not in os.listdir()
-
-
-def test_graph_usage(folder: Folder) -> None:
-    assert folder.run("dump", folder.write("a.nsg", TEXT), "--format", "dot", "--diff").exit_code == 2
-    assert "`scenelang dump --format mmd`" in folder.run("graph", "a.nsg").stderr
-    assert folder.run("dump", folder.write("b.nsg", "square { scale(0); }"), "-o", "b.dot").exit_code == 1
-    assert sorted(os.listdir()) == ["a.nsg", "b.nsg"]
 
 
 def test_quotes_in_names_stay_inside_labels(folder: Folder) -> None:

@@ -159,20 +159,6 @@ def test_write_fails_whole(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> N
     assert text(folder.path / name) == ROUGH
 
 
-def test_nothing_heavy_is_loaded(tmp_path: Path) -> None:
-    scene = tmp_path / "rough.nsg"
-    scene.write_text(ROUGH)
-    code = (
-        "import sys\nfrom scenelang.cli.main import main\n"
-        f"try:\n    main(['fmt', {str(scene)!r}])\nexcept SystemExit as stop:\n    assert not stop.code\n"
-        "print(*sorted({name.split('.')[0] for name in sys.modules}))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {"torch", "numpy", "pydantic", "lark", "rich", "pygls"}
-    assert not heavy & set(done.stdout.split())
-    assert text(scene) == NEAT
-
-
 def test_check_says_a_line_a_file(folder: Folder) -> None:
     folder.write("all/bad.nsg", "square { scale(0.5 }\nstar { rotate(30deg) }\n")
     folder.write("all/one.nsg", "star { rotate(30deg) }\n")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.conftest import GOOD, Folder
+from tests.cli.conftest import Folder
 
 SOLIDS = "canvas(24, 16);\nsphere { scale(0.5); }\nsphere { translate(1, 0, 0); }\n"
 ORBIT = "animate(1, 3); camera(eye = [6 * sin(1turn * u), 1, 6 * cos(1turn * u)]);\n" + SOLIDS
@@ -66,23 +66,6 @@ def test_a_link_where_an_output_goes_is_refused(folder: Folder) -> None:
     ran = folder.run("render", folder.write("a.nsg", SOLIDS), "-o", "p.png", *DEPTH)
     assert (ran.exit_code, Path("mine.txt").read_text()) == (2, "mine")
     assert not Path("p.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("out", "text", "options", "message"),
-    [
-        ("p.png", GOOD, DEPTH, "a 2D picture has no depth; it has object and alpha"),
-        ("p.jpg", SOLIDS, DEPTH, "outputs go with .png or .exr pictures, not `p.jpg`"),
-        ("p.gif", ORBIT, DEPTH, "`p.gif` is one file"),
-        ("p.png", SOLIDS, ("--output", "z"), "'z' is not one of 'depth', 'normal', 'object', 'alpha'"),
-        ("f-%d.jpg", ORBIT, DEPTH, "outputs go with .png or .exr pictures, not `f-0.jpg`"),
-    ],
-)
-def test_what_is_refused(folder: Folder, out: str, text: str, options: tuple[str, ...], message: str) -> None:
-    ran = folder.run("render", folder.write("a.nsg", text), "-o", out, *options)
-    assert ran.exit_code == 2
-    assert message in " ".join(ran.stderr.split())
-    assert [path.name for path in folder.path.iterdir()] == ["a.nsg"]
 
 
 def test_exr_without_its_library_is_refused_before_anything_is_drawn(folder: Folder, monkeypatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from PIL import Image
 
 import scenelang as nsg
@@ -41,32 +40,3 @@ def test_what_is_not_proved_is_drawn_again(folder: Folder) -> None:
     assert "p.png: 100 % of pixels proved right to 1/255" in ran.stderr
     exact = nsg.render(nsg.loads(TEXT), backend="reference").to_uint8().astype(int)
     assert abs(np.asarray(Image.open("p.png"), int) - exact).max() <= 1
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "why"),
-    [
-        ("sphere { scale(0.5); }", (), "solids are not proved"),
-        (
-            'model "shapes2d-streaming"; canvas(32, 32); background(#fff); square { }',
-            (),
-            "learned where points lie",
-        ),
-        (TEXT, ("--backend", "reference"), "pictures are exact"),
-        (TEXT, ("--max-ms", "5"), "leave out --max-ms"),
-        ("animate(1, 3);" + TEXT, ("--frames", "0..1"), "a proof is for single pictures"),
-    ],
-)
-def test_what_cannot_be_proved_is_told(folder: Folder, text: str, options: tuple[str, ...], why: str) -> None:
-    name = folder.write("a.nsg", text)
-    out = "p-%d.png" if "--frames" in options else "p.png"
-    ran = folder.run("render", name, "-o", out, "--prove", *options)
-    assert ran.exit_code == 2
-    assert why in " ".join(ran.stderr.split())
-    assert not list(folder.path.glob("p*"))
-
-
-def test_a_compiled_program_has_no_proof(folder: Folder) -> None:
-    assert folder.run("compile", folder.write("a.nsg", TEXT), "-o", "a.safetensors").exit_code == 0
-    ran = folder.run("render", "a.safetensors", "-o", "p.png", "--prove")
-    assert (ran.exit_code, "a proof is of a scene" in ran.stderr) == (1, True)

@@ -28,13 +28,6 @@ def test_one_scene(folder: Folder) -> None:
     assert np.abs(pixels[3, 3] - 255).max() <= 1
 
 
-def test_the_reference(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
-    assert folder.run("render", name, "-o", "b.png").exit_code == 0
-    assert np.abs(picture("a.png") - picture("b.png")).mean() < 4
-
-
 def test_formulas_in_place_of_the_network(folder: Folder) -> None:
     name = folder.write("a.nsg")
     assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
@@ -42,13 +35,6 @@ def test_formulas_in_place_of_the_network(folder: Folder) -> None:
     assert done.exit_code == 0
     assert "formulas in the network's place" in done.stderr
     assert (np.abs(picture("a.png") - picture("b.png")).max(-1) > 1).sum() <= 2
-    for options, why in (
-        (("--device", "cuda"), "not by device cuda"),
-        (("--prove",), "leave out --backend exact"),
-    ):
-        refused = folder.run("render", name, "-o", "c.png", "--backend", "exact", *options)
-        assert refused.exit_code == 2
-        assert why in " ".join(refused.stderr.split())
 
 
 def test_formats_and_sizes(folder: Folder) -> None:
@@ -74,38 +60,6 @@ def test_one_scene_into_a_folder(folder: Folder) -> None:
     assert folder.run("render", name, "-o", "new/").exit_code == 0
     assert folder.run("render", name, "-o", "new").exit_code == 0
     assert os.listdir("new") == ["a.png"]
-
-
-def test_threads_agree(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    for threads in ("1", "2", "5"):
-        assert folder.run("render", name, "-o", f"{threads}.png", "--threads", threads).exit_code == 0
-    assert np.abs(picture("1.png") - picture("2.png")).max() <= 1
-    assert np.abs(picture("1.png") - picture("5.png")).max() <= 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
-        (("a.nsg", "-o", "a"), "a folder ends in a slash"),
-        (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
-        (("a.nsg", "b/a.nsg", "-o", "out"), "both be written to"),
-        (("a.nsg", "b.nsg", "-o", "a.nsg"), "is a file"),
-        (("a.nsg", "b.nsg", "-o", "out.png"), "names a picture"),
-        (("a.nsg", "-o", "a.png", "--size", "3"), "not a size such as"),
-        (("a.nsg", "-o", "a.png", "--size", "9000x1"), "outside 1..8192"),
-        (("a.nsg", "-o", "a.png", "--threads", "0"), "--threads"),
-    ],
-)
-def test_usage_is_settled_before_any_work(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
-    for name in ("a.nsg", "b.nsg", "b/a.nsg"):
-        folder.write(name)
-    before = sorted(os.listdir())
-    result = folder.run("render", *arguments)
-    assert result.exit_code == 2
-    assert said in result.stderr
-    assert sorted(os.listdir()) == before
 
 
 def test_scenes_with_errors_are_left_out(folder: Folder) -> None:
@@ -186,22 +140,19 @@ def test_programs(folder: Folder) -> None:
     assert Path("p.png").read_bytes() == Path("s.png").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
+def test_what_programs_cannot(folder: Folder) -> None:
+    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
+    for arguments, said in (
         (("--size", "64x32"), "another shape"),
         (("--backend", "reference"), "the reference draws scenes"),
         (("--frame", "3"), "a single frame"),
         (("--model", "other"), "not `other`"),
         (("-D", "k=1"), "E0211"),
-    ],
-)
-def test_what_programs_cannot(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
-    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
-    result = folder.run("render", "a.safetensors", "-o", "p.png", *arguments)
-    assert result.exit_code == 1
-    assert said in result.stderr
-    assert not Path("p.png").exists()
+        (("--prove",), "a proof is of a scene"),
+    ):
+        result = folder.run("render", "a.safetensors", "-o", "p.png", *arguments)
+        assert (result.exit_code, said in result.stderr) == (1, True), arguments
+        assert not Path("p.png").exists()
 
 
 def test_damaged_programs(folder: Folder) -> None:
@@ -213,35 +164,16 @@ def test_damaged_programs(folder: Folder) -> None:
     assert os.listdir("out") == ["a.png"]
 
 
-def test_standard_input(folder: Folder) -> None:
-    assert folder.run("render", "-", "-o", "a.png", "--size", "16x16", stdin=GOOD).exit_code == 0
-    assert picture("a.png").shape == (16, 16, 3)
-
-
-@pytest.mark.parametrize("arguments", [(), ("-o", "a.png"), ("-o", "none/a.safetensors")])
-def test_compile_usage(folder: Folder, arguments: tuple[str, ...]) -> None:
-    assert folder.run("compile", folder.write("a.nsg"), *arguments).exit_code == 2
-    assert os.listdir() == ["a.nsg"]
-
-
-def test_compile_refuses_errors(folder: Folder) -> None:
-    result = folder.run("compile", folder.write("a.nsg", "square { scale(foo); }"), "-o", "a.safetensors")
-    assert result.exit_code == 1
-    assert "E0201" in result.stderr
-    assert os.listdir() == ["a.nsg"]
-
-
-@pytest.mark.parametrize("options", [("--size", "4096x4096"), ("--max-ms", "5"), ("--device", "cpu")])
-def test_without_torch_what_it_draws_is_refused(folder: Folder, options: tuple[str, ...]) -> None:
+def test_without_torch_what_it_draws_is_refused(folder: Folder) -> None:
     """Small pictures are drawn by numpy alone; the others say what is missing."""
     folder.write("a.nsg", "for (i in 0..<20) { star { scale(0.5); translate(rand(i), 0); } }")
     code = "import sys; sys.modules['torch'] = None\nfrom scenelang.cli.main import main; main(sys.argv[1:])"
     command = (sys.executable, "-c", code, "render", "a.nsg", "-o", "a.png")
     assert subprocess.run(command, check=True).returncode == 0
-    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "torch, which is not installed" in done.stderr
-    assert "Traceback" not in done.stderr
+    for options in (("--size", "4096x4096"), ("--max-ms", "5")):
+        done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert done.stderr == "Error: this needs torch, which is not installed; pip install torch\n"
 
 
 def test_a_picture_of_one_colour_is_told(folder: Folder) -> None:
@@ -257,18 +189,14 @@ def test_a_picture_of_one_colour_is_told(folder: Folder) -> None:
     assert "throughout" not in result.stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_why_a_picture_has_one_colour(folder: Folder) -> None:
+    """Another reason where the background is not white; and a scene may have no objects."""
+    for text, said in (
         ("background(#222); square { scale(0.001); }", "smaller than a pixel"),
         ("background(#222); subtract { star; star; }", "cut away"),
         ("background(#222); module part() { star; }", "no objects to draw"),
         ("group { scale(0.5); }", "no objects to draw"),
-    ],
-)
-def test_why_a_picture_has_one_colour(folder: Folder, text: str, said: str) -> None:
-    """Where the background is not white the reason is another, and a scene may have no objects."""
-    result = folder.run("render", folder.write("a.nsg", text), "-o", "a.png", "--size", "16x16")
-    assert result.exit_code == 0
-    assert said in result.stderr
-    assert "white" not in result.stderr
+    ):
+        result = folder.run("render", folder.write("a.nsg", text), "-o", "a.png", "--size", "16x16")
+        assert (result.exit_code, said in result.stderr) == (0, True), text
+        assert "white" not in result.stderr

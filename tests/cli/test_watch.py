@@ -16,7 +16,6 @@ import pytest
 from PIL import Image
 
 from scenelang.output.watch import settle, stamps
-from tests.cli.conftest import Folder
 
 LONG_S = 120  # on a busy machine
 HEAD = "canvas(16, 16); background(#000);\n"
@@ -182,21 +181,6 @@ def test_animations(tmp_path: Path) -> None:
         watcher.process.kill()
         watcher.process.communicate()
     assert sorted(os.listdir(tmp_path)) == ["a.gif", "a.nsg"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("none.nsg",), "there is no file `none.nsg`"),
-        (("a.nsg", "-o", "none/a.png"), "no folder `none`"),
-        (("a.nsg", "-o", "a.xyz"), "suffix `.xyz`"),
-        (("a.nsg", "-o", "a.png", "--frames", "0..3"), "holds one picture"),
-    ],
-)
-def test_usage(folder: Folder, arguments: tuple[str, ...], said: str) -> None:
-    folder.write("a.nsg")
-    result = folder.run("watch", *arguments)
-    assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
 
 
 def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str]) -> None:

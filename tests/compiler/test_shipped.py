@@ -8,7 +8,7 @@ import pytest
 import scenelang as nsg
 from lab.docs.make_textures import drawn
 from scenelang.assets.picture import pixels
-from scenelang.assets.textures import FILE, load_textures
+from scenelang.assets.zoo import TEXTURES_FILE, load_textures
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.drawing.torch_backend import draw_program, open_model
@@ -53,7 +53,7 @@ def test_most_textures_show_flips_and_turns() -> None:
     """Half of them at least are not themselves mirrored, turned, or mirrored and shifted by half a period."""
     assert tuple(sorted(COLOURS)) == TEXTURES
     assert len(COLOURS) == 16
-    assert FILE.stat().st_size < 100_000
+    assert TEXTURES_FILE.stat().st_size < 100_000
     shows = 0
     for colours in COLOURS.values():
         others = [colours[:, ::-1], colours[::-1], colours[::-1, ::-1], np.rot90(colours)]

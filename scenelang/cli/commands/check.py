@@ -1,29 +1,28 @@
-"""``scenelang check``: what is wrong with scenes, and fixes; imports neither numpy nor torch."""
+"""``scenelang check``: mistakes of scenes, and fixes; imports neither numpy nor torch."""
 
 from __future__ import annotations
 
+import os
 import sys
 from codecs import BOM_UTF8
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Literal
 
 import click
 
 from scenelang.assets.files import followed, write_whole
-from scenelang.cli import inputs
+from scenelang.assets.records import Record
+from scenelang.cli import options
+from scenelang.cli.files import STDIN, scenes_of
+from scenelang.cli.inputs import merged, read_input, read_text, unused_defines
 from scenelang.cli.main import describe
-from scenelang.cli.say import SUFFIX, named, say_trouble, show_difference, wants_color, width_of
-from scenelang.language.diagnostics import plural
-from scenelang.language.reports import printable
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from scenelang.cli.checking import Scenes
-    from scenelang.cli.inputs import Request
-    from scenelang.compiler.check import Frames
-    from scenelang.language.diagnostics import Diagnostic, Settled
-
+from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
+from scenelang.compiler.check import Frames, check_evaluated
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, Settled, SourceFile, plural, settle
+from scenelang.language.reports import in_order, printable, render_text
+from scenelang.language.session import Defines
 
 Format = Literal["human", "json", "sarif", "github", "concise"]
 
@@ -47,21 +46,15 @@ def _codes(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 @click.argument("files", nargs=-1, required=True, metavar="PATH…")
 @click.option("--fix", "fixes", is_flag=True, help="Apply the safe fixes; report what is left.")
 @click.option("--diff", is_flag=True, help="Show what --fix would change, and change nothing.")
-@inputs.strict
+@options.strict
 @click.option("--select", multiple=True, metavar="CODES", callback=_codes, help="Report only these warnings.")
 @click.option("--ignore", multiple=True, metavar="CODES", callback=_codes, help="Leave out these warnings.")
-@inputs.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
-@click.option(
-    "--max-diagnostics",
-    "most",
-    type=click.IntRange(0),
-    metavar="N",
-    help="Largest number to write; all are counted.",
-)
+@options.choice("--format", "kind", words="human json sarif github concise", help="Format of diagnostics.")
+@options.count("--max-diagnostics", "most", low=0, help="Largest number to write; all are counted.")
 @click.option("-q", "--quiet", is_flag=True, help="Write diagnostics and no summary.")
-@inputs.color
+@options.color
 @click.option("--all-frames", is_flag=True, help="Look at all frames of the animation.")
-@inputs.request
+@options.request()
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -74,9 +67,9 @@ def command(
     kind: Format,
     most: int | None,
     quiet: bool,
-    color: inputs.Color,
+    color: options.Color,
     all_frames: bool,
-    request: Request,
+    request: options.Request,
 ) -> None:
     """Report what is wrong with scenes, without drawing them.
 
@@ -89,18 +82,21 @@ def command(
     Exits with 0 where there are no errors, 1 where there are (or a difference, with --diff), 2 where a file
     cannot be read or written.
     """
-    from scenelang.cli.checking import Scenes, Selection
-    from scenelang.cli.inputs import STDIN
-
     if request.frame is not None and all_frames:
         raise click.UsageError("--frame and --all-frames exclude each other.")
     frames: Frames = "all" if all_frames else "some" if request.frame is None else "one"
-    scenes = Scenes(request, Selection(select, ignore), frames)
-    unreadable = not _read(files, scenes)
-    out = _Output(kind, most, quiet, color, (fixes or diff) and STDIN in scenes.sources, scenes)
+    scenes = Scenes(request, select, ignore, frames)
+    names, readable = scenes_of(files)
+    for name in names:
+        try:
+            scenes.read(name)
+        except OSError as error:
+            say_trouble(describe(error))
+            readable = False
+    to_stderr = (fixes or diff) and STDIN in scenes.sources
+    left: Sequence[Diagnostic]
     if not fixes and not diff:
-        left: Sequence[Diagnostic] = scenes.check().items if scenes.sources or scenes.unread.items else ()
-        out.write(left)
+        left = scenes.check().items if scenes.sources or scenes.unread.items else ()
     else:
         settled = scenes.fix()
         changed = {n: text for n, text in settled.texts.items() if text != scenes.sources[n].text}
@@ -108,44 +104,34 @@ def command(
         if diff:
             for name, text in changed.items():
                 show_difference(scenes.sources[name].name, scenes.sources[name].text, text, color)
-            out.fixed(settled, "would fix")
-            ctx.exit(2 if unreadable else int(bool(changed or _wrong(left, strict))))
-        lost = _store(changed, settled, scenes)
-        unreadable |= bool(lost)
-        out.fixed(settled, "fixed", lost)
-        out.write(left)
+            lost = set()
+        else:
+            lost = _store(changed)
+            if STDIN in scenes.sources:
+                sys.stdout.buffer.write(settled.texts[STDIN].encode("utf-8"))
+        if not quiet:
+            _say_fixed(scenes, settled, "would fix" if diff else "fixed", lost)
+        if diff:
+            ctx.exit(2 if not readable else int(bool(changed) or _wrong(left, strict)))
+        readable &= not lost
+    stream = sys.stderr if to_stderr else sys.stdout
+    if kind == "human":
+        text = _for_people(scenes, left, most, quiet, wants_color(stream, color), width_of(stream))
+    else:
+        text = _for_machines(left, kind, most)
+    click.echo(text, nl=False, err=to_stderr, color=True)
     if all_frames and scenes.unseen:
-        click.echo(
-            f"{plural(scenes.unseen, 'frame')} left out: together they exceed the limits of one.", err=True
-        )
-    ctx.exit(2 if unreadable else int(_wrong(left, strict)))
-
-
-def _read(paths: tuple[str, ...], scenes: Scenes) -> bool:
-    """Take in all scenes, folders' too; False where something cannot be read."""
-
-    lost: list[OSError] = []
-    names = list(named(paths, lost.append))
-    for name in names:
-        try:
-            scenes.read(name)
-        except OSError as error:
-            lost.append(error)
-    for trouble in lost:
-        say_trouble(describe(trouble))
-    if not lost and not names:
-        say_trouble(f"no scenes (*{SUFFIX}) there")
-    return bool(names) and not lost
+        unseen = plural(scenes.unseen, "frame")
+        click.echo(f"{unseen} left out: together they exceed the limits of one.", err=True)
+    ctx.exit(2 if not readable else int(_wrong(left, strict)))
 
 
 def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
     return any(strict or d.severity == "error" for d in left)
 
 
-def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> set[str]:
-    """Write what changed, and standard input to standard output; returns what cannot be written."""
-    from scenelang.cli.inputs import STDIN
-
+def _store(changed: Mapping[str, str]) -> set[str]:
+    """Write files that changed; returns the names of those that cannot be written, after a report."""
     lost = set()
     for name, text in changed.items():
         if name == STDIN:
@@ -157,73 +143,109 @@ def _store(changed: dict[str, str], settled: Settled[str], scenes: Scenes) -> se
         except OSError as error:
             say_trouble(describe(error))
             lost.add(name)
-    if STDIN in scenes.sources:
-        sys.stdout.buffer.write(settled.texts[STDIN].encode("utf-8"))
     return lost
 
 
-@dataclass(frozen=True, slots=True)
-class _Output:
-    """Writes diagnostics and a summary of scenes; to standard error where a scene goes to the output."""
-
-    kind: Format
-    most: int | None
-    quiet: bool
-    color: inputs.Color
-    to_stderr: bool
-    scenes: Scenes
-
-    def write(self, found: Sequence[Diagnostic]) -> None:
-        """Print diagnostics, or that there are none."""
-        stream = sys.stderr if self.to_stderr else sys.stdout
-        if self.kind != "human":
-            text = _for_machines(found, self.kind, self.most)
-        elif found:
-            from scenelang.language.reports import in_order, render_text
-
-            text = render_text(
-                found,
-                wants_color(stream, self.color),
-                width=width_of(stream),
-                most=self.most,
-                summary=not self.quiet,
-                fixer="--fix",
-                fixable=sum(d.fix is not None and self.scenes.owner(d) is not None for d in found),
-            )
-            if not self.quiet:
-                text += f"For more, try `scenelang explain {in_order(found)[0].code}`.\n"
-        else:
-            count = len(self.scenes.sources) + len(self.scenes.unread)
-            scenes = plural(count, "scene")
-            text = f"no mistakes in {scenes}\n" if count and not self.quiet else ""
-        click.echo(text, nl=False, err=self.to_stderr, color=True)
-
-    def fixed(self, settled: Settled[str], done: str, lost: Collection[str] = ()) -> None:
-        """Say what was fixed, file by file, but for files that could not be written."""
-
-        if self.quiet:
-            return
-        for name, applied in settled.applied.items():
-            if applied and name not in lost:
-                codes = ", ".join(sorted({d.code for d in applied}))
-                shown = printable(self.scenes.sources[name].name)
-                click.echo(f"{shown}: {done} {plural(len(applied), 'mistake')} ({codes})", err=True)
-        if not settled.stable:
-            click.echo("Some fixes undo each other and were left out.", err=True)
+def _say_fixed(scenes: Scenes, settled: Settled[str], done: str, lost: set[str]) -> None:
+    """Say what was fixed, file by file, but for files that could not be written."""
+    for name, applied in settled.applied.items():
+        if applied and name not in lost:
+            codes = ", ".join(sorted({d.code for d in applied}))
+            shown = printable(scenes.sources[name].name)
+            click.echo(f"{shown}: {done} {plural(len(applied), 'mistake')} ({codes})", err=True)
+    if not settled.stable:
+        click.echo("Some fixes undo each other and were left out.", err=True)
 
 
-def _for_machines(found: Sequence[Diagnostic], kind: Format, most: int | None) -> str:
+def _for_people(
+    scenes: Scenes, left: Sequence[Diagnostic], most: int | None, quiet: bool, paint: bool, width: int
+) -> str:
+    """Diagnostics with carets and a summary, or that there are none."""
+    if not left:
+        count = len(scenes.sources) + len(scenes.unread)
+        return f"no mistakes in {plural(count, 'scene')}\n" if count and not quiet else ""
+    fixable = sum(d.fix is not None and scenes.owner(d) is not None for d in left)
+    text = render_text(left, paint, width=width, most=most, summary=not quiet, fixer="--fix", fixable=fixable)
+    return text if quiet else f"{text}For more, try `scenelang explain {in_order(left)[0].code}`.\n"
+
+
+def _for_machines(left: Sequence[Diagnostic], kind: Format, most: int | None) -> str:
     from importlib.metadata import version
 
     from scenelang.language import machine
-    from scenelang.language.reports import in_order
 
-    shown = in_order(found)[:most]
+    shown = in_order(left)[:most]
     if kind == "sarif":
         return machine.render_sarif(shown, version("scenelang"))
-    renderers = {
-        "json": machine.render_json,
-        "github": machine.render_github,
-        "concise": machine.render_concise,
-    }
-    return renderers[kind](shown)
+    render: Callable[[Sequence[Diagnostic]], str] = getattr(machine, f"render_{kind}")
+    return render(shown)
+
+
+class Scenes(Record, frozen=False):
+    """Several scenes that are checked together."""
+
+    request: options.Request  # what holds for all of them
+    # codes, or beginnings of codes, of the warnings that are wanted, empty for all, and that are not
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    frames: Frames = "some"  # those that are checked
+    # their texts by the names that the user wrote
+    sources: dict[str, SourceFile] = field(default_factory=dict)
+    unread: Diagnostics = field(default_factory=Diagnostics)  # of files that are not text
+    names: dict[str, str] = field(default_factory=dict)  # by the files' places on the disk
+    unseen: int = 0  # frames that were left out, as they exceed the limits of one scene
+
+    def read(self, name: str) -> None:
+        """Read a scene, once under any name; raises `OSError` where it cannot be opened."""
+        place = _place(name)
+        if place not in self.names and (source := read_text(name, self.unread)) is not None:
+            self.sources[name], self.names[place] = source, name
+
+    def check(
+        self, sources: Mapping[str, SourceFile] | None = None, texts: Mapping[Path, str] | None = None
+    ) -> Diagnostics:
+        """All diagnostics that are wanted; those of other texts where these are given.
+
+        Args:
+            sources: the scenes.
+            texts: imported files by their resolved paths.
+        """
+        # `Defines` record the params that they were used for, so each round needs its own.
+        given = self.request.source
+        request = replace(self.request, source=replace(given, params=Defines(given.values), texts=texts))
+        parts, self.unseen = [self.unread.items], 0
+        for name, source in (self.sources if sources is None else sources).items():
+            result = read_input(name, request, text=source)
+            facts = result.tree, result.evaluation, result.scene, result.spans, result.diagnostics
+            self.unseen += check_evaluated(*facts, frames=self.frames)
+            parts.append(result.diagnostics.items)
+        every = merged([*parts, unused_defines(request)])
+        every.items[:] = [d for d in every.items if d.severity == "error" or self._selects(d.code)]
+        return every
+
+    def _selects(self, code: str) -> bool:
+        return code.startswith(self.select or "W") and not (self.ignore and code.startswith(self.ignore))
+
+    def owner(self, diagnostic: Diagnostic) -> str | None:
+        """The name of the scene that a diagnostic is in; None for an import that was not named."""
+        if diagnostic.span is None:
+            return None
+        name = diagnostic.span.source.name
+        return self.names.get(STDIN if name == "<stdin>" else _place(name))
+
+    def fix(self) -> Settled[str]:
+        """The texts after all fixes, by the names that the user wrote, and the diagnostics that are left.
+
+        Of imported files only those change that were named too.
+        """
+
+        def check(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
+            sources = {name: SourceFile(self.sources[name].name, text) for name, text in texts.items()}
+            inside = {Path(_place(name)): text for name, text in texts.items() if name != STDIN}
+            return [(self.owner(d), d) for d in self.check(sources, inside)]
+
+        return settle({name: source.text for name, source in self.sources.items()}, check)
+
+
+def _place(name: str) -> str:
+    return name if name == STDIN else os.path.realpath(name)

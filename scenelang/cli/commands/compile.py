@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
+from scenelang.cli.files import PROGRAM
 from scenelang.cli.say import Clock
-
-if TYPE_CHECKING:
-    from scenelang.cli.inputs import Request
 
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
 @click.option("-o", "--out", required=True, metavar="OUT", help="Program to write, .safetensors.")
-@inputs.request
-@inputs.strict
-@inputs.verbose
+@options.request()
+@options.strict
+@options.verbose
 @click.pass_context
-def command(ctx: click.Context, file: str, out: str, request: Request, strict: bool, verbose: bool) -> None:
+def command(
+    ctx: click.Context, file: str, out: str, request: options.Request, strict: bool, verbose: bool
+) -> None:
     """Compile a scene to a program that `scenelang render` draws and other software can read.
 
     FILE is a scene, or - for standard input. `scenelang dump` shows what the compiler made of it.
     """
-    from scenelang.cli.jobs import PROGRAM, prepare_scene
+    from scenelang.cli.inputs import prepare_scene
 
     if not out.endswith(PROGRAM):
         raise click.UsageError(f"A program's file ends in {PROGRAM}, `{out}` does not.")

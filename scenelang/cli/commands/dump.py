@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
 from scenelang.cli.main import Trouble
 from scenelang.cli.say import put_out
 from scenelang.compiler.passes import PASSES
+from scenelang.drawing.how import How, threads_for
 from scenelang.language.diagnostics import plural
 from scenelang.language.words import COMBINE
 
 if TYPE_CHECKING:
-    from scenelang.cli.inputs import Input, Request
-    from scenelang.drawing.how import How
+    from scenelang.cli.inputs import Input
 
 
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
@@ -48,17 +48,10 @@ _PATIENCE_S: Final = 60
     help="Format of what is printed, or of a drawing of the graph: mmd (Mermaid), dot, or svg and png, which "
     "need Graphviz; by default the one of OUT's suffix, else text.",
 )
-@click.option(
-    "--most",
-    type=click.IntRange(1, 10_000),
-    metavar="N",
-    default=200,
-    show_default=True,
-    help="Largest number of boxes to draw.",
-)
-@inputs.out
-@inputs.request
-@inputs.drawing("device", "threads")
+@options.count("--most", high=10_000, default=200, help="Largest number of boxes to draw.")
+@options.out
+@options.request()
+@options.drawing("device", "threads")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -69,7 +62,7 @@ def command(
     kind: Kind | None,
     most: int,
     out: str | None,
-    request: Request,
+    request: options.Request,
     how: How,
 ) -> None:
     """Show what a scene is after stages of the compiler, or draw its graph.
@@ -86,7 +79,7 @@ def command(
     steps and evaluations of the network), the parameters, the time of a frame, and the error against the
     exact picture.
     """
-    from scenelang.cli.jobs import prepare_scene
+    from scenelang.cli.inputs import prepare_scene
 
     suffix = Path(out or "").suffix[1:].lower()
     form = kind or (suffix if suffix in _DRAWN else "text")
@@ -97,7 +90,6 @@ def command(
         raise click.UsageError("A drawing is of one stage, with --after.")
     if drawn and "syntax" in stages:
         raise click.UsageError("The syntax tree has no drawing.")
-    dot = _find_dot(form) if form in ("svg", "png") else None
     job = prepare_scene(file, request)
     if (costs or drawn) and (job.scene is None or job.program is None or job.failed()):
         ctx.exit(1)
@@ -106,7 +98,7 @@ def command(
         put_out((json.dumps(plan, indent=2) if form == "json" else _costs_text(plan)) + "\n", out)
     elif drawn:
         text = _drawing(job, stages[0] if stages else "scene", form, most)
-        put_out(text if dot is None else _picture(dot, form, text), out)
+        put_out(_picture(form, text) if form in ("svg", "png") else text, out)
     else:
         shown = list(_changes(job, stages) if diff else _whole(job, stages or ("program",), form))
         if form == "json":
@@ -166,18 +158,14 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
     return to_mermaid(drawing) if kind == "mmd" else to_dot(drawing)
 
 
-def _find_dot(kind: str) -> str:
-    """The program that draws."""
-    result = shutil.which("dot")
-    if result is None:
+def _picture(kind: str, text: str) -> bytes:
+    """A picture of DOT text by Graphviz."""
+    dot = shutil.which("dot")
+    if dot is None:
         raise click.UsageError(
             f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."
         )
-    return result
-
-
-def _picture(dot: str, kind: str, text: str) -> bytes:
     try:
         done = subprocess.run(
             [dot, f"-T{kind}"], input=text.encode(), capture_output=True, timeout=_PATIENCE_S, check=False
@@ -193,9 +181,8 @@ def _picture(dot: str, kind: str, text: str) -> bytes:
 # ---------------------------------------------------------------- costs
 
 
-def _plan(job: Input, request: Request, how: How) -> dict[str, Any]:
+def _plan(job: Input, request: options.Request, how: How) -> dict[str, Any]:
     """Draw the scene and say what that took."""
-    from scenelang.drawing.how import threads_for
     from scenelang.drawing.torch_backend import choose_device, open_model
     from scenelang.output.plan import plan_of
 

@@ -7,16 +7,13 @@ import re
 import shutil
 import sys
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
 from scenelang.cli.say import wants_color
-
-if TYPE_CHECKING:
-    from scenelang.language.pages import Page
-
+from scenelang.language.pages import AREAS, CODES, Page, read_page
+from scenelang.language.reports import paint
 
 _WIDEST = 96
 
@@ -24,23 +21,21 @@ _WIDEST = 96
 @click.command("explain")
 @click.argument("code", required=False)
 @click.option("--list", "listed", is_flag=True, help="List all codes, as without a CODE.")
-@inputs.choice("--format", "kind", words="human json", help="Format of pages.")
-@inputs.color
-def command(code: str | None, listed: bool, kind: str, color: inputs.Color) -> None:
+@options.choice("--format", "kind", words="human json", help="Format of pages.")
+@options.color
+def command(code: str | None, listed: bool, kind: str, color: options.Color) -> None:
     """Say what CODE means, such as E0401, with an example and what to write instead.
 
     A word instead of a code lists the codes whose pages have it.
     """
-    from scenelang.language.pages import CODES, read_page
-
-    paint = wants_color(sys.stdout, color)
+    painted = wants_color(sys.stdout, color)
     if code is None or listed:
-        _print_list(list(CODES), kind, paint)
+        _print_list(list(CODES), kind, painted)
         return
     result = re.search(r"[EWew]\d{4}", code)
     wanted = result.group().upper() if result else code.strip()
     if wanted in CODES:
-        _print_page(read_page(wanted), kind, paint)
+        _print_page(read_page(wanted), kind, painted)
         return
     about = _about(wanted) if len(wanted) >= 3 else []
     if not about:
@@ -49,12 +44,11 @@ def command(code: str | None, listed: bool, kind: str, color: inputs.Color) -> N
         if near:
             advice = f"Did you mean {' or '.join(near)}?"
         raise click.UsageError(f"No code `{code}`. {advice}")
-    _print_list(about, kind, paint)
+    _print_list(about, kind, painted)
 
 
 def _about(word: str) -> list[str]:
     """The codes whose pages have a word, in British or American spelling, in their text or examples."""
-    from scenelang.language.pages import CODES, read_page
 
     def plain(text: str) -> str:
         return text.lower().replace("colour", "color").replace("grey", "gray")
@@ -62,9 +56,7 @@ def _about(word: str) -> list[str]:
     return [code for code in CODES if plain(word) in plain(read_page(code).text)]
 
 
-def _print_list(codes: list[str], kind: str, paint: bool) -> None:
-    from scenelang.language.pages import AREAS, read_page
-
+def _print_list(codes: list[str], kind: str, painted: bool) -> None:
     if kind == "json":
         data = [{"code": p.code, "severity": p.severity, "title": p.title} for p in map(read_page, codes)]
         click.echo(json.dumps({"version": 1, "codes": data}, indent=2))
@@ -72,13 +64,13 @@ def _print_list(codes: list[str], kind: str, paint: bool) -> None:
     sections = []
     for area, name in AREAS.items():
         pages = [read_page(code) for code in codes if code[1:3] == area]
-        own = [f"  {_styled(page.code, page.severity, paint)}  {page.title}" for page in pages]
+        own = [f"  {paint(page.severity, page.code, painted)}  {page.title}" for page in pages]
         if own:
-            sections.append("\n".join([_styled(name, "bold", paint), *own]))
+            sections.append("\n".join([paint("bold", name, painted), *own]))
     click.echo("\n\n".join(sections), color=True)
 
 
-def _print_page(page: Page, kind: str, paint: bool) -> None:
+def _print_page(page: Page, kind: str, painted: bool) -> None:
     if kind == "json":
         data = {
             "version": 1,
@@ -96,11 +88,5 @@ def _print_page(page: Page, kind: str, paint: bool) -> None:
         click.echo(json.dumps(data, indent=2, ensure_ascii=False))
         return
     width = min(shutil.get_terminal_size((_WIDEST, 24)).columns, _WIDEST)
-    text = page.plain(max(width, 40), lambda text, style: _styled(text, style, paint))
+    text = page.plain(max(width, 40), lambda text, style: paint(style, text, painted))
     click.echo(text, nl=False, color=True)
-
-
-def _styled(text: str, style: str, paint: bool) -> str:
-    from scenelang.language import reports
-
-    return reports.paint(style, text, paint)

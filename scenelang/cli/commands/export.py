@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
-from scenelang.cli import inputs
+from scenelang.assets.files import write_output
+from scenelang.cli import options
+from scenelang.cli.files import PAGE, stem_of, targets
 from scenelang.cli.say import Clock, say_trouble
-
-if TYPE_CHECKING:
-    from scenelang.cli.inputs import Request
 
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
 @click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
-@inputs.request
-@inputs.strict
-@inputs.verbose
+@options.request()
+@options.strict
+@options.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
     files: tuple[str, ...],
     out: str,
     title: str | None,
-    request: Request,
+    request: options.Request,
     strict: bool,
     verbose: bool,
 ) -> None:
@@ -40,9 +37,7 @@ def command(
     Scenes with errors are reported and left out. Exits with 1 if there are any, 2 if a file cannot be read
     or written.
     """
-    from scenelang.assets.files import write_output
-    from scenelang.cli.inputs import stem_of
-    from scenelang.cli.jobs import PAGE, prepare_all, targets
+    from scenelang.cli.inputs import prepare_all
     from scenelang.compiler.program import ProgramError
     from scenelang.web.export import page, scene_view, still
 

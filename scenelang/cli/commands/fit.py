@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from scenelang.cli import inputs
-from scenelang.cli.jobs import targets
+from scenelang.cli import options
+from scenelang.cli.files import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.say import Bar, put_out, say_diagnostics, say_trouble
-
-if TYPE_CHECKING:
-    from scenelang.language.session import Defines
-
+from scenelang.cli.say import Bar, put_out
 
 NOT_CONVERGED = 1
 MOST_FRAMES = 10_000  # whose pictures are looked for
@@ -69,76 +65,33 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
     help="Target, PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
 )
 @click.option(
-    "-o",
-    "--out",
-    metavar="OUT",
-    help="Scene to write, with the values that were found as defaults; - prints it.",
+    "-o", "--out", metavar="OUT", help="Scene to write, with the values found as defaults; - prints it."
 )
-@click.option(
-    "--params",
-    "names",
-    multiple=True,
-    metavar="NAME,…",
-    help="Params to find, instead of all that have a range.",
-)
-@click.option(
-    "--start",
-    multiple=True,
-    metavar="NAME=VALUE",
-    callback=inputs.assignments,
-    help="Value to begin with, instead of the param's default.",
-)
-@inputs.define
-@click.option(
-    "--mask",
-    type=click.Path(path_type=Path),
-    metavar="PICTURE",
-    help="Picture that is bright where pixels count.",
-)
-@click.option("--crop", metavar="WxH+X+Y", callback=_crop, help="Part of the target that shows the scene.")
-@click.option(
-    "--background",
-    default="#ffffff",
-    metavar="COLOR",
+@options.text("--params", "NAME,…", "Params to find, instead of all that have a range.", multiple=True)
+@options.text(
+    "--start", "NAME=VALUE", "Value to begin with, instead of the param's default.", multiple=True,
+    callback=options.assignments,
+)  # fmt: skip
+@options.request("defines", "frame", "model", "root")
+@options.text("--mask", "PICTURE", "Picture that is bright where pixels count.")
+@options.text("--crop", "WxH+X+Y", "Part of the target that shows the scene.", callback=_crop)
+@options.text(
+    "--background", "COLOR", "Colour behind what is transparent.", default="#ffffff", show_default=True,
     callback=_colour,
-    show_default=True,
-    help="Colour behind what is transparent.",
-)
+)  # fmt: skip
 @click.option("--compare", metavar="OUT.png", help="Write a picture of before, after and target.")
 @click.option("--animate", metavar="OUT.gif", help="Write an animation of the way to what was found.")
-@click.option(
-    "--seed", default=0, type=click.IntRange(0, 2**31 - 1), metavar="N", help="Seed of the places to look at."
-)
-@click.option(
-    "--budget",
-    default=300.0,
-    type=inputs.Real(0, min_open=True),
-    show_default=True,
-    metavar="SECONDS",
-    help="Time after which nothing new is begun.",
-)
-@inputs.frame
-@inputs.model
-@inputs.root
-@click.pass_context
+@options.count("--seed", low=0, high=2**31 - 1, default=0, help="Seed of the places to look at.")
+@options.positive("--budget", "SECONDS", "Time after which nothing new is begun.", default=300.0)
 def command(
-    ctx: click.Context,
     scene: Path,
-    target: Path | dict[int, Path],
     out: str | None,
-    names: tuple[str, ...],
-    start: dict[str, str],
-    defines: Defines,
-    mask: Path | None,
-    crop: tuple[int, int, int, int] | None,
-    background: tuple[float, float, float],
+    params: tuple[str, ...],
+    request: options.Request,
     compare: str | None,
     animate: str | None,
-    seed: int,
     budget: float,
-    frame: int | None,
-    model: str | None,
-    root: str | None,
+    **given: Any,  # arguments of `fit` by their names
 ) -> None:
     """Find the params of SCENE whose picture comes nearest to another picture.
 
@@ -148,7 +101,6 @@ def command(
     """
     from scenelang.drawing.exact.mesh import FitError
     from scenelang.inverse.fit import fit
-    from scenelang.language.reports import SceneError
     from scenelang.output.animate import animate as render
     from scenelang.output.frames import is_animation
 
@@ -156,20 +108,16 @@ def command(
         targets(["compare"], compare)
     if animate is not None and not is_animation(animate):
         raise click.UsageError(f"`{animate}` names no animation, such as way.gif.")
-    wanted = [name for listed in names for name in re.split(r"[,\s]+", listed) if name]
+    wanted = [name for listed in params for name in re.split(r"[,\s]+", listed) if name]
+    source = request.source
     try:
         with Bar() as bar:
             result = fit(
-                scene, target, params=wanted, start=start, fixed=defines.values, mask=mask, crop=crop,
-                background=background, model=model, root=root, frame=frame or 0, seed=seed, budget_s=budget,
-                progress=bar,
+                scene, params=wanted, fixed=source.values, model=source.model, root=source.root,
+                frame=request.frame or 0, budget_s=budget, progress=bar, **given,
             )  # fmt: skip
-    except SceneError as error:
-        say_diagnostics(error.diagnostics)
-        raise click.exceptions.Exit(1) from None
     except FitError as error:
-        say_trouble(str(error))
-        raise click.exceptions.Exit(Trouble.exit_code) from None
+        raise Trouble(str(error)) from None
     if out is not None:
         put_out(result.text, out)
     if compare is not None:
@@ -180,4 +128,4 @@ def command(
     for line in result.told():
         click.echo(line, err=out == "-")
     if not result.done:
-        ctx.exit(NOT_CONVERGED)
+        raise click.exceptions.Exit(NOT_CONVERGED)

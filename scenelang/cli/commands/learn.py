@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Any
 
 import click
 
 from scenelang.assets.element import MOST_PIXELS, TEXELS
-from scenelang.cli import inputs
-from scenelang.cli.jobs import targets
+from scenelang.assets.zoo import SUFFIX, load_zoo
+from scenelang.cli import options
+from scenelang.cli.files import targets
 from scenelang.cli.main import Trouble
-from scenelang.cli.say import Bar, say_trouble
-
-if TYPE_CHECKING:
-    from scenelang.drawing.exact.mesh import Sign
+from scenelang.cli.say import Bar
 
 
 @click.command("learn")
@@ -24,22 +22,20 @@ if TYPE_CHECKING:
     "-o", "--out", required=True, metavar="ZOO", help="File of elements to write or to add to, .safetensors."
 )
 @click.option("--name", metavar="NAME", help="Name of the element; by default the file's.")
-@inputs.choice(
+@options.choice(
     "--as",
     "pictures",
     words="texture outline",
     help="Element to make of a picture: a material, or the flat shape of its opaque or, without "
     "transparency, dark part.",
 )
-@click.option(
+@options.count(
     "--texels",
-    type=click.IntRange(1, MOST_PIXELS),
-    metavar="N",
+    high=MOST_PIXELS,
     default=TEXELS,
-    show_default=True,
     help="Texels of a texture along its longer side, at most; larger pictures are made smaller.",
 )
-@inputs.choice(
+@options.choice(
     "--sign",
     words="auto winding closed",
     help="Test for the inside: winding numbers, of any mesh, or normals, of a closed one that "
@@ -51,50 +47,31 @@ if TYPE_CHECKING:
     help="Make parts elements of their own too: solids that a mesh file names, areas of one "
     "colour; by default those of drawings.",
 )
-@click.option(
-    "--color-error",
-    type=inputs.Real(0, 1, min_open=True),
-    metavar="SHARE",
-    help="Largest root mean square error of a mesh's colours; by default 0.025.",
+@options.positive(
+    "--color-error", "SHARE", "Largest root mean square error of a mesh's colours; by default 0.025.", high=1
 )
-@click.option(
+@options.positive(
     "--max-error",
-    type=inputs.Real(0, 1, min_open=True),
-    metavar="SHARE",
-    help="Largest mean error of distances at the surface, in radii of the shape, by default 0.00015 "
+    "SHARE",
+    "Largest mean error of distances at the surface, in radii of the shape, by default 0.00015 "
     "for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
     "colours, by default 0.01.",
+    high=1,
 )
-@click.option(
-    "--budget",
-    type=inputs.Real(0, min_open=True),
-    default=math.inf,
-    metavar="SECONDS",
-    help="Time after which nothing new is begun, for each file.",
-)
-@click.option(
-    "--steps", type=click.IntRange(1), metavar="N", help="Largest number of forms to try, whatever the time."
-)
+@options.positive("--budget", "SECONDS", "Time after which nothing new is begun, for each file.")
+@options.count("--steps", help="Largest number of forms to try, whatever the time.")
 @click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")
 @click.option("--source", metavar="TEXT", help="Origin of the originals, kept in the file.")
-@inputs.cluster
+@options.cluster
 @click.option("--preview", metavar="OUT.png", help="Write a picture of all elements of the file.")
 def command(
     files: tuple[str, ...],
     out: str,
     name: str | None,
-    pictures: Literal["texture", "outline"],
-    texels: int,
-    sign: Sign,
-    parts: bool | None,
-    color_error: float | None,
-    max_error: float | None,
-    budget: float,
-    steps: int | None,
-    license: str | None,
-    source: str | None,
+    budget: float | None,
     cluster: str | None,
     preview: str | None,
+    **given: Any,  # fields of `LearnOptions` by their names
 ) -> None:
     """Make meshes and drawings elements, which scenes import.
 
@@ -109,7 +86,6 @@ def command(
 
     A scene says: import "zoo.safetensors" as zoo; zoo.cow { … }
     """
-    from scenelang.assets.zoo import SUFFIX, load_zoo
     from scenelang.drawing.exact.mesh import FitError
     from scenelang.inverse.learn import LearnOptions, learn_files, names_of
 
@@ -118,20 +94,16 @@ def command(
     if preview is not None:
         targets(["preview"], preview)
     try:
-        options = LearnOptions(
-            sign, max_error, budget, steps, license, source, pictures, texels, parts, color_error
-        )
-        names_of(files, options, name)
+        wishes = LearnOptions(budget_s=budget or math.inf, **given)
+        names_of(files, wishes, name)
     except ValueError as error:
         raise click.UsageError(f"{error}.") from None
     try:
         with Bar() as bar:
             say = partial(click.echo, err=True)
-            learn_files(files, out, options, name=name, cluster=cluster, say=say, progress=bar)
+            learn_files(files, out, wishes, name=name, cluster=cluster, say=say, progress=bar)
     except FitError as error:
-        for line in str(error).split("\n"):
-            say_trouble(line)
-        raise click.exceptions.Exit(Trouble.exit_code) from None
+        raise Trouble(str(error).replace("\n", "\nError: ")) from None
     if preview is not None:
         from scenelang.drawing.small import sheet
 

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import logging
+import socket
+import sys
 
 import click
 
+from scenelang.assets.element import Element
+from scenelang.cli import options
 from scenelang.cli.main import Trouble
-
-if TYPE_CHECKING:
-    from scenelang.assets.element import Element
 
 
 @click.command("lsp")
 @click.option("--stdio", is_flag=True, help="Speak over standard input and output; the default.")
-@click.option(
-    "--tcp", type=click.IntRange(1, 65535), metavar="PORT", help="Serve one client on a port of this machine."
-)
+@options.count("--tcp", high=65535, metavar="PORT", help="Serve one client on a port of this machine.")
 @click.option("--log", type=click.Path(dir_okay=False), metavar="FILE", help="Write a log to a file.")
 def command(stdio: bool, tcp: int | None, log: str | None) -> None:
     """Serve an editor over the Language Server Protocol.
 
     Editors start it themselves; docs/editors.md says how.
     """
-    import logging
-    import socket
-    import sys
-
     if stdio and tcp is not None:
         raise click.UsageError("--stdio and --tcp exclude each other.")
     try:

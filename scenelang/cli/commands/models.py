@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import click
 
-from scenelang.cli import inputs
-
-if TYPE_CHECKING:
-    from scenelang.compiler.manifest import Manifest
+from scenelang.cli import options
+from scenelang.compiler.manifest import Manifest, available, load_manifest
+from scenelang.compiler.weights import ModelError, read_facts
 
 
 @click.command("models")
 @click.argument("name", required=False)
-@inputs.choice("--format", "kind", words="human json", help="Format of what is printed.")
+@options.choice("--format", "kind", words="human json", help="Format of what is printed.")
 def command(name: str | None, kind: Literal["human", "json"]) -> None:
     """List the models, or tell all about the model NAME.
 
     That is its manifest (what it can draw, which ranges it was trained or measured in, what was
     measured), its weights, and how they were trained.
     """
-    from scenelang.compiler.manifest import available, load_manifest
-
     known = available()
     if name is None:
         told = [_facts(load_manifest(each)) for each in known]
@@ -44,8 +41,6 @@ def command(name: str | None, kind: Literal["human", "json"]) -> None:
 
 def _facts(manifest: Manifest) -> dict[str, Any]:
     """Manifest and weights; the weights are null where they are missing or damaged."""
-    from scenelang.compiler.weights import ModelError, read_facts
-
     try:
         weights: dict[str, Any] | None = read_facts(manifest.name)
     except (OSError, ModelError):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from scenelang.cli import options
 from scenelang.cli.main import Trouble
 
 NEW = "nsg 1;\n\nsquare { scale(0.6); material flat { color(#2a6f97); } }\n"  # as the page's own
@@ -14,12 +15,7 @@ _PARTS = ("starlette", "uvicorn", "websockets", "watchfiles", "pygls", "lsprotoc
 
 @click.command("play")
 @click.argument("path", default=".", metavar="[SCENE | FOLDER]", type=click.Path(path_type=Path))
-@click.option(
-    "--port",
-    type=click.IntRange(1, 65535),
-    metavar="N",
-    help="Port to listen on; by default 8766 or a free one.",
-)
+@options.count("--port", high=65535, help="Port to listen on; by default 8766 or a free one.")
 @click.option(
     "--host",
     default="127.0.0.1",

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
+from scenelang.cli.files import PROGRAM, check_outputs, targets
 from scenelang.cli.main import Trouble
 from scenelang.cli.say import Bar, Clock
+from scenelang.drawing.how import How, threads_for
+from scenelang.language.diagnostics import plural
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
-    from scenelang.cli.inputs import Input, Request
-    from scenelang.drawing.how import How
-    from scenelang.drawing.image import Image, Output, Outputs
+    from scenelang.cli.inputs import Input
+    from scenelang.drawing.image import Image, Output
 
 
 _SECTIONS: Final = {
@@ -28,7 +30,7 @@ _SECTIONS: Final = {
 }
 
 
-@click.command("render", cls=inputs.Sectioned, sections=_SECTIONS)
+@click.command("render", cls=options.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
 @click.option(
     "-o",
@@ -37,54 +39,37 @@ _SECTIONS: Final = {
     metavar="OUT",
     help="Picture, animation, numbered pictures or folder to write.",
 )
-@inputs.request
-@inputs.frames
-@inputs.fps
-@inputs.jobs
-@inputs.cluster
-@inputs.choice(
-    "--palette", words="auto global frame", help="Colours of a GIF: 255 for all frames or for each."
-)
-@click.option("--dither", is_flag=True, help="Dither colours that a GIF's palette lacks.")
-@inputs.drawing()
-@click.option(
+@options.request()
+@options.film()
+@options.drawing()
+@options.several(
     "--output",
     "outputs",
-    multiple=True,
-    type=click.Choice(("depth", "normal", "object", "alpha", "proof")),
-    help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr; may be "
-    "given several times.",
+    of=("depth", "normal", "object", "alpha", "proof"),
+    help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr",
 )
 @click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
 @click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
-@click.option(
-    "--max-ms",
-    type=inputs.Real(0, min_open=True),
-    metavar="N",
-    help="Choose the most exact way to draw that takes at most N milliseconds on one thread.",
+@options.positive(
+    "--max-ms", "N", "Choose the most exact way to draw that takes at most N milliseconds on one thread."
 )
 @click.option(
     "--max-flip",
-    type=inputs.Real(0, 1),
+    type=options.Real(0, 1),
     metavar="E",
     help="Choose the fastest way to draw whose promised FLIP error is at most E.",
 )
-@inputs.originals
-@inputs.strict
-@inputs.verbose
+@options.originals
+@options.strict
+@options.verbose
 @click.pass_context
 def command(
     ctx: click.Context,
     files: tuple[str, ...],
     out: str,
-    request: Request,
+    request: options.Request,
+    film: options.Film,
     how: How,
-    frames: str | None,
-    fps: float | None,
-    jobs: int | None,
-    cluster: str | None,
-    palette: Literal["auto", "global", "frame"],
-    dither: bool,
     outputs: tuple[Output, ...],
     prove: bool,
     redraw: bool,
@@ -117,56 +102,59 @@ def command(
     With --max-ms or --max-flip each scene is drawn by what was measured to suffice, model and samples; -v
     says which, why, and what was next.
     """
-    from scenelang.cli.animation import Film, animate, moves
-    from scenelang.cli.inputs import read_input, unused_defines
-    from scenelang.cli.jobs import PROGRAM, check_outputs, choose_all, prepare_all, targets
-    from scenelang.output.frontier import Limits
+    from scenelang.cli.inputs import prepare_all, read_input, unused_defines
 
-    outputs = tuple(dict.fromkeys(outputs))
-    more = _More(outputs, prove or redraw or "proof" in outputs, redraw)
-    film, limits = Film(frames, fps, jobs, cluster, palette, dither), Limits(max_ms, max_flip)
-    _ = film.frames
+    outputs, limits = tuple(dict.fromkeys(outputs)), max_ms is not None or max_flip is not None
+    prove |= redraw or "proof" in outputs
     if request.frame is not None and film.certain:
         raise click.UsageError("--frame asks for a picture, --frames and --fps for an animation.")
     if film.certain and len(files) > 1:
         raise click.UsageError("--frames and --fps take one scene.")
-    if more.prove and (limits or how.backend != "neural"):
+    if prove and (limits or how.backend != "neural"):
         other = "--max-ms and --max-flip" if limits else f"--backend {how.backend}, whose pictures are exact"
         raise click.UsageError(f"A proof is of what the scene's model draws; leave out {other}.")
-    request = replace(request, source=replace(request.source, fps=fps))
+    request = replace(request, source=replace(request.source, fps=film.fps))
     clock, result = Clock(), None
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
+            from scenelang.cli.animation import animate, moves
+
             result = read_input(files[0], request, clock, how)
             if moves(result, target, film, out):
-                if limits or more.prove:
-                    what = "a proof is" if more.prove else "--max-ms and --max-flip are"
+                if limits or prove:
+                    what = "a proof is" if prove else "--max-ms and --max-flip are"
                     raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
                 result.diagnostics.items += unused_defines(request)
-                ctx.exit(animate(result, target, film, how, out, outputs, strict, verbose))
+                animate(result, target, film, out, outputs, strict, verbose)
+                return
     elif film.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
-    if cluster is not None:
+    if film.cluster is not None:
         raise click.UsageError("--cluster draws the frames of an animation; sweep draws many pictures.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
     refused = None
-    if more.prove or how.backend == "reference":
-        does = "a proof is of a scene" if more.prove else "the reference draws scenes"
+    if prove or how.backend == "reference":
+        does = "a proof is of a scene" if prove else "the reference draws scenes"
         refused = f"{does}; a program keeps only what the network needs"
     every, code = prepare_all(
-        files, request, clock, how, strict=strict, graphs=more.prove, stored=refused, first=result
+        files, request, clock, how, strict=strict, graphs=prove, stored=refused, first=result
     )
     able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
     if limits and able:
-        chosen = choose_all([job for job, _ in able], limits, request.source.model, clock)
+        from scenelang.cli.choosing import choose_all
+        from scenelang.output.frontier import Limits
+
+        with clock("choose"):
+            chosen = choose_all([job for job, _ in able], Limits(max_ms, max_flip), request.source.model)
         code = code if len(chosen) == len(able) else 2
         able = [(job, path) for job, path in able if job in chosen]
     told: list[str] = []
     with Bar() as bar:
         for index, (job, path) in enumerate(able):
-            told += _draw(job, path, more, clock, partial(_part, bar, index, len(able)))
+            progress = partial(_progress, bar, index, len(able))
+            told += _save(job, path, outputs, (prove, redraw), clock, progress)
             if verbose:
                 lines = "".join(f"\n  {note}" for note in job.notes)
                 click.echo(f"{job.name} -> {path}{lines}", err=True)
@@ -177,49 +165,97 @@ def command(
     ctx.exit(code)
 
 
-class _More(NamedTuple):
-    """Wishes besides a picture."""
-
-    outputs: tuple[Output, ...]
-    prove: bool
-    redraw: bool
+def _progress(bar: Bar, index: int, count: int, share: float) -> None:
+    bar("drawing", index + share, count)
 
 
-def _draw(job: Input, path: Path, more: _More, clock: Clock, progress: Callable[[float], None]) -> list[str]:
-    """Draw a job to a file; lines about it."""
-    from scenelang.cli.jobs import blank, draw_job
-    from scenelang.drawing.image import Outputs
+def _save(
+    job: Input,
+    path: Path,
+    outputs: tuple[Output, ...],
+    proof_options: tuple[bool, bool],
+    clock: Clock,
+    progress: Callable[[float], None],
+) -> list[str]:
+    """Draw a job to a file; lines about it.
+
+    Args:
+        proof_options: prove the picture, and draw again what is not proved right.
+    """
+    from scenelang.drawing.image import Outputs, save_outputs
     from scenelang.drawing.render import outputs_of, prove_drawn
 
-    result, drawn, proof = Outputs(), job.scene if job.how.backend == "reference" else job.program, None
-    if more.outputs and drawn is not None:  # before the picture: what it lacks is said at once
+    (prove, redraw), proof, result = proof_options, None, Outputs()
+    drawn = job.scene if job.how.backend == "reference" else job.program
+    if outputs and drawn is not None:  # before the picture: what it lacks is said at once
         with clock("outputs"):
-            result = outputs_of(drawn, more.outputs, job.how, spans=job.spans)
-    if more.prove and job.program is not None:
+            result = outputs_of(drawn, outputs, job.how, spans=job.spans)
+    if prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
-                job.graphs, job.program.model, lambda: draw_job(job, clock, progress), more.redraw
+                job.graphs, job.program.model, lambda: _draw(job, clock, progress), redraw
             )
     else:
-        image = draw_job(job, clock, progress)
-    told = [] if (why := blank(job, image)) is None else [f"{path}: {why}"]
+        image = _draw(job, clock, progress)
+    told = [] if (why := _blank(job, image)) is None else [f"{path}: {why}"]
     if proof is not None:
         told.append(f"{path}: {proof.told()}")
-        result = replace(result, proof=proof) if "proof" in more.outputs else result
+        result = replace(result, proof=proof) if "proof" in outputs else result
     with clock("save"):
-        return told + _saved(image, result, path)
+        try:
+            saved = save_outputs(image, result, path)
+        except ValueError as error:
+            raise Trouble(f"cannot write `{path}`: {error}") from None
+    return told + [f"{file}: {result.told(name)}" for file, name in zip(saved, result.names, strict=True)]
 
 
-def _saved(image: Image, outputs: Outputs, path: Path) -> list[str]:
-    """Write a picture and its outputs; a line about each of these."""
-    from scenelang.drawing.image import save_outputs
+def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
+    """Draw a job with its options and add its notes; ``progress`` gets the share done, in [0, 1]."""
+    from scenelang.drawing.render import draw, draw_exact
 
-    try:
-        files = save_outputs(image, outputs, path)
-    except ValueError as error:
-        raise Trouble(f"cannot write `{path}`: {error}") from None
-    return [f"{file}: {outputs.told(name)}" for file, name in zip(files, outputs.names, strict=True)]
+    how, program = job.how, job.program
+    if how.backend == "reference":
+        assert job.scene is not None
+        with clock("draw"):
+            image = draw_exact(job.scene, spans=job.spans, progress=progress)
+        job.notes.append("drew the exact picture, four samples a pixel")
+        return image
+    from scenelang.drawing.small import choose_drawer
+
+    assert program is not None
+    library, why = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+    if library == "numpy":
+        cores = how.threads or threads_for(program.canvas) if program.stage else 1
+        device, place = "numpy", "one core" if cores == 1 else f"{cores} cores"
+    else:
+        with clock("load torch"):
+            from scenelang.drawing.torch_backend import choose_device, open_model
+        device = place = choose_device(how.device)
+        with clock("load model"):
+            open_model(program.model, device, program.weights)
+    with clock("draw"):
+        drawing = draw(program, how, place=device, progress=progress)
+    if drawing.work is not None and drawing.work.lost:
+        lost = f"{drawing.work.lost:,} rays took too many steps"
+        click.echo(f"Warning: {job.name}: the picture is incomplete: {lost}", err=True)
+    width, height = program.canvas
+    once = width * height - drawing.refined
+    job.notes += [
+        f"drawn by {library} on {place}: {why}",
+        f"drew {plural(once, 'pixel')} by one sample and {drawing.refined:,} by four",
+        f"{plural(drawing.pairs, 'meeting')} of a sample and an object",
+    ]
+    return drawing.image
 
 
-def _part(bar: Bar, index: int, count: int, share: float) -> None:
-    bar("drawing", index + share, count)
+def _blank(job: Input, image: Image) -> str | None:
+    """The reason why a picture shows nothing, unless a warning has given it."""
+    if any(d.code == "W0402" for d in job.diagnostics):
+        return None
+    if job.program is not None and not len(job.program.tokens):
+        return "no objects to draw: a module draws where it is called, as in part();"
+    if not all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image):
+        return None
+    if (image[0, 0] > 1 - 0.5 / 255).all():
+        return "one colour throughout; flat objects are white without a colour, and so is the background"
+    return "one colour throughout: objects in the background's colour, cut away, or smaller than a pixel"

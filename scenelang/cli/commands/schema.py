@@ -6,17 +6,17 @@ import json
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
 from scenelang.cli.say import put_out
 
 
 @click.command("schema")
-@inputs.choice(
+@options.choice(
     "--kind",
     words="scene diagnostics manifest",
     help="Schema of scenes as JSON, of what `check --format json` prints, or of a model's manifest.",
 )
-@inputs.out
+@options.out
 def command(kind: str, out: str | None) -> None:
     """Print the JSON Schema (draft 2020-12) of scenes as JSON.
 

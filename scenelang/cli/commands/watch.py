@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import replace
 from functools import partial
@@ -10,38 +11,36 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from scenelang.cli import inputs
+from scenelang.cli import options
+from scenelang.cli.files import composed, targets
 from scenelang.cli.main import describe
 from scenelang.cli.say import wants_color
+from scenelang.drawing.how import How, RenderError
 from scenelang.language.diagnostics import plural
 
 if TYPE_CHECKING:
     import PIL.Image
 
-    from scenelang.cli.inputs import Request
-    from scenelang.drawing.how import How
     from scenelang.output.watch import Easel, Outcome, Screen
 
 
 @click.command("watch")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("-o", "--out", metavar="OUT", help="Picture or animation to write; by default STEM.png.")
-@inputs.request
-@inputs.frames
-@inputs.fps
-@inputs.choice(
+@options.request()
+@options.film("frames", "fps")
+@options.choice(
     "--show",
     words="auto never always",
     help="Show the picture in the terminal; always does with coloured characters if need be.",
 )
-@inputs.drawing()
+@options.drawing()
 def command(
     file: Path,
     out: str | None,
-    request: Request,
+    request: options.Request,
+    film: options.Film,
     how: How,
-    frames: str | None,
-    fps: float | None,
     show: Literal["auto", "never", "always"],
 ) -> None:
     """Draw a scene again whenever it, or a file that it imports, is saved.
@@ -50,22 +49,17 @@ def command(
     which a further save calls off. Mistakes stay on the screen until they are mended, and OUT stays the last
     good picture. Where OUT is an animation, all of it is drawn again. Ctrl-C ends it, with exit code 130.
     """
-    import sys
-
-    from scenelang.cli.animation import Film
-    from scenelang.cli.jobs import composed, targets
+    from scenelang.output.frames import FrameRange
     from scenelang.output.watch import Easel, Outdated, Screen, settle, stamps, wait
 
     out = str(composed(Path(f"{file.stem}.png"))) if out is None else out
-    film, target = Film(frames, fps), None
-    if request.frame is None:
-        target = film.target(str(file), out)
+    target = film.target(str(file), out) if request.frame is None else None
     path = Path(out) if target is not None else targets([str(file)], out)[0]
     if not file.is_file():
         raise click.UsageError(f"there is no file `{file}`.")
-    source = replace(request.source, path=file, fps=fps, params=request.source.values)
+    source = replace(request.source, path=file, fps=film.fps, params=request.source.values)
     screen = Screen(show, wants_color(sys.stdout))
-    easel = Easel(source, path, target, film.frames, request.frame or 0, how)
+    easel = Easel(source, path, target, film.frames or FrameRange(), request.frame or 0, how)
     easel.drafted = partial(_report, easel, screen)
     while True:
         before = stamps(easel.paths)
@@ -79,8 +73,6 @@ def command(
 
 
 def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    from scenelang.drawing.how import RenderError
-
     clock = time.strftime("%H:%M:%S")
     try:
         outcome = easel.draw(before)
@@ -95,7 +87,6 @@ def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] 
 
 
 def _report(easel: Easel, screen: Screen, outcome: Outcome) -> None:
-
     clock = time.strftime("%H:%M:%S")
     screen.clear()
     if outcome.diagnostics:
