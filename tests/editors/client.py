@@ -1,8 +1,4 @@
-"""A client of the language server over real standard input and output, written against the protocol alone.
-
-It keeps its own copy of each text and knows nothing of the server's code, so that both can be held against
-each other.
-"""
+"""A client of the language server over real pipes, written against the protocol alone, with its own texts."""
 
 from __future__ import annotations
 
@@ -10,6 +6,7 @@ import json
 import queue
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -29,12 +26,7 @@ CAPABILITIES: Json = {
         "completion": {"completionItem": {"snippetSupport": True}},
         "rename": {"prepareSupport": True},
         "publishDiagnostics": {"relatedInformation": True, "versionSupport": True},
-        "semanticTokens": {
-            "requests": {"full": True, "range": True},
-            "tokenTypes": [],
-            "tokenModifiers": [],
-            "formats": ["relative"],
-        },
+        "semanticTokens": {"requests": {}, "tokenTypes": [], "tokenModifiers": [], "formats": ["relative"]},
     },
 }
 
@@ -49,11 +41,12 @@ class Client:
         options: Json | None = None,
         command: list[str] | None = None,
     ) -> None:
+        self.errors = tempfile.TemporaryFile()  # noqa: SIM115
         self.process = subprocess.Popen(
             command or [sys.executable, "-m", "scenelang", "lsp"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self.errors,
         )
         self.encoding = encoding
         self.texts: dict[str, str] = {}
@@ -64,16 +57,13 @@ class Client:
         self._answers: dict[int | None, Json] = {}
         self._inbox: queue.Queue[Json | None] = queue.Queue()
         self._id = 0
-        self.stderr: list[bytes] = []
-        for target in (self._read, self._drain):
-            threading.Thread(target=target, daemon=True).start()
+        threading.Thread(target=self._read, daemon=True).start()
         capabilities = json.loads(json.dumps(CAPABILITIES))
         capabilities["general"]["positionEncodings"] = [encoding]
-        folder = {"uri": root.as_uri(), "name": root.name} if root else None
         params = {
             "processId": None,
-            "rootUri": folder["uri"] if folder else None,
-            "workspaceFolders": [folder] if folder else None,
+            "rootUri": root.as_uri() if root else None,
+            "workspaceFolders": [{"uri": root.as_uri(), "name": root.name}] if root else None,
             "capabilities": capabilities,
             "initializationOptions": {"debounceMs": 20} if options is None else options,
         }
@@ -83,8 +73,6 @@ class Client:
             self.kill()
             raise
         self.notify("initialized", {})
-
-    # ------------------------------------------------------------ messages
 
     def _read(self) -> None:
         stream = self.process.stdout
@@ -98,11 +86,6 @@ class Client:
                 self._inbox.put(None)
                 return
             self._inbox.put(json.loads(stream.read(length)))
-
-    def _drain(self) -> None:
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
-            self.stderr.append(line)
 
     def send(self, message: Json) -> None:
         data = json.dumps({"jsonrpc": "2.0", **message}).encode()
@@ -126,7 +109,8 @@ class Client:
         except queue.Empty:
             return False
         if message is None:
-            raise EOFError(b"".join(self.stderr).decode())
+            self.errors.seek(0)
+            raise EOFError(self.errors.read().decode())
         method = message.get("method")
         if method == "textDocument/publishDiagnostics":
             self.published.setdefault(message["params"]["uri"], []).append(message["params"])
@@ -157,8 +141,6 @@ class Client:
         message = self.answer(self.start(method, params))
         assert "error" in message, message
         return str(message["error"]["message"])
-
-    # ------------------------------------------------------------ documents
 
     def open(self, uri: str, text: str) -> str:
         self.texts[uri], self.versions[uri] = text, 1
@@ -193,10 +175,8 @@ class Client:
         return {"line": line, "character": self.units(column)}
 
     def units(self, text: str) -> int:
-        name, size = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}[
-            self.encoding
-        ]
-        return len(text.encode(name)) // size
+        size = {"utf-8": 1, "utf-16": 2, "utf-32": 4}[self.encoding]
+        return len(text.encode(f"{self.encoding}-le" if size > 1 else "utf-8")) // size
 
     def offset(self, text: str, place: Json) -> int:
         start = 0
@@ -255,10 +235,16 @@ class Client:
         self.notify("exit", None)
         return self.process.wait(PATIENCE_S)
 
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+
     def kill(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait(PATIENCE_S)
-        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
-            if stream is not None:
-                stream.close()
+        for stream in (self.process.stdin, self.process.stdout, self.errors):
+            assert stream is not None
+            stream.close()
