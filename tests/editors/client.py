@@ -9,6 +9,7 @@ import sys
 import tempfile
 import threading
 import time
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,7 @@ class Client:
         self.published: dict[str, list[Json]] = {}
         self.logged: list[Json] = []
         self.asked: list[Json] = []
-        self._answers: dict[int | None, Json] = {}
+        self._answers: dict[int, Json] = {}
         self._inbox: queue.Queue[Json | None] = queue.Queue()
         self._id = 0
         threading.Thread(target=self._read, daemon=True).start()
@@ -102,12 +103,12 @@ class Client:
         self.send({"id": self._id, "method": method, "params": params})
         return self._id
 
-    def _take(self, seconds: float) -> bool:
-        """Take one message in; False where none came."""
+    def _take(self, what: str, end: float) -> None:
+        """Take one message in before a time; one that does not come fails the test."""
         try:
-            message = self._inbox.get(timeout=max(seconds, 0.0))
+            message = self._inbox.get(timeout=max(end - time.monotonic(), 0.0))
         except queue.Empty:
-            return False
+            raise AssertionError(f"no {what}") from None
         if message is None:
             self.errors.seek(0)
             raise EOFError(self.errors.read().decode())
@@ -121,13 +122,12 @@ class Client:
             self.send({"id": message["id"], "result": None})
         elif method is None:
             self._answers[message["id"]] = message
-        return True
 
-    def answer(self, request: int | None, seconds: float = PATIENCE_S) -> Json:
-        """The whole answer to a request; to None, that to what is not a request."""
-        end = time.monotonic() + seconds
+    def answer(self, request: int) -> Json:
+        """The whole answer to a request."""
+        end = time.monotonic() + PATIENCE_S
         while request not in self._answers:
-            assert self._take(end - time.monotonic()), f"no answer to {request}"
+            self._take(f"answer to {request}", end)
         return self._answers.pop(request)
 
     def request(self, method: str, params: Any) -> Any:
@@ -201,16 +201,12 @@ class Client:
 
     def applied(self, text: str, edits: list[Json]) -> str:
         """A text after edits, which must not overlap."""
-        spans = sorted(
-            (self.offset(text, e["range"]["start"]), self.offset(text, e["range"]["end"]), e["newText"])
-            for e in edits
-        )
-        out, at = [], 0
-        for start, end, new in spans:
-            assert start >= at, "edits overlap"
-            out += [text[at:start], new]
-            at = end
-        return "".join([*out, text[at:]])
+        places = [[self.offset(text, e["range"][side]) for side in ("start", "end")] for e in edits]
+        first = len(text)
+        for (start, end), edit in sorted(zip(places, edits, strict=True), key=itemgetter(0), reverse=True):
+            assert end <= first, "edits overlap"
+            text, first = text[:start] + edit["newText"] + text[end:], start
+        return text
 
     def diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """What is published for the latest text of a document, once its check has ended too."""
@@ -219,14 +215,14 @@ class Client:
             found = [p for p in self.published.get(uri, []) if p.get("version") == self.versions[uri]]
             if len(found) >= 2:  # the syntax at once, the rest later
                 return list(found[-1]["diagnostics"])
-            assert self._take(end - time.monotonic()), f"not enough publications for {uri}"
+            self._take(f"diagnostics of {uri}", end)
 
-    def next_diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
+    def next_diagnostics(self, uri: str) -> list[Json]:
         """The publication after those that have come so far."""
-        end = time.monotonic() + seconds
+        end = time.monotonic() + PATIENCE_S
         count = len(self.published.get(uri, []))
         while len(self.published.get(uri, [])) == count:
-            assert self._take(end - time.monotonic()), "nothing published"
+            self._take(f"more diagnostics of {uri}", end)
         return list(self.published[uri][-1]["diagnostics"])
 
     def stop(self) -> int:

@@ -35,9 +35,6 @@ def says(client: Client, uri: str, rows: list[tuple[str, int, list[str]]]) -> No
     assert [(word, text) for word, _, texts in rows for text in texts if text not in told[word]] == [], told
 
 
-# ------------------------------------------------------------ diagnostics
-
-
 def test_syntax_comes_at_once_and_the_rest_when_typing_pauses(client: Client, uri: str) -> None:
     at = client.texts[uri].index("ring(3")
     client.change(uri, at, at, "square { rotate(30) }\n")
@@ -100,9 +97,6 @@ def test_later_frames_are_looked_at_also_without_a_file(client: Client) -> None:
     (found,) = client.diagnostics(uri)
     assert found["message"].startswith("expected an angle, found a bare number (frame 1)")
     client.close(uri)
-
-
-# ------------------------------------------------------------ completion and signatures
 
 
 def test_completion_goes_by_the_block(client: Client, uri: str) -> None:
@@ -176,9 +170,6 @@ def test_signatures_follow_the_argument(client: Client, uri: str) -> None:
         assert head[start:end] == name
 
 
-# ------------------------------------------------------------ hover
-
-
 def test_hover_tells_values_matrices_and_chains(client: Client, uri: str) -> None:
     rows = [
         ("0.2 * r", 6, ["let r = lib.twice(k);", "how large", "= `1`"]),
@@ -204,9 +195,6 @@ def test_hover_tells_words_models_and_the_stage_unless_a_module_hides_it(client:
     says(client, uri, rows)
     client.replace(uri, "module light(power) { sphere; }\nlight(3);\n")
     says(client, uri, [("light(3)", 1, ["module light(power)"])])
-
-
-# ------------------------------------------------------------ fixes and formatting
 
 
 def test_fixes_are_code_actions(client: Client, uri: str) -> None:
@@ -244,9 +232,6 @@ def test_formatting_changes_few_lines_and_leaves_broken_files(client: Client, ur
     assert edit["range"]["start"]["line"] >= 1
     client.replace(uri, "let a = ;\n")
     assert client.request("textDocument/formatting", params) is None
-
-
-# ------------------------------------------------------------ definitions, references, renaming
 
 
 def test_definition_goes_across_files(client: Client, uri: str) -> None:
@@ -322,9 +307,6 @@ def test_rename_refuses_what_would_change_the_meaning(client: Client, uri: str) 
     assert "not defined" in client.refused("textDocument/prepareRename", client.at(uri, "square", 1))
 
 
-# ------------------------------------------------------------ symbols, folds, colours, tokens, hints
-
-
 def test_symbols_of_a_file_and_of_the_folder(client: Client, uri: str) -> None:
     found = client.request("textDocument/documentSymbol", {"textDocument": {"uri": uri}})
     assert [s["name"] for s in found] == ["lib", "k", "r", "ring"]
@@ -389,9 +371,6 @@ def test_hints_show_values_and_parameters(client: Client, uri: str) -> None:
     whole = {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}
     found = client.request("textDocument/inlayHint", {"textDocument": {"uri": uri}, "range": whole})
     assert [(hint["label"], hint["position"]["line"]) for hint in found] == [(" = 1", 3), ("n:", 9)]
-
-
-# ------------------------------------------------------------ files of elements
 
 
 def test_elements_groups_and_materials_are_proposed_and_told_of(

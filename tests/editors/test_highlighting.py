@@ -33,22 +33,32 @@ FILES = sorted([*(ROOT / "examples").rglob("*.nsg"), *(ROOT / "tests/conformance
 EDITORS = ROOT / "editors"
 VIM, VSCODE = EDITORS / "vim", EDITORS / "vscode"
 
-# ------------------------------------------------------------ Pygments
-
 CLASSES = {"NAME": Name, "NUMBER": Number, "STRING": String, "COLOR": Number.Hex}
+SCOPES = {
+    "NAME": r"variable|entity\.name|support\.function|constant\.language\.nsg",
+    "NUMBER": r"constant\.numeric",
+    "STRING": r"string\.quoted",
+    "COLOR": r"constant\.other\.color",
+}
+KEYWORD = r"keyword\.(declaration|control)|storage\.type|constant\.language\.boolean"
+SIGN = r"keyword\.operator|punctuation"
+
+
+def scanned(text: str) -> list[tuple[int, int, str]]:
+    """Start, end and terminal of each token of a text."""
+    tokens = scan(source := SourceFile("", text), Report(source))
+    kinds = (tables().kinds[kind] for kind in tokens.kinds[:-1])
+    return list(zip(tokens.starts[:-1], tokens.ends[:-1], kinds, strict=True))
 
 
 def same_tokens(text: str) -> None:
-    source = SourceFile("", text)
-    tokens = scan(source, Report(source))
     read = list(NsgLexer().get_tokens_unprocessed(text))
     assert "".join(value for _, _, value in read) == text
     assert not [value for _, kind, value in read if kind in Error]
     seen = [found for found in read if found[1] not in Whitespace and found[1] not in Comment]
-    places = zip(tokens.starts[:-1], tokens.ends[:-1], strict=True)
-    assert [(start, value) for start, _, value in seen] == [(s, text[s:e]) for s, e in places]
-    for (_, kind, value), number in zip(seen, tokens.kinds[:-1], strict=True):
-        terminal = tables().kinds[number]
+    tokens = scanned(text)
+    assert [(start, value) for start, _, value in seen] == [(s, text[s:e]) for s, e, _ in tokens]
+    for (_, kind, value), (_, _, terminal) in zip(seen, tokens, strict=True):
         if terminal in CLASSES:
             assert kind in CLASSES[terminal], (value, kind)
         elif terminal[0].isalpha():
@@ -89,18 +99,6 @@ def test_the_lexer_classes_names_and_marks_errors() -> None:
         assert any(kind in Error for _, kind, _ in read), text
 
 
-# ------------------------------------------------------------ TextMate
-
-SCOPES = {
-    "NAME": r"variable|entity\.name|support\.function|constant\.language\.nsg",
-    "NUMBER": r"constant\.numeric",
-    "STRING": r"string\.quoted",
-    "COLOR": r"constant\.other\.color",
-}
-KEYWORD = r"keyword\.(declaration|control)|storage\.type|constant\.language\.boolean"
-SIGN = r"keyword\.operator|punctuation"
-
-
 def test_every_keyword_and_terminal_is_matched() -> None:
     """By an expression of the right class, read with Python's engine."""
     repository = highlighting.textmate()["repository"]
@@ -125,29 +123,17 @@ def test_vscode_reads_the_tokens_of_the_language() -> None:
     done = subprocess.run(command, cwd=VSCODE, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for name, found in json.loads(done.stdout).items():
-        compare(Path(name), found)
+        text = Path(name).read_text("utf-8")
+        scopes = {(line, start): scope for line, start, _, scope in found}
+        for start, _, terminal in scanned(text):
+            column = text[text.rfind("\n", 0, start) + 1 : start]
+            place = text.count("\n", 0, start), len(column.encode("utf-16-le")) // 2
+            expected = SCOPES.get(terminal) or (KEYWORD if terminal[0].isalpha() else SIGN)
+            if terminal in {"step", "as"}:  # may be names
+                expected += "|" + SCOPES["NAME"]
+            assert re.match(expected, scopes.get(place, "")), (name, place, terminal, scopes.get(place))
+        assert not [scope for scope in scopes.values() if scope.startswith("invalid")]
 
-
-def compare(path: Path, found: list[tuple[int, int, int, str]]) -> None:
-    text = path.read_text("utf-8")
-    source = SourceFile("", text)
-    tokens = scan(source, Report(source))
-    scopes = {(line, start): scope for line, start, _, scope in found}
-    significant = [scope for _, _, _, scope in found if scope and not scope.startswith("comment")]
-    for start, end, kind in zip(tokens.starts[:-1], tokens.ends[:-1], tokens.kinds[:-1], strict=True):
-        line, column = source.position(start)
-        units = len(source.line(line)[: column - 1].encode("utf-16-le")) // 2
-        scope = scopes.get((line - 1, units), "")
-        terminal = tables().kinds[kind]
-        expected = SCOPES.get(terminal) or (KEYWORD if terminal[0].isalpha() else SIGN)
-        if terminal in {"step", "as"}:  # may be names
-            expected += "|" + SCOPES["NAME"]
-        assert re.match(expected, scope), (path.name, line, column, text[start:end], scope)
-    assert len(significant) >= len(tokens.kinds) - 1
-    assert not [scope for scope in significant if scope.startswith("invalid")]
-
-
-# ------------------------------------------------------------ Vim
 
 SAMPLE = """// a comment TODO
 nsg 1;
@@ -182,42 +168,40 @@ def vim(folder: Path, script: str) -> str:
     return out.read_text("utf-8")
 
 
-needs_vim = pytest.mark.skipif(shutil.which("vim") is None, reason="NOT RUN: there is no vim here")
-
-
-@needs_vim
-def test_vim_colours(tmp_path: Path) -> None:
+@pytest.mark.skipif(shutil.which("vim") is None, reason="NOT RUN: there is no vim here")
+def test_vim_colours_formats_and_indents(tmp_path: Path) -> None:
     (tmp_path / "scene.nsg").write_text(SAMPLE, "utf-8")
-    script = ["let g:out = [&filetype, b:current_syntax, &commentstring, &shiftwidth]"]
+    (tmp_path / "other.nsg").write_text("square   {}\n\n\n\nstar{}\n", "utf-8")
+    program = tmp_path / "scenelang"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m scenelang "$@"\n')
+    program.chmod(0o755)
+    script = [f"set runtimepath^={VIM}", "filetype plugin indent on", "syntax on", "edit scene.nsg"]
+    script += ["let g:out = [&filetype, b:current_syntax, &commentstring, &shiftwidth]"]
     for text, _ in EXPECTED:
         before = SAMPLE[: SAMPLE.index(text)]
         line, column = before.count("\n") + 1, len(before.rpartition("\n")[2].encode()) + 1
         script.append(f"call add(g:out, synIDattr(synID({line}, {column}, 1), 'name'))")
-    script += ["call writefile(map(g:out, 'string(v:val)'), 'out')", "qall!"]
-    found = [line.strip("'") for line in vim(tmp_path, "\n".join(script)).splitlines()]
-    assert found[:4] == ["nsg", "nsg", "// %s", "2"]
-    read = zip([text for text, _ in EXPECTED], found[4:], strict=True)
+    script += [
+        f"let $PATH = '{tmp_path}:' . $PATH",
+        "edit other.nsg",
+        "NsgFormat",
+        "let g:out += ['--'] + getline(1, '$') + ['--']",
+        "call setline(1, ['group {', 'square {', 'scale(', '1,', ');', '}', '}'])",
+        "normal gg=G",
+        "call writefile(g:out + getline(1, '$'), 'out')",
+        "qall!",
+    ]
+    (tmp_path / "script.vim").write_text("\n".join(script))
+    command = ["vim", "-u", "NONE", "-i", "NONE", "-N", "-n", "-es", "-S", "script.vim"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (tmp_path / "out").exists(), done.stdout + done.stderr
+    found, formatted, indented = (tmp_path / "out").read_text("utf-8").split("--\n")
+    options, names = found.splitlines()[:4], found.splitlines()[4:]
+    assert options == ["nsg", "nsg", "// %s", "2"]
+    read = zip([text for text, _ in EXPECTED], names, strict=True)
     assert [(text, name.removeprefix("nsg")) for text, name in read] == EXPECTED
-
-
-@needs_vim
-def test_vim_formats_and_indents(tmp_path: Path) -> None:
-    (tmp_path / "scene.nsg").write_text("square   {}\n\n\n\nstar{}\n", "utf-8")
-    program = tmp_path / "scenelang"
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m scenelang "$@"\n')
-    program.chmod(0o755)
-    script = (
-        f"let $PATH = '{tmp_path}:' . $PATH\n"
-        "NsgFormat\nlet g:out = getline(1, '$')\n"
-        "call setline(1, ['group {', 'square {', 'scale(', '1,', ');', '}', '}'])\nnormal gg=G\n"
-        "call writefile(g:out + ['--'] + getline(1, '$'), 'out')\nqall!\n"
-    )
-    formatted, indented = vim(tmp_path, script).split("--\n")
     assert formatted == "square {}\n\nstar {}\n"
     assert indented == "group {\n  square {\n    scale(\n      1,\n    );\n  }\n}\n"
-
-
-# ------------------------------------------------------------ VS Code and others
 
 
 def test_snippets_are_scene_text_in_the_canonical_layout() -> None:
