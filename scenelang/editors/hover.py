@@ -165,9 +165,6 @@ def _model(manifest: Manifest) -> str:
     return f"{head}\n\n| {manifest.dimension}D | |\n|---|---|\n{table}"
 
 
-# ---------------------------------------------------------------- transforms and objects
-
-
 def _calls(document: Document, use: Use) -> Iterator[tree.Call]:
     """The calls around a name, the innermost first."""
     path = path_to(document.file, use.start)
@@ -210,7 +207,7 @@ def _node_facts(document: Document, node: Any) -> str:
 
 
 _LONGEST: Final = 28
-_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color)
+_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color, tree.Unary, tree.Vector)
 _CLEAR: Final = frozenset(
     {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
 )
@@ -240,7 +237,7 @@ def inlay_hints(
 
 def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
     """The value of a let, unless it is written there or differs from pass to pass."""
-    if _is_plain(let.value):
+    if all(isinstance(node, _PLAIN) for node in walk(let.value)):
         return None
     seen = seen_at(document, document, let.name.span.start, let.name.span.end)
     if seen is None or not seen.values:
@@ -255,14 +252,6 @@ def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
         padding_left=False,
         tooltip="the value that this scene gives it",
     )
-
-
-def _is_plain(expr: tree.Expr) -> bool:
-    if isinstance(expr, tree.Unary):
-        return _is_plain(expr.operand)
-    if isinstance(expr, tree.Vector):
-        return all(_is_plain(item) for item in expr.items)
-    return isinstance(expr, _PLAIN)
 
 
 def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallExpr) -> list[types.InlayHint]:

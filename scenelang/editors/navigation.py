@@ -87,8 +87,7 @@ def rename(
 ) -> types.WorkspaceEdit | None:
     """Rename a definition and all its uses, in all files, in versioned edits where the client takes them.
 
-    Raises:
-        Refused: the new name is not a name, or would mean something else somewhere.
+    Raises `Refused` where the new name is not a name, or would mean something else somewhere.
     """
     use = document.names.at(offset)
     result = docs.definition(document, use) if use is not None else None

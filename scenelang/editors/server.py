@@ -80,9 +80,7 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
     return types.Diagnostic(
         range=place,
         message=message,
-        severity=types.DiagnosticSeverity.Error
-        if d.severity == "error"
-        else types.DiagnosticSeverity.Warning,
+        severity=types.DiagnosticSeverity[d.severity.capitalize()],
         code=d.code,
         code_description=_description(d.code),
         source="scenelang",
@@ -240,8 +238,6 @@ class Server(LanguageServer):
                 log.exception("cannot draw element %s", element.name)
                 self._drawn[element.digest] = ""
         return self._drawn[element.digest]
-
-    # ------------------------------------------------------------ diagnostics
 
     def publish(self, document: Document) -> None:
         """Send all current diagnostics: those of syntax, and those of the last check, moved."""

@@ -158,12 +158,8 @@ def check(
 ) -> Checked:
     """Evaluate a scene and run the compiler's checks; raises `Superseded` where ``stop`` was set meanwhile.
 
-    Args:
-        file, path: the tree, and its file if it has one.
-        root: the folder that imports cannot leave; by default the file's.
-        texts: texts of open files.
-        model: draw with this model instead of the scene's.
-        parsed: the text has no syntax mistakes.
+    Imports read ``texts`` of open files and cannot leave ``root``, by default the file's folder. ``parsed``
+    says that the text has no syntax mistakes.
     """
     result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
@@ -202,17 +198,11 @@ MAX_PAUSE_MS: Final = 60_000
 
 
 class Settings(Record):
-    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``."""
 
-    Args:
-        debounce_ms: pause in typing after which a scene is evaluated.
-        model: draw with this model instead of the scene's.
-        root: the folder that imports cannot leave, instead of the scene's.
-    """
-
-    debounce_ms: float = 200.0
-    model: str | None = None
-    root: Path | None = None
+    debounce_ms: float = 200.0  # pause in typing after which a scene is evaluated
+    model: str | None = None  # draws instead of the scene's
+    root: Path | None = None  # the folder that imports cannot leave, instead of the scene's
     value_hints: bool = True
     argument_hints: bool = True
 
@@ -293,9 +283,8 @@ class Document:
     @cached_property
     def _parsed(self) -> tuple[tree.File, tuple[Diagnostic, ...]]:
         if self._is_too_long:
-            message = (
-                f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
-            )
+            size = f"{MAX_TEXT // 1_000_000} MB"
+            message = f"a text of more than {size}, which the language server does not read"
             help = "`scenelang check` does, up to 10 MB"
             nowhere = Span(self.source, 0, 0)
             return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
@@ -359,8 +348,6 @@ class Workspace:
         self.open: dict[str, Document] = {}
         self._closed: dict[Path, tuple[tuple[int, int], Document]] = {}
 
-    # ------------------------------------------------------------ the client's buffers
-
     def put(self, uri: str, text: str, version: int | None) -> Document:
         """Open a buffer, or open it anew."""
         path = path_of(uri)
@@ -411,8 +398,6 @@ class Workspace:
                     document = self.by_path(path)
                     if document is not None:
                         yield document
-
-    # ------------------------------------------------------------ names across files
 
     def imported(self, document: Document, text: str) -> Document | None:
         """The document of an import's path."""
