@@ -347,7 +347,7 @@ class _Maker:
     def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before
         last = before[-1] if before else ""
-        if cursor.inside == "comment":
+        if cursor.inside in ("comment", "colour"):
             return
         if cursor.inside == "string":
             yield from self._strings()
@@ -357,8 +357,6 @@ class _Maker:
             for unit in UNITS:
                 if number is not None and unit.startswith(number[2]):
                     yield Item(f"{number[1]}{unit}", Kind.Unit)
-        elif cursor.inside == "colour":
-            return
         elif last == ".":
             yield from self._members(before)
         elif not before:
@@ -409,25 +407,21 @@ class _Maker:
     def _statements(self) -> Iterator[Item]:
         block = self.cursor.block
         kind = block.kind
-        if kind == "material":
-            yield from _calls(words.OPERATIONS, "a")
+        if kind in ("material", "object"):
+            yield from _calls(words.OPERATIONS if kind == "material" else self.transforms, "a")
+            if kind == "object":
+                yield self._keyword("material", "b")
+                yield from self._material_values("b")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
-            tops = [s for s in self.document.file.statements if isinstance(s, tree.Version | tree.Model)]
-            given = {type(stmt) for stmt in tops}
+            given = {type(stmt) for stmt in self.document.file.statements}
             if tree.Version not in given:
                 yield self._keyword("nsg", "c")
             if tree.Model not in given:
                 yield self._keyword("model", "q")
             yield from (self._keyword(word, "q") for word in ("param", "import"))
             yield from _calls(words.SETTINGS, "q")
-        if kind == "object":
-            yield from _calls(self.transforms, "a")
-            yield self._keyword("material", "b")
-            yield from self._material_values("b")
-            yield from (self._keyword(word) for word in ("let", "for", "if"))
-            return
         yield from self._children("a")
         if kind == "chain":
             for word in COMBINE:

@@ -91,6 +91,10 @@ def _named(word: str, scope: str) -> dict[str, Any]:
     return {"match": rf"\b({word})\s+({_NAME})", "captures": captures}
 
 
+def _between(begin: str, end: str, scope: str, **more: Any) -> dict[str, Any]:
+    return {"begin": begin, "end": end, "name": f"{scope}.nsg", **more}
+
+
 def _mark(kind: str) -> dict[str, Any]:
     return {"0": {"name": f"punctuation.definition.{kind}.nsg"}}
 
@@ -98,25 +102,19 @@ def _mark(kind: str) -> dict[str, Any]:
 _UNITS: Final = _any(nsg.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
-        {
-            **{"begin": "//", "end": "$", "name": "comment.line.double-slash.nsg"},
-            "beginCaptures": _mark("comment"),
-        },
-        {
-            **{"begin": r"/\*", "end": r"\*/", "name": "comment.block.nsg"},
-            "captures": _mark("comment"),
-        },
+        _between("//", "$", "comment.line.double-slash", beginCaptures=_mark("comment")),
+        _between(r"/\*", r"\*/", "comment.block", captures=_mark("comment")),
     ],
     "strings": [
-        {
-            **{"begin": '"', "end": '"|(?=$)', "name": "string.quoted.double.nsg"},
-            "beginCaptures": _mark("string.begin"),
-            "endCaptures": _mark("string.end"),
-            "patterns": [
+        _between(
+            *('"', '"|(?=$)', "string.quoted.double"),
+            beginCaptures=_mark("string.begin"),
+            endCaptures=_mark("string.end"),
+            patterns=[
                 {"match": r"\\[\"\\nt]", "name": "constant.character.escape.nsg"},
                 {"match": r"\\.", "name": "invalid.illegal.escape.nsg"},
             ],
-        }
+        )
     ],
     "declarations": [
         _named("fn", "entity.name.function"),

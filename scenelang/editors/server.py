@@ -136,14 +136,9 @@ def _is_ours(document: Document, d: Diagnostic) -> bool:
 def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeAction:
     assert d.fix is not None
     edits = [types.TextEdit(document.lines.span(e.span), e.replacement) for e in d.fix.edits]
-    shown = to_diagnostic(d, document)
-    return types.CodeAction(
-        title=d.fix.message[:1].upper() + d.fix.message[1:],
-        kind=types.CodeActionKind.QuickFix,
-        diagnostics=[shown] if shown is not None else None,
-        is_preferred=preferred,
-        edit=types.WorkspaceEdit(changes={document.uri: edits}),
-    )
+    shown, title = to_diagnostic(d, document), d.fix.message[:1].upper() + d.fix.message[1:]
+    edit, kind = types.WorkspaceEdit(changes={document.uri: edits}), types.CodeActionKind.QuickFix
+    return types.CodeAction(title, kind, [shown] if shown else None, preferred, edit=edit)
 
 
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
@@ -256,11 +251,9 @@ class Server(LanguageServer):
 
     def forget(self, uri: str) -> None:
         """Drop the check that waits or runs for a document."""
-        timer = self._timers.pop(uri, None)
-        if timer is not None:
+        if (timer := self._timers.pop(uri, None)) is not None:
             timer.cancel()
-        stop = self._running.pop(uri, None)
-        if stop is not None:
+        if (stop := self._running.pop(uri, None)) is not None:
             stop.set()
 
     def _start(self, uri: str) -> None:
