@@ -349,7 +349,7 @@ def test_colours_are_shown_and_written(client: Client, uri: str) -> None:
     assert forms == ["rgb(0, 1, 0)", "#0f0", "hsv(0.333, 1, 1)", "[0, 1, 0]"]
 
 
-def test_semantic_tokens_cover_what_a_grammar_cannot_know(client: Client, uri: str) -> None:
+def test_semantic_tokens_and_hints_tell_what_a_grammar_cannot_know(client: Client, uri: str) -> None:
     legend = client.capabilities["semanticTokensProvider"]["legend"]["tokenTypes"]
     data = client.request("textDocument/semanticTokens/full", {"textDocument": {"uri": uri}})["data"]
     found: dict[str, tuple[str, int]] = {}
@@ -365,12 +365,9 @@ def test_semantic_tokens_cover_what_a_grammar_cannot_know(client: Client, uri: s
     }.items():
         assert found[text][0] == kind, text
     assert found["twirl"][1] == 4
-
-
-def test_hints_show_values_and_parameters(client: Client, uri: str) -> None:
     whole = {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}
-    found = client.request("textDocument/inlayHint", {"textDocument": {"uri": uri}, "range": whole})
-    assert [(hint["label"], hint["position"]["line"]) for hint in found] == [(" = 1", 3), ("n:", 9)]
+    hints = client.request("textDocument/inlayHint", {"textDocument": {"uri": uri}, "range": whole})
+    assert [(hint["label"], hint["position"]["line"]) for hint in hints] == [(" = 1", 3), ("n:", 9)]
 
 
 def test_elements_groups_and_materials_are_proposed_and_told_of(

@@ -214,7 +214,7 @@ def test_snippets_are_scene_text_in_the_canonical_layout() -> None:
         assert re.sub(r"\s", "", format_text(text)) == re.sub(r"\s", "", text), name
 
 
-def test_extension_names_files_commands_and_settings_that_exist() -> None:
+def test_extensions_name_files_commands_and_settings_that_exist() -> None:
     package = json.loads((VSCODE / "package.json").read_text("utf-8"))
     given: dict[str, Any] = package["contributes"]
     ignored = (VSCODE / ".gitignore").read_text("utf-8").splitlines()
@@ -239,9 +239,6 @@ def test_extension_names_files_commands_and_settings_that_exist() -> None:
     for key in (*changed, *hints):
         assert re.search(rf"\b{key}:", client), key
     assert properties["scenelang.debounceMs"]["default"] == default.debounce_ms
-
-
-def test_editors_start_a_command_that_exists() -> None:
     helix = tomllib.loads((EDITORS / "helix/languages.toml").read_text("utf-8"))
     server, language = helix["language-server"]["scenelang"], helix["language"][0]
     assert {server["args"][0], language["formatter"]["args"][0], "lsp"} <= COMMANDS.keys()

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scenelang.editors.workspace import MAX_TEXT, Settings
-from tests.editors.client import PATIENCE_S, Client
+from tests.editors.client import PATIENCE_S, Client, Json
 
 ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
 
@@ -149,7 +149,7 @@ def test_a_port_serves_as_well_as_pipes() -> None:
                 assert time.monotonic() < end, "nobody listens"
                 time.sleep(0.05)
             connection.settimeout(PATIENCE_S)
-            params = {"processId": None, "rootUri": None, "capabilities": {}}
+            params: Json = {"processId": None, "rootUri": None, "capabilities": {}}
             data = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params})
             connection.sendall(f"Content-Length: {len(data)}\r\n\r\n{data}".encode())
             answer = b""
@@ -207,9 +207,7 @@ def test_random_edits_keep_texts_in_step_and_crash_nothing(
 
 def test_a_missing_library_is_one_line_that_says_what_to_do() -> None:
     code = "import sys; sys.modules['pygls'] = None\nfrom scenelang.cli.main import main\nmain(['lsp'])"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr.strip() == "Error: the language server needs pygls: pip install 'scenelang[lsp]'"
 

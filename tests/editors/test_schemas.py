@@ -57,7 +57,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [path, *(below for key, item in inner for below in places(item, (*path, key)))]
 
 
-ODD = (
+ODD: tuple[Any, ...] = (
     *(None, True, 0, 1, -1, 2.5, 256.0, 9000, "", "star", "0.5", "a b", "union", "subtract", "scale"),
     *("rotate", "object", [], {}, [0, 0, 0], [1, 1, 1], [0, 0, 0, 1], {"kind": "flip"}, {"x": 1, "y": 1}),
 )
