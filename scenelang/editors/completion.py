@@ -39,6 +39,7 @@ TYPES: Final = (
 MODIFIERS: Final = ("declaration", "readonly", "defaultLibrary")
 LEGEND: Final = types.SemanticTokensLegend(list(TYPES), list(MODIFIERS))
 _COMMENTS: Final = re.compile(r"//[^\n]*|/\*[\s\S]*?(?:\*/|\Z)")
+_LINE: Final = re.compile(r"[^\r\n]+")
 _ROLES: Final = {
     "function": ("function", 4),
     "constant": ("variable", 6),
@@ -112,15 +113,9 @@ def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tu
 
 def _comments(text: str, start: int, end: int) -> list[tuple[int, int, str, int]]:
     """Comments between two tokens, line by line, as a token must not span lines."""
-    result = []
-    for match in _COMMENTS.finditer(text, start, end):
-        at = match.start()
-        for part in match[0].splitlines(keepends=True):
-            bare = part.rstrip("\r\n")
-            if bare:
-                result.append((at, at + len(bare), "comment", 0))
-            at += len(part)
-    return result
+    matches = _COMMENTS.finditer(text, start, end)
+    parts = (part for match in matches for part in _LINE.finditer(text, *match.span()))
+    return [(part.start(), part.end(), "comment", 0) for part in parts]
 
 
 def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:

@@ -150,7 +150,7 @@ def stage_text(stage: Stage | None) -> list[str]:
     camera, light, ground = stage.camera, stage.light, stage.ground
 
     def point(p: Triple) -> str:
-        return f"[{p[0]:g}, {p[1]:g}, {p[2]:g}]"
+        return "[{:g}, {:g}, {:g}]".format(*p)
 
     def colour(rgb: Triple) -> str:
         return hex_text(encoded(rgb))
@@ -350,11 +350,7 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
 
     model = () if scene.model is None else (f"model {scene.model}",)
     nodes: list[tuple[str, Child]] = [("", (node, None)) for node in scene.nodes]
-    return _draw_tree((_sized("scene", scene.canvas), *model), nodes, look, most)
-
-
-def _sized(kind: str, canvas: tuple[int, int]) -> str:
-    return f"{kind} {canvas[0]} x {canvas[1]}"
+    return _draw_tree(("scene {} x {}".format(*scene.canvas), *model), nodes, look, most)
 
 
 def _rounded(statement: str) -> str:
@@ -377,13 +373,13 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
         return Box((node.geometry, *texture, *moves), rgb, leaf=True), []
 
     return _draw_tree(
-        (_sized("scene", graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
+        ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
     )
 
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
     """The stream of a Program: each object and the token that joins it to what came before."""
-    head = (_sized("program", program.canvas), f"model {program.model}", *stage_text(program.stage))
+    head = ("program {} x {}".format(*program.canvas), f"model {program.model}", *stage_text(program.stage))
     boxes, tokens = [Box(head)], token_names(program)
     for at, name in enumerate(program.objects[:most]):
         place = program.places[at]

@@ -152,7 +152,6 @@ def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
 
 
 def _model(manifest: Manifest) -> str:
-    """A model's facts."""
     ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
     rows = [
         ("geometries", ", ".join(manifest.geometries)),

@@ -41,7 +41,6 @@ from scenelang.editors.workspace import (
 )
 from scenelang.language import pages, tree
 from scenelang.language.diagnostics import Diagnostic, Span, apply_fixes
-from scenelang.language.pages import CODES
 from scenelang.language.reports import SceneError
 
 
@@ -92,8 +91,6 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
 @cache
 def _description(code: str) -> types.CodeDescription | None:
     """The page that explains a code; it ships with the package, so it needs no network."""
-    if code not in CODES:
-        return None
     page = Path(pages.__file__).with_name(f"{code}.md")
     return types.CodeDescription(uri_of(page)) if page.is_file() else None
 
@@ -347,8 +344,7 @@ def _changed(server: Server, params: types.DidChangeTextDocumentParams) -> None:
 
 
 def _saved(server: Server, params: types.DidSaveTextDocumentParams) -> None:
-    document = server.docs.open.get(params.text_document.uri)
-    if document is not None:
+    if (document := server.docs.open.get(params.text_document.uri)) is not None:
         server.schedule(document, 0.0)
 
 
@@ -362,8 +358,7 @@ def _closed(server: Server, params: types.DidCloseTextDocumentParams) -> None:
 
 
 def _files_changed(server: Server, params: types.DidChangeWatchedFilesParams) -> None:
-    for change in params.changes:
-        path = path_of(change.uri)
+    for path in (path_of(change.uri) for change in params.changes):
         if path is not None:
             server.changed(path.resolve())
             server.changed(path)

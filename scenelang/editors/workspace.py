@@ -95,7 +95,6 @@ class Lines:
         return end
 
     def position(self, offset: int) -> types.Position:
-        """The position of an offset."""
         offset = min(max(offset, 0), len(self.text))
         line = bisect_right(self.starts, offset) - 1
         start = self.starts[line]
@@ -104,7 +103,6 @@ class Lines:
         return types.Position(line, width(self.text[start:offset], self.encoding))
 
     def range(self, start: int, end: int) -> types.Range:
-        """The range between two offsets."""
         return types.Range(self.position(start), self.position(end))
 
     def span(self, span: Span) -> types.Range:
@@ -262,7 +260,6 @@ class Document:
 
     @property
     def file(self) -> tree.File:
-        """The tree."""
         return self._parsed[0]
 
     @cached_property
