@@ -124,6 +124,7 @@ _ARGUED: Final = "`<node>` takes no objects as arguments"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _METHOD: Final = "transforms stand in the block of what they move"
 _VALUE: Final = "objects are not values"
+_DRAWN: Final = "objects are drawn where they stand"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
 _BEFORE: Final = "transforms stand behind what they apply to"
 _INSIDE: Final = "it stands in the block, as in square { translate(1, 0); material flat { color(#d33); } }"
@@ -167,9 +168,7 @@ HABITS: Final = (
     Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
     Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
-    Habit(
-        "<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"
-    ),
+    Habit("<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNNAMED_FN, code="E0126"),
     Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
     Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNTYPED),
     Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _UNTYPED),
@@ -200,6 +199,7 @@ HABITS: Final = (
     _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
     Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
     _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
     Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),

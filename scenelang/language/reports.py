@@ -278,7 +278,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
         stop = start
         for _ in range(first, last + 1):
             stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
-        old = source.text[start:stop].removesuffix("\n")
+        old = source.text[start:stop]
         new, at = "", 0
         marks: list[tuple[int, int]] = []  # columns of what is inserted, without spaces at its ends
         for edit in own:
@@ -289,7 +289,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             at = edit.span.end - start
         new += old[at:]
         if all(edit.span.start == edit.span.end and "\n" not in edit.replacement for edit in own):
-            row = _Row(new, marks[0][0], marks[-1][1], width)
+            row = _Row(new.removesuffix("\n"), marks[0][0], marks[-1][1], width)
             places = [(max(row.cell(a), 0), min(row.cell(b), row.size), "+", "added") for a, b in marks]
             under = _underlines([place for place in places if place[0] < place[1]], color)
             rows += [
@@ -298,7 +298,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             ]
             continue
         for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
-            lines = text.split("\n") if text.strip() or sign == "-" else []
+            lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []
             for offset, line in enumerate(lines[:_MOST_LINES]):
                 near = 0 if offset else own[0].span.start - start
                 row = _Row(line.rstrip("\r"), near, near, width)
