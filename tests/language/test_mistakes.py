@@ -1,6 +1,7 @@
 """Mistakes: each is reported once, with its code, at its place, with fixes that mend, and no other is.
 
-A case of ``*.nsgs`` has a title, a text with marks, and below a line what its fixes make of it, if anything.
+A case of ``*.nsgs`` has a title, a text with marks, and below a line what its fixes make of it, if anything;
+in ``advice.nsgs`` the title is part of the help, and the text below the line follows it.
 """
 
 from __future__ import annotations
@@ -8,7 +9,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
+import scenelang as nsg
 from scenelang.language import foreign
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import SourceFile, Span, apply_fixes, did_you_mean, ranked, settle
@@ -118,6 +121,44 @@ ERRORS, HABITS, FIXES = map(cases, ("errors.nsgs", "habits.nsgs", "fixes.nsgs"))
 def outcome_of(text: str) -> Outcome:
     """The result of a case; two tests look at it."""
     return run_text(text)
+
+
+def test_advice_leads_to_a_scene() -> None:
+    wrong = []
+    for case in (HERE / "advice.nsgs").read_text("utf-8").split("===")[1:]:
+        head, meant = case.strip().split("\n---\n")
+        said, _, text = head.rpartition("\n")
+        found = [*nsg.check_text(text)]
+        only = found[0] if len(found) == 1 else None
+        if (
+            only is None
+            or only.code not in CODES
+            or said not in (only.help or "")
+            or [*nsg.check_text(meant)]
+        ):
+            wrong.append((text, found))
+        elif only.fix is not None:
+            after, left = nsg.fix_text(text)
+            if " ".join(after.split()) != meant or [*left]:
+                wrong.append((text, [after, *left]))
+    assert wrong == []
+
+
+def test_lists_name_what_can_stand_there() -> None:
+    """Not what a library is made of inside: a statement is no place for a function."""
+    shapes = 'import "std/shapes" as s;'
+    (only,) = nsg.check_text(f"{shapes} s.blob(0.3);")
+    assert (only.help or "").startswith("it has arc, arrow, capsule, corners, disc")
+    (only,) = nsg.check_text(f"{shapes} square {{ scale(s.sizze([1, 0])); }}")
+    assert only.help == "did you mean `size`?"
+
+
+def test_time_in_an_imported_file_is_for_the_scene_to_run(tmp_path: Path) -> None:
+    (tmp_path / "lib.nsg").write_text("module hand() { star { rotate(360deg * t); } }", "utf-8")
+    (tmp_path / "a.nsg").write_text('import "lib.nsg" as lib; lib.hand();', "utf-8")
+    assert [*nsg.check(tmp_path / "a.nsg")] == []
+    (tmp_path / "a.nsg").write_text("star { rotate(360deg * t + 1deg * frame); }", "utf-8")
+    assert [d.code for d in nsg.check(tmp_path / "a.nsg")] == ["W0304"]
 
 
 def test_marked_mistakes_are_all() -> None:
