@@ -1,8 +1,7 @@
 """From the grammar to `tables.json`: Lark builds the LALR tables, and what is kept is plain JSON.
 
-States are numbered in the order a breadth-first walk meets them, so the same grammar always gives the same
-bytes. `scenelang.language.tables` calls this where there are no current tables, and so does the build of a
-wheel (``hatch_build.py``).
+States are numbered breadth-first, so the same grammar always gives the same bytes. `tables` calls this where
+there are no current tables, and so does the build of a wheel (``hatch_build.py``).
 """
 
 from __future__ import annotations

@@ -376,11 +376,7 @@ def _extent(tokens: Tokens, hole: str, at: int, head: int) -> int:
 
 
 def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Token]]:
-    """Text and tokens of a replacement: holes keep their places, all else is empty.
-
-    A `BAD_` token takes the text behind the last hole before it. Holes that change their order are left out
-    of the tokens: nothing is known of them.
-    """
+    """Text and tokens of a replacement: holes in order keep their places, all else is empty."""
     language = tables()
     text, new, (at, close) = "", [], tokens.place(*match[""])
     for piece in _PIECE.finditer(meant):
@@ -414,10 +410,7 @@ def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Toke
 
 
 def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at: int) -> bool:
-    """Report a habit in the statement from ``first`` on and put what was meant in its place.
-
-    ``stack`` are the parser's states before the statement; ``at`` is the token that does not fit.
-    """
+    """Report a habit in the statement from ``first`` on, in which token ``at`` does not fit, and mend it."""
     if len(report.found) > _MOST:
         return False
     anchors = _anchors(tokens, first, at)

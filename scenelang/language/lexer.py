@@ -1,11 +1,8 @@
 """Text to tokens, and the LALR automaton that reads them.
 
 One regular expression, made from the terminals of the grammar and the shapes of common slips, eats
-white space and comments and then one token. A slip is reported here once and stands in the token list as
-what was meant, so that the parser meets a sound text.
-
-Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
-tables, keeps token indices on its stack and hands over at a mistake.
+white space and comments and then one token. A slip is reported once and stands in the token list as what
+was meant. Unlike Lark's own loop, the automaton's can resume after a mistake.
 """
 
 from __future__ import annotations
@@ -118,10 +115,7 @@ class Report:
 
 
 class Tokens:
-    """Tokens as parallel lists of kinds, starts and ends; the last one is the end of the text.
-
-    A token that recovery put in is empty (``start == end``).
-    """
+    """Tokens as parallel lists; the last one is the end of the text, those that recovery put in are empty."""
 
     __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")
 
@@ -155,11 +149,7 @@ class Tokens:
         return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
 
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
-        """Put tokens of other kinds in the place of ``count`` tokens.
-
-        A token that takes the place of another keeps it; otherwise new ones are empty and stand where the
-        first old one began, or at the end of the token before where none goes.
-        """
+        """Put tokens of other kinds in the place of ``count``: empty ones, but for one in place of one."""
         if len(kinds) == count == 1:
             self.kinds[index] = kinds[0]
             return
@@ -344,12 +334,10 @@ Mend = Callable[[list[int], list[Any], int], int | None]
 
 
 def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
-    """Read tokens to their end and build what they stand for; None where ``mend`` gave up.
+    """Read tokens up to `END` and build what they stand for; None where ``mend`` gave up.
 
-    Args:
-        kinds: of each token, the last of them `END`; ``mend`` may change the list.
-        callbacks: builders of each rule's value from those of its parts, in the order of `Tables.rules`; the
-            value of a token is its index. None passes the only value on.
+    ``callbacks`` build each rule's value from those of its parts, in the order of `Tables.rules`; None passes
+    the only value on. The value of a token is its index.
     """
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final

@@ -110,10 +110,7 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whol
 
 
 def singular(rows: Sequence[Sequence[float]]) -> bool:
-    """Test whether the 3 x 3 linear block of an affine has no inverse.
-
-    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
-    """
+    """Test whether the 3 x 3 block of an affine has no inverse: float64 cannot tell below 1e-14."""
     lengths = [math.hypot(*row[:3]) for row in rows[:3]]
     if not all(lengths) or not all(map(math.isfinite, lengths)):
         return True
@@ -152,8 +149,6 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
 
 
 _SEVERAL = frozenset(("children", "elements", "nodes", "ops", "transforms"))
-
-
 _COLOURS = frozenset(("background", "color", "rgb"))
 
 
@@ -271,9 +266,8 @@ def _line(item: ErrorDetails, known: list[str]) -> str:
         from difflib import get_close_matches  # only mistakes need it
 
         near = get_close_matches(path, known, 1)
-        return f"there is no `{path}`, " + (
-            f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
-        )
+        there = f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
+        return f"there is no `{path}`, {there}"
     if kind == "missing":
         return f"`{path}` is missing"
     if kind == "union_tag_invalid":
@@ -303,10 +297,8 @@ class _Turn(Frozen):
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
         if args:
             name = cls.__name__
-            raise TypeError(
-                f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
-                f"or {name}(angle={args[0]!r}) for radians"
-            )
+            ways = f"write {name}.degrees({args[0]!r}), or {name}(angle={args[0]!r}) for radians"
+            raise TypeError(f"{name}: an angle without its unit: {ways}")
         return data
 
 
@@ -575,7 +567,6 @@ class Material(Frozen):
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        """A text such as ``#d33`` alone is the colour."""
         given = super()._arranged(args, data)
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
@@ -698,7 +689,6 @@ class Chain(Frozen):
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        """A child without a word is joined by union."""
         given = super()._arranged(args, data)
         if isinstance(given.get("children"), list | tuple):
             nodes = (Object, Group, Boolean, Chain)

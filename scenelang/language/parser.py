@@ -1,8 +1,7 @@
 """Text to syntax tree: `parse` reads a whole file, reports the mistakes and always returns a tree.
 
-Tokens come as indices into `Tokens`. A node's span runs from its first token to its last, braces and
-semicolon included. What recovery invented is an empty token; an expression that rests on one becomes a
-`BadExpr`, a statement without its name a `BadStmt`.
+Tokens come as indices into `Tokens`. What recovery invented is an empty token; an expression that rests on
+one becomes a `BadExpr`, a statement without its name a `BadStmt`.
 """
 
 from __future__ import annotations
@@ -301,13 +300,7 @@ _OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range
 
 
 def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
-    """The tree of a whole text; never raises.
-
-    Args:
-        source: the text.
-        diagnostics: takes every syntax mistake, in the order of the text. Where there are any, the tree
-            holds `BadStmt` and `BadExpr` nodes.
-    """
+    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes."""
     report = Report(source)
     tokens = scan(source, report)
     if _unbalanced(tokens):
@@ -371,8 +364,7 @@ def _classes() -> tuple[int, ...]:
 def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up.
 
-    Depth counts everything that makes the tree deeper: open brackets and braces, operators between them,
-    and the arms of an `else if` chain. The check runs over tokens, before there is a tree.
+    Open brackets and braces, operators between them and the arms of an `else if` chain make a tree deeper.
     """
     kinds = tokens.kinds
     classes = _classes()

@@ -3,9 +3,9 @@
 Where braces do not match, the layout tells the line of the slip: one that stands no further in than the head
 of an open block comes after its end. Trying the parser out on it tells which brace is missing or too many.
 
-With braces that match, what people bring from other languages is looked up first (`habits`). Then each way to
-insert, delete or replace a token near the mistake is tried out: it is worth how far the parser reads on, less
-what it costs. Where none helps, the statement is skipped up to its end.
+With braces that match, `habits` are looked up first. Then each way to insert, delete or replace a token near
+the mistake is tried: it is worth how far the parser reads on, less what it costs. Where none helps, the
+statement is skipped up to its end.
 """
 
 from __future__ import annotations

@@ -29,14 +29,11 @@ _CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 
 
 class Damage(Record):
-    """Lines of a file that its syntax mistakes leave unknown, and their words, which may have been defined.
-
-    ``lost`` says that nobody knows what is defined where: braces did not match, or a name is missing.
-    """
+    """Lines of a file that its syntax mistakes leave unknown, and words that may have been defined there."""
 
     lines: frozenset[int] = frozenset()
     words: frozenset[str] = frozenset()
-    lost: bool = False
+    lost: bool = False  # nobody knows what is defined where: a brace or a name is missing
 
     def holds(self, span: Span) -> bool:
         """Test whether a place lies in text that was mended or skipped."""
@@ -120,8 +117,8 @@ class Reporter(Record, frozen=False):
     ) -> int | None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
 
-        One that shows in the library that ships is reported where that is called. Returns the index of the
-        report, None where nothing was added; raises `Halt` where no more mistakes are kept.
+        One in the library is reported where that is called. Returns the index of the report, None where
+        nothing was added; raises `Halt` where no more mistakes are kept.
         """
         calls = self.calls
         site = calls.outside() if calls is not None and library.holds(span.source) else None

@@ -1,17 +1,8 @@
 """Diagnostics as text for people, with marked source lines, and the exception that carries them.
 
-Nothing in a scene may move the cursor or colour a terminal: what does not print is shown as U+FFFD.
-
-Words stand beside the last mark of a line; those of others stand below it, each under its own mark. Of a
-mark over several lines the first is underlined to its end::
-
-    3 |     subtract star { … }
-      |     -------- this is subtracted from
-    4 |     intersect {
-      |     ^^^^^^^^^^^
-
-Columns are counted in code points; on the screen tabs are widened and wide characters take two cells, so
-marks stay under what they mark.
+Nothing in a scene may move the cursor or colour a terminal: what does not print is shown as U+FFFD. Words
+stand beside the last mark of a line, those of others below it, each under its own mark; of a mark over
+several lines the first is underlined. Tabs are widened and wide characters take two cells.
 """
 
 from __future__ import annotations
@@ -52,9 +43,9 @@ def paint(style: str, text: str, color: bool) -> str:
 
 
 class _Row:
-    """One source line in the cells of a screen, cut to ``width`` around the columns ``first`` to ``last``.
+    """One source line in cells of a screen, cut to ``width`` around columns ``first`` to ``last``, from 0.
 
-    Columns count from 0. ``words`` more cells behind them are shown where there is room.
+    ``words`` more cells behind them are shown where there is room.
     """
 
     def __init__(self, text: str, first: int, last: int, width: int, words: int = 0) -> None:
@@ -202,7 +193,7 @@ def render_text(
     fixer: str = "scenelang check --fix",
     fixable: int | None = None,
 ) -> str:
-    """Snippets with marks, and a line that counts the diagnostics.
+    """Snippets with marks, and a line that counts the diagnostics; empty where there are none.
 
     Args:
         diagnostics: in any order.
@@ -212,9 +203,6 @@ def render_text(
         summary: whether to count.
         fixer: the command that applies fixes, for the summary.
         fixable: how many it would apply; by default all that there are.
-
-    Returns:
-        Text that ends in a newline; empty where there is nothing to say.
     """
     ordered = in_order(diagnostics)
     if not ordered:

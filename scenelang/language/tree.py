@@ -1,7 +1,7 @@
 """The syntax tree: frozen, with a span on every node. Names are as written, nothing is resolved.
 
-Spans cover the node's own text. Where recovery had to invent something, a `Bad…` node stands there and
-a diagnostic has been given; later stages skip such nodes silently.
+Where recovery had to invent something, a `Bad…` node stands there and a diagnostic has been given; later
+stages skip such nodes silently.
 """
 
 from __future__ import annotations
@@ -201,12 +201,10 @@ class If(Stmt):
 
 
 class Call(Stmt):
-    """Any statement headed by a name, with arguments, a block, both, or neither.
+    """Any statement headed by a name, with arguments, a block, both, or neither (None).
 
-    Geometries (``square { … }``), transforms (``scale(2);``), settings (``canvas(w, h);``,
-    ``background(c);``, ``animate(…);``), texture operations, module calls (``dot(1) { … }``) and uses of
-    material values (``mist;``, ``mist { … }``) look alike; the evaluator tells them apart by name.
-    ``args`` is None where there are no parentheses, ``body`` None where there is no block.
+    Geometries, transforms, settings, texture operations, calls of modules and uses of material values look
+    alike; the evaluator tells them apart by name.
     """
 
     name: Name
@@ -215,10 +213,7 @@ class Call(Stmt):
 
 
 class Node(Stmt):
-    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block.
-
-    ``smooth``, ``subtract`` and ``intersect`` may have arguments, here and as the word of a chain's child.
-    """
+    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block."""
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
     body: Block
@@ -236,10 +231,7 @@ class Combined(Stmt):
 
 
 class MaterialUse(Stmt):
-    """``material NAME;`` or ``material NAME { … }`` as a statement.
-
-    ``shading`` is the first of two names, as in ``material volumetric zoo.bark;``.
-    """
+    """``material NAME;`` or with a block; ``shading`` is the first of two names (``volumetric zoo.bark``)."""
 
     name: Name
     body: Block | None

@@ -85,10 +85,7 @@ class Page(Record):
         return self.text.partition("\n")[2].partition("\n## ")[0].strip()
 
     def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
-        """The page without its Markdown: headings alone, code indented, paragraphs wrapped.
-
-        A text in one of the styles of `diagnostics.cells` is coloured by ``paint``.
-        """
+        """The page without its Markdown, coloured by ``paint`` in styles of `reports`."""
         blocks = [paint(f"{self.severity}[{self.code}]", self.severity) + paint(f": {self.title}", "bold")]
         text = re.sub(r"^<!--.*-->\n", "", self.text.partition("\n")[2], flags=re.MULTILINE)
         for part in re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL):
