@@ -6,6 +6,7 @@ import json
 import os
 import unicodedata
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -357,68 +358,9 @@ def test_any_marks_in_any_text(text: str, places: list[tuple[int, int]], width: 
 # ---------------------------------------------------------------- SARIF
 
 
-def shape(required: list[str], **properties: Any) -> dict[str, Any]:
-    """An object of the schema: these properties and no others."""
-    return {"type": "object", "required": required, "properties": properties, "additionalProperties": False}
-
-
-def many(items: dict[str, Any], **more: Any) -> dict[str, Any]:
-    return {"type": "array", "items": items, **more}
-
-
-# Trimmed from the OASIS schema of SARIF 2.1.0: types, required properties, bounds and enumerations as there.
-WORDS = {"type": "string"}
-COUNT = {"type": "integer", "minimum": 0}
-PLACE = {"type": "integer", "minimum": 1}
-LEVEL = {"enum": ["none", "note", "warning", "error"]}
-MESSAGE = shape(["text"], text=WORDS)
-FILE = shape([], uri={"type": "string", "format": "uri-reference"})
-REGION = shape([], startLine=PLACE, startColumn=PLACE, endLine=PLACE, endColumn=PLACE)
-LOCATION = shape(
-    [],
-    id={"type": "integer", "minimum": -1},
-    physicalLocation=shape([], artifactLocation=FILE, region=REGION),
-    message=MESSAGE,
-)
-RULE = shape(
-    ["id"],
-    id=WORDS,
-    shortDescription=MESSAGE,
-    fullDescription=MESSAGE,
-    help=shape(["text"], text=WORDS, markdown=WORDS),
-    defaultConfiguration=shape([], level=LEVEL),
-    properties=shape([], tags=many(WORDS, uniqueItems=True)),
-)
-CHANGE = shape(
-    ["artifactLocation", "replacements"],
-    artifactLocation=FILE,
-    replacements=many(
-        shape(["deletedRegion"], deletedRegion=REGION, insertedContent=shape([], text=WORDS)), minItems=1
-    ),
-)
-RESULT = shape(
-    ["message"],
-    ruleId=WORDS,
-    ruleIndex={"type": "integer", "minimum": -1},
-    level=LEVEL,
-    message=MESSAGE,
-    locations=many(LOCATION),
-    relatedLocations=many(LOCATION, uniqueItems=True),
-    fixes=many(
-        shape(["artifactChanges"], description=MESSAGE, artifactChanges=many(CHANGE, minItems=1)),
-        uniqueItems=True,
-    ),
-)
-RUN = shape(
-    ["tool"],
-    tool=shape(
-        ["driver"], driver=shape(["name"], name=WORDS, version=WORDS, rules=many(RULE, uniqueItems=True))
-    ),
-    columnKind={"enum": ["utf16CodeUnits", "unicodeCodePoints"]},
-    results=many(RESULT),
-    properties=shape([], errors=COUNT, warnings=COUNT, fixable=COUNT),
-)
-LOG = shape(["version", "runs"], **{"$schema": WORDS, "version": {"const": "2.1.0"}, "runs": many(RUN)})
+# Trimmed from the OASIS schema of SARIF 2.1.0: types, required properties, bounds and enumerations as there,
+# and no other properties.
+LOG = json.loads(Path(__file__).with_name("sarif.json").read_text("utf-8"))
 
 
 def log(found: list[Diagnostic]) -> Any:
