@@ -25,7 +25,6 @@ class SourceFile:
 
     @cached_property
     def _starts(self) -> list[int]:
-        """Offset of the beginning of each line."""
         return [0, *(newline.end() for newline in re.finditer("\n", self.text))]
 
     def position(self, offset: int) -> tuple[int, int]:
@@ -62,7 +61,6 @@ class Span(Record):
 
     @property
     def text(self) -> str:
-        """The source text that the span covers."""
         return self.source.text[self.start : self.end]
 
     def locate(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -236,7 +234,6 @@ def ranked(
 
 
 def nearest(name: str, known: Iterable[str], slips: int | None = None) -> str | None:
-    """The known name with the fewest slips from ``name``; None where none is near."""
     result = ranked(name, known, slips)
     return result[0][1] if result else None
 
@@ -310,7 +307,6 @@ def listing(known: Iterable[str], limit: int = 12) -> str:
 
 
 def plural(count: int, noun: str) -> str:
-    """`1 error`, `2 errors`."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
@@ -369,7 +365,6 @@ def removal(source: SourceFile, start: int, end: int) -> Fix:
 
 
 def _fits(fix: Fix, text: str) -> bool:
-    """Test whether a fix belongs to this text and changes something."""
     return any(e.span.text != e.replacement for e in fix.edits) and all(
         (e.span.source.text is text or e.span.source.text == text)
         and 0 <= e.span.start <= e.span.end <= len(text)

@@ -22,8 +22,6 @@ _COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 class Comment(NamedTuple):
-    """One comment."""
-
     text: str  # from its first sign to its last, trailing white space of its lines taken off
     column: int | None  # code points before it on its line, if it has several lines and no tabs stand there
     ends_line: bool  # nothing may follow it on its last line: it is a line comment or has several lines
@@ -126,8 +124,6 @@ AnyDoc = TypeVar("AnyDoc", bound="Doc")
 
 
 class Doc:
-    """A piece of layout."""
-
     __slots__ = ("after", "before", "blank", "flat")
 
     def __init__(self, flat: str | None) -> None:
@@ -155,8 +151,6 @@ class Break(Doc):
 
 
 class Concat(Doc):
-    """Parts one after another."""
-
     __slots__ = ("parts",)
 
     def __init__(self, flat: str | None, parts: Sequence[Part]) -> None:
@@ -175,7 +169,6 @@ class Group(Doc):
         self._made: Part | None = None
 
     def broken(self) -> Part:
-        """Layout over several lines."""
         if self._made is None:
             self._made = self.maker()
         return self._made
@@ -289,7 +282,6 @@ def ends_of(doc: AnyDoc, first: Part, last: Part) -> AnyDoc:
 
 
 def render(doc: Part) -> list[str]:
-    """The lines of a document."""
     printer = _Printer()
     printer.print(doc)
     if printer.line:

@@ -116,7 +116,6 @@ def _numbers(items: Sequence[Item]) -> list[str]:
 
 
 def blank_before(part: Part) -> bool:
-    """Test for a blank line before a part and its comments."""
     if isinstance(part, str):
         return False
     return part.before[0].blank if part.before else part.blank
@@ -697,5 +696,4 @@ def _comments(text: str) -> list[str]:
 
 
 def _statements(text: str, diagnostics: Diagnostics) -> list[tuple[int, int]]:
-    """Start and end of each statement of the top level of a text without errors."""
     return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), diagnostics).statements]

@@ -19,7 +19,6 @@ from scenelang.assets.files import write_whole
 
 
 def generate(grammar: str) -> dict[str, Any]:
-    """The plain data of `tables.json` for a grammar text."""
     lark = Lark(grammar, parser="lalr", lexer="basic", maybe_placeholders=False)
     table = lark.parser.parser._parse_table
     literals = {t.name: t.pattern.value for t in lark.terminals if isinstance(t.pattern, PatternStr)}

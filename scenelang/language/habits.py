@@ -83,8 +83,6 @@ def keywords_near(text: str) -> tuple[str, ...]:
 
 
 class Habit(Record):
-    """One habit."""
-
     pattern: str  # what is written
     meant: str  # what is written here; also read in its place, so that the rest can be checked
     message: str  # the fact; words that the pattern has found may stand in it
@@ -483,7 +481,6 @@ def _reads_on(
 
 def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str) -> None:
     def filled(words: str) -> str:
-        """Words with the names that were found in the holes."""
         return re.sub("<([a-z]+)>", lambda hole: _text(tokens, match[hole[1]]), words)
 
     start, end = tokens.place(*match[""])
@@ -516,7 +513,6 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
 
 
 def head(tokens: Tokens, at: int) -> str:
-    """The first word of the statement that the token at an index belongs to."""
     first = at
     while first and at - first < MAX_REPLAY and tokens.text(first - 1) not in (";", "{", "}"):
         first -= 1

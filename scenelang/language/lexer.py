@@ -102,7 +102,6 @@ class Report:
         self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
 
     def change(self, start: int, end: int, text: str, message: str | None = None) -> Fix:
-        """A fix that puts a text in the place of ``[start, end)``."""
         if not text:
             return removal(self.source, start, end)
         usual = f"{'insert' if start == end else 'write'} `{text.strip()}`"
@@ -133,7 +132,6 @@ class Tokens:
         self.ends.append(end)
 
     def text(self, index: int) -> str:
-        """The text of one token."""
         return self.source.text[self.starts[index] : self.ends[index]]
 
     def place(self, first: int, stop: int = 0) -> tuple[int, int]:
@@ -145,7 +143,6 @@ class Tokens:
         return self.ends[index - 1] if index else 0
 
     def on_new_line(self, index: int) -> bool:
-        """Test whether a token is the first of its line."""
         return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
 
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
@@ -157,17 +154,14 @@ class Tokens:
         self.splice(index, index + count, [(kind, at, at) for kind in kinds])
 
     def part(self, first: int, stop: int) -> list[Token]:
-        """Kinds, starts and ends of the tokens ``[first, stop)``."""
         columns = (self.kinds[first:stop], self.starts[first:stop], self.ends[first:stop])
         return list(zip(*columns, strict=True))
 
     def splice(self, first: int, stop: int, new: Sequence[Token]) -> None:
-        """Put others in the place of the tokens ``[first, stop)``."""
         for number, column in enumerate((self.kinds, self.starts, self.ends)):
             column[first:stop] = [token[number] for token in new]
 
     def drop(self, indices: Sequence[int]) -> None:
-        """Take out any number of tokens at once."""
         gone = set(indices)
         for column in (self.kinds, self.starts, self.ends):
             column[:] = [value for index, value in enumerate(column) if index not in gone]
@@ -401,7 +395,6 @@ def advance(stack: list[int], kind: int) -> bool:
 
 
 def fits(stack: list[int], kind: int) -> bool:
-    """Test whether a token can follow."""
     return advance(stack.copy(), kind)
 
 

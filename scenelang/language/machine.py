@@ -158,7 +158,6 @@ def _relative(name: str) -> str:
 
 
 def _uri(name: str) -> str:
-    """A file name as a relative or absolute URI reference."""
     from urllib.parse import quote
 
     path = _relative(name)

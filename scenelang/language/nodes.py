@@ -47,7 +47,6 @@ def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str]
 
 
 def light_fault(power: float) -> str | None:
-    """Why there is no light of such a power, if there is none."""
     return f"a power of {power:g} is negative" if power < 0.0 else None
 
 
@@ -190,7 +189,6 @@ class Frozen(BaseModel):
 
     @classmethod
     def _names(cls) -> list[str]:
-        """Arguments of a constructor, in order."""
         return [name for name in cls.model_fields if name != "kind"]
 
     @classmethod

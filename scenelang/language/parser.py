@@ -289,7 +289,6 @@ def _items(rest: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _block(last: Any) -> tree.Block | None:
-    """The block that a statement ends with, None where that is a `;`."""
     return last if isinstance(last, tree.Block) else None
 
 
@@ -314,7 +313,6 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
 
 
 def _unbalanced(tokens: Tokens) -> bool:
-    """Test whether some brace has no counterpart."""
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
     return depths[-1] != 0 or min(depths) < 0
@@ -340,7 +338,6 @@ def parse_tokens(tokens: Tokens, report: Report) -> tree.File:
 
 
 def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
-    """The tree of what came before the mistakes became too many."""
     statements = values[0] if values and isinstance(values[0], list) else []
     end = tokens.ends[-1]
     start = statements[-1].span.end if statements else 0
@@ -353,7 +350,6 @@ def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
 
 @cache
 def _classes() -> tuple[int, ...]:
-    """Class of each kind, by its effect on the depth."""
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}

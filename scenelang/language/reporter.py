@@ -92,7 +92,6 @@ class Reporter(Record, frozen=False):
         return self.damaged.get(source, _SOUND)
 
     def words(self, source: SourceFile) -> frozenset[str]:
-        """All words of a file."""
         if source not in self.words_in:
             self.words_in[source] = frozenset(_WORD.findall(source.text))
         return self.words_in[source]

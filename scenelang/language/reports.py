@@ -38,7 +38,6 @@ def printable(text: str) -> str:
 
 
 def paint(style: str, text: str, color: bool) -> str:
-    """Text in ANSI codes, or as it is."""
     return f"{STYLES[style]}{text}{STYLES['off']}" if color and style and text else text
 
 

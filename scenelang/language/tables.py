@@ -39,7 +39,6 @@ class Tables(Record):
 
 
 def decode(data: dict[str, Any]) -> Tables:
-    """Tables from the plain data of `tables.json`."""
 
     def pairs(flat: list[int]) -> dict[int, int]:
         return dict(zip(flat[::2], flat[1::2], strict=True))
@@ -82,6 +81,5 @@ def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
 
 @cache
 def tables() -> Tables:
-    """The tables of the grammar."""
     grammar = grammar_path()
     return decode(current(grammar, PLACE, shipped=grammar.is_relative_to(PACKAGE)))

@@ -15,8 +15,6 @@ from scenelang.language.words import Combine
 
 
 class Spanned(Record):
-    """Base of all parts of the tree: a piece of the text."""
-
     span: Span
 
 
@@ -102,8 +100,6 @@ class Argument(Spanned):
 
 
 class CallExpr(Expr):
-    """A function call inside an expression."""
-
     name: Name
     args: tuple[Argument, ...]
 
@@ -149,14 +145,10 @@ class Parameter(Spanned):
 
 
 class Version(Stmt):
-    """``nsg 1;``"""
-
     number: Number
 
 
 class Model(Stmt):
-    """``model "name";``"""
-
     name: Expr
 
 
@@ -243,8 +235,6 @@ class BadStmt(Stmt):
 
 
 class File(Spanned):
-    """A whole file."""
-
     statements: tuple[Stmt, ...]
 
 

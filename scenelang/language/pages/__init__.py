@@ -45,8 +45,6 @@ _FENCE: Final = re.compile(
 
 
 class Example(Record):
-    """A scene of a page."""
-
     kind: Literal["bad", "good"]  # ``bad`` gives the page's code and nothing else, ``good`` nothing
     language: str  # ``nsg``, ``json`` or ``python``
     text: str
@@ -55,8 +53,6 @@ class Example(Record):
 
 
 class Page(Record):
-    """Documentation of a code."""
-
     code: str  # such as ``E0302``
     text: str  # the Markdown, with its first line
     examples: tuple[Example, ...]  # in the order of the page
