@@ -2,68 +2,45 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import scenelang
 from lab.docs.make_errors import index
+from scenelang.cli.main import cli
 from scenelang.compiler import lower
-from scenelang.compiler.check import check_compiles, check_frames
+from scenelang.compiler.check import check_compiles
 from scenelang.language import lexer, limits, modifiers, parser, session, values
 from scenelang.language import scene as schema
 from scenelang.language import values as functions
-from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
+from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.language.pages import AREAS, CODES, Example, Page, read_page
-from scenelang.language.parser import parse
 from scenelang.language.reports import SceneError, render_text
-from scenelang.language.resolve import find_unused
-from scenelang.language.scene import Scene
-from scenelang.language.session import Defines
 from scenelang.language.tables import tables
 
 PAGES = Path(scenelang.__file__).parent / "language/pages"
 INDEX = (Path(__file__).parents[2] / "docs/errors.md").read_text("utf-8")
 
 
-def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
-    """What there is to say about an example."""
-    found = Diagnostics()
+def check(example: Example, page: Page) -> list[str]:
+    """Codes of what there is to say about an example."""
     if example.language == "python":
         try:
             exec(compile(example.text, page.code, "exec"), {})
         except SceneError as error:
-            return list(error.diagnostics)
+            return [d.code for d in error.diagnostics]
         return []
-    spans = None
-    if example.language == "json":
-        try:
-            scene: Scene | None = Scene.from_json(example.text)
-        except SceneError as error:
-            return list(error.diagnostics)
-    else:
-        for name, text in (("scene.nsg", example.text), *page.files):
-            (folder / name).parent.mkdir(exist_ok=True)
-            (folder / name).write_text(text, "utf-8")
-        told = {"-D": [], "--frame": []}
-        for name, value in zip(example.options[::2], example.options[1::2], strict=True):
-            told[name].append(value)
-        defines = Defines(dict(item.split("=", 1) for item in told["-D"]))
-        source = SourceFile("scene.nsg", example.text)
-        path = folder / "scene.nsg"
-        tree = parse(source, found)
-        evaluation = Source(path, tree=tree, params=defines).evaluation(found, replays=True)
-        scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
-        defines.report_unused(found)
-        if not found.errors:
-            find_unused(tree, found)
-    if scene is not None:
-        check_compiles(scene, spans, found)
-    if example.language == "nsg" and not told["--frame"]:
-        check_frames(evaluation, found, first=scene)
-    return list(found)
+    scene = f"scene.{example.language}"
+    for name, text in ((scene, example.text), *page.files):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(text, "utf-8")
+    result = CliRunner().invoke(cli, ["check", scene, *example.options, "--format", "json"])
+    return [d["code"] for d in json.loads(result.stdout)["diagnostics"]]
 
 
 EXAMPLES = [
@@ -75,11 +52,10 @@ EXAMPLES = [
 
 @pytest.mark.parametrize(("example", "page"), EXAMPLES)
 def test_example(example: Example, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     for name, value in example.limits:
         monkeypatch.setattr(name, value)
-    found = check(example, page, tmp_path)
-    wanted = [page.code] if example.kind == "bad" else []
-    assert [d.code for d in found] == wanted, [(d.message, d.span) for d in found]
+    assert check(example, page) == ([page.code] if example.kind == "bad" else [])
 
 
 def test_codes_are_those_of_the_pages() -> None:
