@@ -13,12 +13,9 @@ import scenelang
 from lab.docs.make_errors import index
 from scenelang.cli.main import cli
 from scenelang.compiler import lower
-from scenelang.compiler.check import check_compiles
 from scenelang.language import lexer, limits, modifiers, parser, session, values
 from scenelang.language import scene as schema
 from scenelang.language import values as functions
-from scenelang.language.diagnostics import Diagnostics, SourceFile
-from scenelang.language.evaluation import Source
 from scenelang.language.pages import AREAS, CODES, Example, Page, read_page
 from scenelang.language.reports import SceneError, render_text
 from scenelang.language.tables import tables
@@ -79,18 +76,12 @@ def test_shape_of_a_page(page: Page) -> None:
     assert page.area in AREAS.values()
 
 
-@pytest.mark.parametrize(("model", "label"), [("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')])
-def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part(model: str, label: str) -> None:
-    found = Diagnostics()
-    source = SourceFile("scene.nsg", model + "square { scale(0.5); }\nsphere { scale(0.3); }\n")
-    scene, spans = Source(text=source).scene(found)
-    assert scene is not None
-    check_compiles(scene, spans, found)
-    (only,) = found
-    assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
-    assert only.span is not None
-    assert (only.span.text, only.labels[0].span.text) == ("sphere", label)
-    assert only.labels[0].message == "flat by this"
+def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part() -> None:
+    for model, label in (("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')):
+        (only,) = scenelang.check_text(f"{model}square {{ scale(0.5); }}\nsphere {{ scale(0.3); }}\n")
+        assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
+        assert [only.span and only.span.text, only.labels[0].span.text] == ["sphere", label]
+        assert only.labels[0].message == "flat by this"
 
 
 def test_pages_state_the_lists_and_limits_of_the_code() -> None:
@@ -125,6 +116,5 @@ def test_the_index_is_made_from_the_pages() -> None:
 def test_the_sample_is_what_is_printed() -> None:
     sample = re.search(r"```text\n(.*?)```", INDEX, re.DOTALL)
     assert sample is not None
-    found = Diagnostics()
-    Source(text=SourceFile("scene.nsg", "square { rotate(45); }\n")).scene(found)
+    found = scenelang.check_text("square { rotate(45); }\n", name="scene.nsg")
     assert render_text(found, summary=False) == sample[1]
