@@ -618,29 +618,19 @@ def format_text(text: str, *, name: str = "<text>") -> str:
         parse(SourceFile(name, text), diagnostics)
         if diagnostics.errors:
             raise SceneError(diagnostics)
-        if diagnostics.items:
-            return format_text(_without_strays(text, diagnostics), name=name)
+        if diagnostics.items:  # all of them of semicolons that stand for nothing
+            for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
+                assert d.code == "W0101", "a warning about more than stray semicolons"
+                assert d.span is not None
+                text = text[: d.span.start] + text[d.span.end :]
+            return format_text(text, name=name)
     assert document is not None, "a text without mistakes that the tables do not read"
     result = "".join(line + "\n" for line in render(document))
-    _compare(tokens, result)
-    return mark + result.replace("\n", newline)
-
-
-def _without_strays(text: str, diagnostics: Diagnostics) -> str:
-    """A text without the semicolons that stand for nothing, all that a parse warns about."""
-    for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
-        assert d.code == "W0101", "a warning about more than stray semicolons"
-        assert d.span is not None
-        text = text[: d.span.start] + text[d.span.end :]
-    return text
-
-
-def _compare(before: Tokens, result: str) -> None:
-    """Fail if formatting would change anything but the layout: a bug, and no file is to suffer from it."""
     source = SourceFile("", result)
     after = scan(source, Report(source))
-    if _significant(before) != _significant(after) or comments_of(before) != comments_of(after):
-        raise AssertionError("formatting changed the text's tokens or comments")
+    if _significant(tokens) != _significant(after) or comments_of(tokens) != comments_of(after):
+        raise AssertionError("formatting changed the text's tokens or comments")  # and no file is to suffer
+    return mark + result.replace("\n", newline)
 
 
 def _significant(tokens: Tokens) -> list[str]:

@@ -302,24 +302,13 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
     """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes."""
     report = Report(source)
     tokens = scan(source, report)
-    if _unbalanced(tokens):
+    steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
+    depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
+    if depths[-1] or min(depths) < 0:  # some brace has no counterpart
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.language.recovery import balance
 
         balance(tokens, report)
-    file = parse_tokens(tokens, report)
-    report.flush(diagnostics)
-    return file
-
-
-def _unbalanced(tokens: Tokens) -> bool:
-    steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
-    depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
-    return depths[-1] != 0 or min(depths) < 0
-
-
-def parse_tokens(tokens: Tokens, report: Report) -> tree.File:
-    """The tree of tokens whose braces match; recovery edits them and reports to ``report``."""
     limit_nesting(tokens, report)
     recovery: Recovery | None = None
     unfinished: list[Any] = []
@@ -334,11 +323,11 @@ def parse_tokens(tokens: Tokens, report: Report) -> tree.File:
         return recovery.resume(states, values, at)
 
     file: tree.File | None = run(tokens.kinds, Builder(tokens, report).callbacks(), mend)
-    return _abandoned(tokens, unfinished) if file is None else file
-
-
-def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
-    statements = values[0] if values and isinstance(values[0], list) else []
+    report.flush(diagnostics)
+    if file is not None:
+        return file
+    # The mistakes became too many: only what came before them is known.
+    statements = unfinished[0] if unfinished and isinstance(unfinished[0], list) else []
     end = tokens.ends[-1]
     start = statements[-1].span.end if statements else 0
     rest = tree.BadStmt(Span(tokens.source, start, end))

@@ -123,7 +123,9 @@ class Reporter(Record, frozen=False):
         site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
             labels, fix, span = (Label(span, "which is used here"),), None, site
-            help = help or _called(site)
+            alias, _, module = site.text.rpartition(".")
+            if not help and alias and module in SHAPES:
+                help = f"it is called {alias}.{SHAPES[module]}"
         elif calls is not None:
             labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
         if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):
@@ -161,9 +163,3 @@ class Reporter(Record, frozen=False):
         if len(again) < _SHOWN and span not in (known.span, *(label.span for label in again)):
             labels = (*known.labels, Label(span, "also here"))
             self.diagnostics.items[index] = replace(known, labels=labels)
-
-
-def _called(site: Span) -> str | None:
-    """Usage line of the library's module that a call names."""
-    alias, _, module = site.text.rpartition(".")
-    return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None
