@@ -1,4 +1,4 @@
-"""Quality of reports of one mistake: ``python -m lab bench mutations [--count N | --all] [--worst N]``.
+"""Quality of reports of one mistake: ``python -m lab bench mutations [--count N] [--worst N]``.
 
 Makes slips in all examples and in the sound scenes of the tests, lets Lark and the evaluator judge which of
 them are mistakes, and prints for each kind how many gave exactly one diagnostic, within one line of the
@@ -10,34 +10,26 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
 
-from tests.language.mutations import (
-    KINDS,
-    Outcome,
-    Tally,
-    exhaust,
-    parsed_only,
-    sample,
-    scenes,
-    study,
-    together,
-)
+from tests.language.mutations import KINDS, Outcome, parsed_only, scenes, share, study
 
 COLUMNS = ("mistakes", "sound", "one, near", "one", "near", "0", "2", "3", "more", "no tree")
 
 
-def row(name: str, tally: Tally) -> str:
+def row(name: str, outcomes: list[Outcome]) -> str:
     """One line of the table."""
-    counts = tally.counts()
+    mistakes = [o for o in outcomes if o.fault != "none"]
+    counts = Counter(o.count for o in mistakes)
     more = sum(number for count, number in counts.items() if count > 3)
     cells = [
-        f"{len(tally.outcomes):,}",
-        f"{tally.still_sound:,}",
-        f"{100 * tally.share('good'):.1f} %",
-        f"{100 * counts[1] / max(1, len(tally.outcomes)):.1f} %",
-        f"{100 * tally.share('near'):.1f} %",
+        f"{len(mistakes):,}",
+        f"{len(outcomes) - len(mistakes):,}",
+        f"{100 * share(mistakes, 'good'):.1f} %",
+        f"{100 * counts[1] / max(1, len(mistakes)):.1f} %",
+        f"{100 * share(mistakes, 'near'):.1f} %",
         *(str(number) for number in (counts[0], counts[2], counts[3], more)),
-        str(sum(not outcome.tree for outcome in tally.outcomes)),
+        str(sum(not outcome.tree for outcome in mistakes)),
     ]
     return f"{name:<18}" + "".join(f"{cell:>10}" for cell in cells)
 
@@ -59,10 +51,6 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=1000, help="slips of each kind (1000)")
-    parser.add_argument("--all", action="store_true", help="every token of every scene instead")
-    parser.add_argument(
-        "--tries", type=int, default=2, help="with --all: random slips of a kind at a token (2)"
-    )
     parser.add_argument("--seed", type=int, default=2021)
     parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind")
     parser.add_argument("--fault", choices=("syntax", "meaning"), help="list only mistakes of this sort")
@@ -70,26 +58,24 @@ def main() -> None:
     options = parser.parse_args()
     kinds = tuple(options.kind or KINDS)
     start = time.process_time()
-    slips = (
-        exhaust(options.seed, options.tries, kinds)
-        if options.all
-        else sample(options.count, options.seed, kinds)
-    )
-    table = study(slips)
+    outcomes = study(options.count, options.seed, kinds)
     print(
         f"{len(scenes())} scenes, seed {options.seed}, {time.process_time() - start:.0f} s of processor time"
     )
     print(f"{'':<18}" + "".join(f"{title:>10}" for title in COLUMNS))
-    for (kind, fault), tally in sorted(table.items()):
-        print(row(f"{kind} / {fault}", tally))
-    for name, tally in (
-        ("syntax", together(table, "syntax")),
-        ("  parser alone", parsed_only(together(table))),
-        ("meaning", together(table, "meaning")),
-        ("all", together(table)),
+    for kind in kinds:
+        own = [o for o in outcomes if o.mutation.kind == kind]
+        print(row(f"{kind} / syntax", [o for o in own if o.fault == "syntax"]))
+        print(row(f"{kind} / meaning", [o for o in own if o.fault != "syntax"]))
+    for name, some in (
+        ("syntax", [o for o in outcomes if o.fault == "syntax"]),
+        ("  parser alone", parsed_only(outcomes)),
+        ("meaning", [o for o in outcomes if o.fault != "syntax"]),
+        ("all", outcomes),
     ):
-        print(row(name, tally))
-    wrong = [o for o in together(table, options.fault).outcomes if not o.good]
+        print(row(name, some))
+    faults = (options.fault,) if options.fault else ("syntax", "meaning")
+    wrong = [o for o in outcomes if o.fault in faults and not o.good]
     wrong.sort(key=lambda o: (-o.count, -o.distance))
     for outcome in wrong[: options.worst]:
         show(outcome)

@@ -114,12 +114,10 @@ class Place(NamedTuple):
 
     @property
     def session(self) -> Session:
-        """The evaluation."""
         return self.file.session
 
     @property
     def report(self) -> Reporter:
-        """Reporter of the session."""
         return self.file.session.report
 
     def inner(self, kind: Kind | None = None) -> Place:

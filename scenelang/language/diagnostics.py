@@ -1,7 +1,6 @@
 """Diagnostics as values: places in text, codes, messages, suggestions and fixes.
 
-Everything here is pure: texts go in, texts come out. `scenelang check --fix` reads and writes the files; an
-editor sends the edits of one `Fix`, or what `settle` makes of its open buffers.
+Everything here is pure: texts go in, texts come out.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ class SourceFile:
 
     @cached_property
     def _starts(self) -> list[int]:
-        """Offset of the beginning of each line."""
         return [0, *(newline.end() for newline in re.finditer("\n", self.text))]
 
     def position(self, offset: int) -> tuple[int, int]:
@@ -63,7 +61,6 @@ class Span(Record):
 
     @property
     def text(self) -> str:
-        """The source text that the span covers."""
         return self.source.text[self.start : self.end]
 
     def locate(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -151,11 +148,7 @@ class Diagnostics:
         help: str | None = None,
         fix: Fix | None = None,
     ) -> bool:
-        """Record one diagnostic; a message that quotes half a file is cut.
-
-        Returns:
-            Whether there is room for it.
-        """
+        """Record one diagnostic, with a long message cut; False where there is no room for it."""
         if span is not None:
             key = (code, span.source.name, span.start, span.end)
             if key in self._seen:
@@ -207,13 +200,9 @@ def ranked(
 ) -> list[tuple[float, str]]:
     """The names that may have been meant, nearest first, each with its distance.
 
-    The distance counts slips: a letter more, less or other is one, two neighbours swapped a little less,
-    an underscore or a final ``s`` too many or too few less again, other case next to nothing. A wrong first
-    letter counts a little more, since it seldom is.
-
-    Args:
-        slips: how many slips are forgiven; by default one in three letters.
-        effort: what this takes its work from; the names that are left when it is spent are not looked at.
+    A letter more, less or other is one slip, two neighbours swapped a little less, an underscore or a final
+    ``s`` less again, other case next to nothing, a wrong first letter a little more. By default one in three
+    letters is forgiven. Names that are left when ``effort`` is spent are not looked at.
     """
     if (len(name) < 2 and not slips) or len(name) > _LONGEST:
         return []
@@ -245,7 +234,6 @@ def ranked(
 
 
 def nearest(name: str, known: Iterable[str], slips: int | None = None) -> str | None:
-    """The known name with the fewest slips from ``name``; None where none is near."""
     result = ranked(name, known, slips)
     return result[0][1] if result else None
 
@@ -292,19 +280,13 @@ def did_you_mean(
     if len(near) > 1:
         shown = [f"`{candidate}`" for candidate in near[:3]]
         return f"did you mean {', '.join(shown[:-1])} or {shown[-1]}?", None
-    fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if is_slip(name, near[0], best) else None
+    # `p3` is not `p2`, `rotateX` not `rotate` and `heptagon` not `pentagon`: they have a meaning.
+    digits, others = ([c for c in text if c.isdigit()] for text in (name, near[0]))
+    axis = name[-1:] in "xyzXYZ" and name[:-1].rstrip("_").lower() == near[0].lower()
+    start = best < 2 or name[:1].lower() == near[0][:1].lower()
+    sure = digits == others and not axis and best <= 2 and start
+    fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if sure else None
     return f"did you mean `{near[0]}`?", fix
-
-
-def is_slip(name: str, other: str, distance: float) -> bool:
-    """Test whether one name can only have been meant for the other.
-
-    `p3` is not `p2`, `rotateX` not `rotate` and `heptagon` not `pentagon`: they mean something of their own.
-    """
-    digits, others = ([c for c in text if c.isdigit()] for text in (name, other))
-    axis = name[-1:] in "xyzXYZ" and name[:-1].rstrip("_").lower() == other.lower()
-    start = distance < 2 or name[:1].lower() == other[:1].lower()
-    return digits == others and not axis and distance <= 2 and start
 
 
 def instead(
@@ -325,14 +307,13 @@ def listing(known: Iterable[str], limit: int = 12) -> str:
 
 
 def plural(count: int, noun: str) -> str:
-    """`1 error`, `2 errors`."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
 MAX_ROUNDS: Final = 50
 """A fix may uncover the next mistake; a text that still changes after so many rounds is left there."""
 MAX_CROWDED: Final = 2
-"""Texts with more mistakes than are kept are left after so many rounds, as looking for so many takes long."""
+"""Texts with more mistakes than are kept are left after so many rounds."""
 SPENT: Final = "E0322"
 """More steps than an evaluation may have: texts that take so long are not checked again."""
 
@@ -340,14 +321,10 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def apply_fixes(text: str, diagnostics: Iterable[Diagnostic]) -> tuple[str, tuple[Diagnostic, ...]]:
-    """Apply the fixes of some diagnostics of one text, as many as go together.
+    """Apply the fixes of some diagnostics of one text, as many as go together; fixes of other texts stay out.
 
     A fix is applied whole or not at all. Where two touch the same place, the one that stands first in the
     text wins and the other waits for the next round. Equal fixes of two diagnostics are applied once.
-
-    Args:
-        text: the text in which the diagnostics were found. A fix for any other text is left out.
-        diagnostics: in any order, with or without fixes.
 
     Returns:
         The text with the fixes, and the diagnostics whose fixes went into it, in the order of the text.
@@ -388,7 +365,6 @@ def removal(source: SourceFile, start: int, end: int) -> Fix:
 
 
 def _fits(fix: Fix, text: str) -> bool:
-    """Test whether a fix belongs to this text and changes something."""
     return any(e.span.text != e.replacement for e in fix.edits) and all(
         (e.span.source.text is text or e.span.source.text == text)
         and 0 <= e.span.start <= e.span.end <= len(text)
@@ -426,15 +402,9 @@ class Settled(Record, Generic[Key]):
 def settle(
     texts: Mapping[Key, str], check: Callable[[Mapping[Key, str]], Iterable[tuple[Key | None, Diagnostic]]]
 ) -> Settled[Key]:
-    """Apply fixes until none is left.
+    """Apply fixes to ``texts``, by any key, until none is left.
 
-    Args:
-        texts: the files that may change, by any key.
-        check: finds the diagnostics of such texts; each comes with the key of the file that it is in, None
-            for a file that may not change.
-
-    Returns:
-        The texts and what is left to mend by hand.
+    ``check`` finds their diagnostics, each with the key of its file, None for a file that may not change.
     """
     now = dict(texts)
     applied: dict[Key, tuple[Diagnostic, ...]] = dict.fromkeys(now, ())

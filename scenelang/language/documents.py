@@ -1,13 +1,10 @@
 """Documents: text with places where lines may break, comments, and the printer that chooses among them.
 
-The rules are chosen so that text laid out by this package reads back the same way: whatever a comment is
-attached to, it is printed where the same rule attaches it again. That is what makes formatting idempotent.
+A comment is printed where the rule that attached it attaches it again: that makes formatting idempotent.
 
 After Philip Wadler, *A prettier printer*, in The Fun of Programming (2003): a group is printed on one line if
-it fits, otherwise its own line breaks are taken and the groups inside are tried. Two things are different.
-Every document knows its text on one line beforehand, so that whatever fits is written at once; and a
-document keeps the comments at its two ends apart from itself, so that whoever puts documents together
-decides where they go (behind a comma, for example).
+it fits, otherwise its own line breaks are taken and the groups inside are tried. Two things are different:
+every document knows its text on one line beforehand, and keeps the comments at its ends apart from itself.
 """
 
 from __future__ import annotations
@@ -25,8 +22,6 @@ _COMMENT = re.compile(r"//[^\n]*|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
 class Comment(NamedTuple):
-    """One comment."""
-
     text: str  # from its first sign to its last, trailing white space of its lines taken off
     column: int | None  # code points before it on its line, if it has several lines and no tabs stand there
     ends_line: bool  # nothing may follow it on its last line: it is a line comment or has several lines
@@ -129,8 +124,6 @@ AnyDoc = TypeVar("AnyDoc", bound="Doc")
 
 
 class Doc:
-    """A piece of layout."""
-
     __slots__ = ("after", "before", "blank", "flat")
 
     def __init__(self, flat: str | None) -> None:
@@ -158,8 +151,6 @@ class Break(Doc):
 
 
 class Concat(Doc):
-    """Parts one after another."""
-
     __slots__ = ("parts",)
 
     def __init__(self, flat: str | None, parts: Sequence[Part]) -> None:
@@ -178,7 +169,6 @@ class Group(Doc):
         self._made: Part | None = None
 
     def broken(self) -> Part:
-        """Layout over several lines."""
         if self._made is None:
             self._made = self.maker()
         return self._made
@@ -292,7 +282,6 @@ def ends_of(doc: AnyDoc, first: Part, last: Part) -> AnyDoc:
 
 
 def render(doc: Part) -> list[str]:
-    """The lines of a document."""
     printer = _Printer()
     printer.print(doc)
     if printer.line:
@@ -301,11 +290,7 @@ def render(doc: Part) -> list[str]:
 
 
 class _Printer:
-    """Writes lines.
-
-    A line's margin is settled by the break that began it. `ended` says that a comment has been written
-    after which nothing may stand on the same line.
-    """
+    """Writes lines; nothing may stand on the line of a comment that has ``ended`` it."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []

@@ -116,7 +116,6 @@ def _numbers(items: Sequence[Item]) -> list[str]:
 
 
 def blank_before(part: Part) -> bool:
-    """Test for a blank line before a part and its comments."""
     if isinstance(part, str):
         return False
     return part.before[0].blank if part.before else part.blank
@@ -204,12 +203,80 @@ class Choice(Group):
         return sequence([*parts, *lead, otherwise])
 
 
-class ExpressionLayout:
-    """Lays out the expressions of one file, which was read without mistakes.
+class Statement(Group):
+    """A statement with ``depth`` blocks within each other; a simple one may stand in a block on one line."""
 
-    `doubtful` becomes true at what only the builder of the tree can refuse: an escape in a string, a number
-    that may be too large, a call of what may not be a name.
-    """
+    __slots__ = ("depth", "simple")
+
+    def __init__(self, flat: str | None, maker: Callable[[], Part], depth: int, simple: bool) -> None:
+        super().__init__(flat, maker)
+        self.depth = depth
+        self.simple = simple
+
+
+class Block:
+    """``{ … }``, whose place in a line is for the statement around it to say."""
+
+    __slots__ = ("closing", "depth", "flat", "opening", "statements")
+
+    def __init__(self, opening: Part, statements: Sequence[Item], closing: Part) -> None:
+        self.opening = opening
+        self.closing = closing
+        self.statements = statements
+        self.depth = 1
+        self.flat: str | None = None
+        simple = not (before_of(opening) or after_of(opening) or before_of(closing))
+        for index, item in enumerate(statements):
+            stmt = item.part
+            assert isinstance(stmt, Statement)
+            self.depth = max(self.depth, stmt.depth + 1)
+            simple = simple and stmt.simple and not (stmt.before or stmt.after or (index and stmt.blank))
+        if simple and not statements and flat_of(opening) == "{":
+            self.flat = f"{{{flat_of(closing)}"
+        elif simple:
+            spaced = [part for item in statements for part in (" ", item.part)]
+            self.flat = joined([opening, *spaced, " ", closing])
+
+    def structural(self) -> str | None:
+        """Its one line where it is the block of something that is not an object."""
+        few = self.depth <= 1 or (self.depth == 2 and len(self.statements) == 1)
+        return self.flat if few else None
+
+    def open(self, behind: Sequence[Comment] = ()) -> list[Part]:
+        """The block on lines of its own; ``behind`` are comments that stood before its opening brace."""
+        opened = [*behind, *before_of(self.opening)]
+        head: list[Part] = [plain(self.opening)]
+        first: list[Part] = []
+        if opened and flat_of(self.opening) != "{":  # comments before the brace must not be overtaken
+            head = [Comments(opened, inside=True), plain(self.opening, after=True)]
+        elif opened := [*opened, *after_of(self.opening)]:
+            first = [Comments(own_after_first(opened))]
+        inside = entries(self.statements, before_of(self.closing))
+        if not inside and not opened:
+            return [self.flat or "{}"]
+        return [*head, Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
+
+
+def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Part]:
+    """Statements and the comments between them, each on a new line, blank lines kept."""
+    parts: list[Part] = []
+    for item in statements:
+        stmt = item.part
+        parts.append(BLANK if parts and blank_before(stmt) else LINE)
+        parts += comments_before(stmt)
+        parts.append(stmt)
+        if after := after_of(stmt):
+            parts.append(Comments(own_after_first(after)))
+    return [*parts, *comment_lines(dangling, begun=bool(parts))]
+
+
+def _lined(parts: Sequence[Part], flat: str | None) -> Group:
+    """Document on the same line or, where that is too long, on a line of its own."""
+    return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
+
+
+class Layout:
+    """Lays out one file that was read without mistakes."""
 
     def __init__(self, tokens: Tokens, notes: Mapping[int, Notes]) -> None:
         self.tokens = tokens
@@ -217,7 +284,7 @@ class ExpressionLayout:
         self.text = tokens.source.text
         self.starts = tokens.starts
         self.ends = tokens.ends
-        self.doubtful = False
+        self.doubtful = False  # at what only the builder of the tree can refuse
 
     def word(self, token: int) -> Part:
         """A token with what stands around it."""
@@ -234,8 +301,6 @@ class ExpressionLayout:
         word = Word(text)
         word.before, word.after, word.blank = note.before, note.after, note.blank
         return word
-
-    # ------------------------------------------------------------ lists
 
     def first(self, item: Part) -> list[Item]:
         return [Item(item)]
@@ -267,8 +332,6 @@ class ExpressionLayout:
         if not (after_of(left) or before_of(right)):
             flat = joined([left, *inline(items), right])
         return ends_of(form(flat, lambda: broken(left, items, right)), left, right)
-
-    # ------------------------------------------------------------ names
 
     name = keyword = word
 
@@ -376,87 +439,8 @@ class ExpressionLayout:
 
     color = true = false = word
 
-
-class Statement(Group):
-    """A statement with ``depth`` blocks within each other; a simple one may stand in a block on one line."""
-
-    __slots__ = ("depth", "simple")
-
-    def __init__(self, flat: str | None, maker: Callable[[], Part], depth: int, simple: bool) -> None:
-        super().__init__(flat, maker)
-        self.depth = depth
-        self.simple = simple
-
-
-class Block:
-    """``{ … }``, whose place in a line is for the statement around it to say."""
-
-    __slots__ = ("closing", "depth", "flat", "opening", "statements")
-
-    def __init__(self, opening: Part, statements: Sequence[Item], closing: Part) -> None:
-        self.opening = opening
-        self.closing = closing
-        self.statements = statements
-        self.depth = 1
-        self.flat: str | None = None
-        simple = not (before_of(opening) or after_of(opening) or before_of(closing))
-        for index, item in enumerate(statements):
-            stmt = item.part
-            assert isinstance(stmt, Statement)
-            self.depth = max(self.depth, stmt.depth + 1)
-            simple = simple and stmt.simple and not (stmt.before or stmt.after or (index and stmt.blank))
-        if simple and not statements and flat_of(opening) == "{":
-            self.flat = f"{{{flat_of(closing)}"
-        elif simple:
-            spaced = [part for item in statements for part in (" ", item.part)]
-            self.flat = joined([opening, *spaced, " ", closing])
-
-    def structural(self) -> str | None:
-        """Its one line where it is the block of something that is not an object."""
-        few = self.depth <= 1 or (self.depth == 2 and len(self.statements) == 1)
-        return self.flat if few else None
-
-    def open(self, behind: Sequence[Comment] = ()) -> list[Part]:
-        """The block on lines of its own; ``behind`` are comments that stood before its opening brace."""
-        opened = [*behind, *before_of(self.opening)]
-        head: list[Part] = [plain(self.opening)]
-        first: list[Part] = []
-        if opened and flat_of(self.opening) != "{":  # comments before the brace must not be overtaken
-            head = [Comments(opened, inside=True), plain(self.opening, after=True)]
-        elif opened := [*opened, *after_of(self.opening)]:
-            first = [Comments(own_after_first(opened))]
-        inside = entries(self.statements, before_of(self.closing))
-        if not inside and not opened:
-            return [self.flat or "{}"]
-        return [*head, Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
-
-
-def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Part]:
-    """Statements and the comments between them, each on a new line, blank lines kept."""
-    parts: list[Part] = []
-    for item in statements:
-        stmt = item.part
-        parts.append(BLANK if parts and blank_before(stmt) else LINE)
-        parts += comments_before(stmt)
-        parts.append(stmt)
-        if after := after_of(stmt):
-            parts.append(Comments(own_after_first(after)))
-    return [*parts, *comment_lines(dangling, begun=bool(parts))]
-
-
-def _lined(parts: Sequence[Part], flat: str | None) -> Group:
-    """Document on the same line or, where that is too long, on a line of its own."""
-    return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
-
-
-class Layout(ExpressionLayout):
-    """Lays out one file."""
-
     def callbacks(self) -> list[Callable[..., Any] | None]:
-        """The callback of every rule, in the order of `Tables.rules`; None passes the value on.
-
-        Rules that only recovery uses have none: what is laid out has no mistakes.
-        """
+        """The callback of every rule, as `run` takes them; rules that only recovery uses have none."""
         names = (name for _, _, name in tables().rules)
         return [None if not name or name.startswith("bad_") else getattr(self, name) for name in names]
 
@@ -634,29 +618,19 @@ def format_text(text: str, *, name: str = "<text>") -> str:
         parse(SourceFile(name, text), diagnostics)
         if diagnostics.errors:
             raise SceneError(diagnostics)
-        if diagnostics.items:
-            return format_text(_without_strays(text, diagnostics), name=name)
+        if diagnostics.items:  # all of them of semicolons that stand for nothing
+            for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
+                assert d.code == "W0101", "a warning about more than stray semicolons"
+                assert d.span is not None
+                text = text[: d.span.start] + text[d.span.end :]
+            return format_text(text, name=name)
     assert document is not None, "a text without mistakes that the tables do not read"
     result = "".join(line + "\n" for line in render(document))
-    _compare(tokens, result)
-    return mark + result.replace("\n", newline)
-
-
-def _without_strays(text: str, diagnostics: Diagnostics) -> str:
-    """A text without the semicolons that stand for nothing, all that a parse warns about."""
-    for d in sorted(diagnostics, key=lambda d: -d.span.start if d.span is not None else 0):
-        assert d.code == "W0101", "a warning about more than stray semicolons"
-        assert d.span is not None
-        text = text[: d.span.start] + text[d.span.end :]
-    return text
-
-
-def _compare(before: Tokens, result: str) -> None:
-    """Fail if formatting would change anything but the layout: a bug, and no file is to suffer from it."""
     source = SourceFile("", result)
     after = scan(source, Report(source))
-    if _significant(before) != _significant(after) or comments_of(before) != comments_of(after):
-        raise AssertionError("formatting changed the text's tokens or comments")
+    if _significant(tokens) != _significant(after) or comments_of(tokens) != comments_of(after):
+        raise AssertionError("formatting changed the text's tokens or comments")  # and no file is to suffer
+    return mark + result.replace("\n", newline)
 
 
 def _significant(tokens: Tokens) -> list[str]:
@@ -712,5 +686,4 @@ def _comments(text: str) -> list[str]:
 
 
 def _statements(text: str, diagnostics: Diagnostics) -> list[tuple[int, int]]:
-    """Start and end of each statement of the top level of a text without errors."""
     return [(s.span.start, s.span.end) for s in parse(SourceFile("", text), diagnostics).statements]

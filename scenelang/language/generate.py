@@ -1,8 +1,7 @@
 """From the grammar to `tables.json`: Lark builds the LALR tables, and what is kept is plain JSON.
 
-States are numbered in the order a breadth-first walk meets them, so the same grammar always gives the same
-bytes. `scenelang.language.tables` calls this where there are no current tables, and so does the build of a
-wheel (``hatch_build.py``).
+States are numbered breadth-first, so the same grammar always gives the same bytes. `tables` calls this where
+there are no current tables, and so does the build of a wheel (``hatch_build.py``).
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from scenelang.assets.files import write_whole
 
 
 def generate(grammar: str) -> dict[str, Any]:
-    """The plain data of `tables.json` for a grammar text."""
     lark = Lark(grammar, parser="lalr", lexer="basic", maybe_placeholders=False)
     table = lark.parser.parser._parse_table
     literals = {t.name: t.pattern.value for t in lark.terminals if isinstance(t.pattern, PatternStr)}

@@ -83,8 +83,6 @@ def keywords_near(text: str) -> tuple[str, ...]:
 
 
 class Habit(Record):
-    """One habit."""
-
     pattern: str  # what is written
     meant: str  # what is written here; also read in its place, so that the rest can be checked
     message: str  # the fact; words that the pattern has found may stand in it
@@ -124,6 +122,7 @@ _ARGUED: Final = "`<node>` takes no objects as arguments"
 _STANDS: Final = "objects stand in its block: <node> { square; star; }"
 _METHOD: Final = "transforms stand in the block of what they move"
 _VALUE: Final = "objects are not values"
+_DRAWN: Final = "objects are drawn where they stand"
 _MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
 _BEFORE: Final = "transforms stand behind what they apply to"
 _INSIDE: Final = "it stands in the block, as in square { translate(1, 0); material flat { color(#d33); } }"
@@ -167,9 +166,7 @@ HABITS: Final = (
     Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
     Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
     Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
-    Habit(
-        "<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", "missing `fn` before `<f>`", code="E0126"
-    ),
+    Habit("<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNNAMED_FN, code="E0126"),
     Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
     Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNTYPED),
     Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _UNTYPED),
@@ -200,6 +197,7 @@ HABITS: Final = (
     _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
     _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
+    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
     Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
     _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
     Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
@@ -376,11 +374,7 @@ def _extent(tokens: Tokens, hole: str, at: int, head: int) -> int:
 
 
 def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Token]]:
-    """Text and tokens of a replacement: holes keep their places, all else is empty.
-
-    A `BAD_` token takes the text behind the last hole before it. Holes that change their order are left out
-    of the tokens: nothing is known of them.
-    """
+    """Text and tokens of a replacement: holes in order keep their places, all else is empty."""
     language = tables()
     text, new, (at, close) = "", [], tokens.place(*match[""])
     for piece in _PIECE.finditer(meant):
@@ -414,10 +408,7 @@ def _replaced(tokens: Tokens, match: _Match, meant: str) -> tuple[str, list[Toke
 
 
 def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at: int) -> bool:
-    """Report a habit in the statement from ``first`` on and put what was meant in its place.
-
-    ``stack`` are the parser's states before the statement; ``at`` is the token that does not fit.
-    """
+    """Report a habit in the statement from ``first`` on, in which token ``at`` does not fit, and mend it."""
     if len(report.found) > _MOST:
         return False
     anchors = _anchors(tokens, first, at)
@@ -490,7 +481,6 @@ def _reads_on(
 
 def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str) -> None:
     def filled(words: str) -> str:
-        """Words with the names that were found in the holes."""
         return re.sub("<([a-z]+)>", lambda hole: _text(tokens, match[hole[1]]), words)
 
     start, end = tokens.place(*match[""])
@@ -523,7 +513,6 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
 
 
 def head(tokens: Tokens, at: int) -> str:
-    """The first word of the statement that the token at an index belongs to."""
     first = at
     while first and at - first < MAX_REPLAY and tokens.text(first - 1) not in (";", "{", "}"):
         first -= 1

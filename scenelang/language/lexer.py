@@ -1,11 +1,8 @@
 """Text to tokens, and the LALR automaton that reads them.
 
 One regular expression, made from the terminals of the grammar and the shapes of common slips, eats
-white space and comments and then one token. A slip is reported here once and stands in the token list as
-what was meant, so that the parser meets a sound text.
-
-Lark's own loop feeds token objects through several layers and cannot resume; this one works on the same
-tables, keeps token indices on its stack and hands over at a mistake.
+white space and comments and then one token. A slip is reported once and stands in the token list as what
+was meant. Unlike Lark's own loop, the automaton's can resume after a mistake.
 """
 
 from __future__ import annotations
@@ -105,7 +102,6 @@ class Report:
         self.found.append(Diagnostic(code, message, Span(self.source, start, end), tuple(labels), help, fix))
 
     def change(self, start: int, end: int, text: str, message: str | None = None) -> Fix:
-        """A fix that puts a text in the place of ``[start, end)``."""
         if not text:
             return removal(self.source, start, end)
         usual = f"{'insert' if start == end else 'write'} `{text.strip()}`"
@@ -118,10 +114,7 @@ class Report:
 
 
 class Tokens:
-    """Tokens as parallel lists of kinds, starts and ends; the last one is the end of the text.
-
-    A token that recovery put in is empty (``start == end``).
-    """
+    """Tokens as parallel lists; the last one is the end of the text, those that recovery put in are empty."""
 
     __slots__ = ("cut", "ends", "kinds", "reported", "source", "starts")
 
@@ -139,7 +132,6 @@ class Tokens:
         self.ends.append(end)
 
     def text(self, index: int) -> str:
-        """The text of one token."""
         return self.source.text[self.starts[index] : self.ends[index]]
 
     def place(self, first: int, stop: int = 0) -> tuple[int, int]:
@@ -151,15 +143,10 @@ class Tokens:
         return self.ends[index - 1] if index else 0
 
     def on_new_line(self, index: int) -> bool:
-        """Test whether a token is the first of its line."""
         return index == 0 or "\n" in self.source.text[self.ends[index - 1] : self.starts[index]]
 
     def replace(self, index: int, count: int, kinds: Sequence[int]) -> None:
-        """Put tokens of other kinds in the place of ``count`` tokens.
-
-        A token that takes the place of another keeps it; otherwise new ones are empty and stand where the
-        first old one began, or at the end of the token before where none goes.
-        """
+        """Put tokens of other kinds in the place of ``count``: empty ones, but for one in place of one."""
         if len(kinds) == count == 1:
             self.kinds[index] = kinds[0]
             return
@@ -167,17 +154,14 @@ class Tokens:
         self.splice(index, index + count, [(kind, at, at) for kind in kinds])
 
     def part(self, first: int, stop: int) -> list[Token]:
-        """Kinds, starts and ends of the tokens ``[first, stop)``."""
         columns = (self.kinds[first:stop], self.starts[first:stop], self.ends[first:stop])
         return list(zip(*columns, strict=True))
 
     def splice(self, first: int, stop: int, new: Sequence[Token]) -> None:
-        """Put others in the place of the tokens ``[first, stop)``."""
         for number, column in enumerate((self.kinds, self.starts, self.ends)):
             column[first:stop] = [token[number] for token in new]
 
     def drop(self, indices: Sequence[int]) -> None:
-        """Take out any number of tokens at once."""
         gone = set(indices)
         for column in (self.kinds, self.starts, self.ends):
             column[:] = [value for index, value in enumerate(column) if index not in gone]
@@ -344,12 +328,10 @@ Mend = Callable[[list[int], list[Any], int], int | None]
 
 
 def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: Mend) -> Any:
-    """Read tokens to their end and build what they stand for; None where ``mend`` gave up.
+    """Read tokens up to `END` and build what they stand for; None where ``mend`` gave up.
 
-    Args:
-        kinds: of each token, the last of them `END`; ``mend`` may change the list.
-        callbacks: builders of each rule's value from those of its parts, in the order of `Tables.rules`; the
-            value of a token is its index. None passes the only value on.
+    ``callbacks`` build each rule's value from those of its parts, in the order of `Tables.rules`; None passes
+    the only value on. The value of a token is its index.
     """
     language = tables()
     actions, gotos, final = language.actions, language.gotos, language.final
@@ -413,7 +395,6 @@ def advance(stack: list[int], kind: int) -> bool:
 
 
 def fits(stack: list[int], kind: int) -> bool:
-    """Test whether a token can follow."""
     return advance(stack.copy(), kind)
 
 

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable
 from typing import Any
 
-from scenelang.language.diagnostics import Diagnostic, Fix, Span
+from scenelang.language.diagnostics import Diagnostic, Span
 from scenelang.language.reports import in_order, printable
 
 JSON_VERSION = 1
@@ -60,7 +60,7 @@ def render_github(diagnostics: Iterable[Diagnostic]) -> str:
     """Workflow commands that GitHub shows beside the lines of a pull request."""
     lines = []
     for d in in_order(diagnostics):
-        fields = {"title": d.code}
+        fields: dict[str, str] = {}
         if d.span is not None:
             (line, column), (end_line, end_column) = d.span.locate()
             fields = {"file": _relative(d.span.source.name), "line": str(line), "col": str(column)}
@@ -68,7 +68,7 @@ def render_github(diagnostics: Iterable[Diagnostic]) -> str:
                 fields["endLine"] = str(end_line)
             elif end_column > column:
                 fields["endColumn"] = str(end_column)
-            fields["title"] = d.code
+        fields["title"] = d.code
         text = d.message if d.help is None else f"{d.message}\nhelp: {d.help}"
         joined = ",".join(f"{key}={_escaped(value, ':,')}" for key, value in fields.items())
         lines.append(f"::{d.severity} {joined}::{_escaped(text)}\n")
@@ -135,7 +135,12 @@ def _result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
             for number, label in enumerate(diagnostic.labels)
         ]
     if diagnostic.fix is not None:
-        result["fixes"] = [_sarif_fix(diagnostic.fix)]
+        changes: dict[str, list[dict[str, Any]]] = {}
+        for edit in diagnostic.fix.edits:
+            replacement = {"deletedRegion": _region(edit.span), "insertedContent": {"text": edit.replacement}}
+            changes.setdefault(_uri(edit.span.source.name), []).append(replacement)
+        files = [{"artifactLocation": {"uri": uri}, "replacements": own} for uri, own in changes.items()]
+        result["fixes"] = [{"description": {"text": diagnostic.fix.message}, "artifactChanges": files}]
     return result
 
 
@@ -158,7 +163,6 @@ def _relative(name: str) -> str:
 
 
 def _uri(name: str) -> str:
-    """A file name as a relative or absolute URI reference."""
     from urllib.parse import quote
 
     path = _relative(name)
@@ -167,12 +171,3 @@ def _uri(name: str) -> str:
     except UnicodeEncodeError:
         path = quote(path.encode("utf-8", "surrogatepass"), safe="/~")
     return f"file://{path}" if path.startswith("/") else path
-
-
-def _sarif_fix(fix: Fix) -> dict[str, Any]:
-    changes: dict[str, list[dict[str, Any]]] = {}
-    for edit in fix.edits:
-        replacement = {"deletedRegion": _region(edit.span), "insertedContent": {"text": edit.replacement}}
-        changes.setdefault(_uri(edit.span.source.name), []).append(replacement)
-    files = [{"artifactLocation": {"uri": uri}, "replacements": own} for uri, own in changes.items()]
-    return {"description": {"text": fix.message}, "artifactChanges": files}

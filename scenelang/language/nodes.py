@@ -47,7 +47,6 @@ def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str]
 
 
 def light_fault(power: float) -> str | None:
-    """Why there is no light of such a power, if there is none."""
     return f"a power of {power:g} is negative" if power < 0.0 else None
 
 
@@ -110,10 +109,7 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=8192), BeforeValidator(_whol
 
 
 def singular(rows: Sequence[Sequence[float]]) -> bool:
-    """Test whether the 3 x 3 linear block of an affine has no inverse.
-
-    A determinant below 1e-14 of the product of the rows' lengths counts as 0: float64 cannot tell.
-    """
+    """Test whether the 3 x 3 block of an affine has no inverse: float64 cannot tell below 1e-14."""
     lengths = [math.hypot(*row[:3]) for row in rows[:3]]
     if not all(lengths) or not all(map(math.isfinite, lengths)):
         return True
@@ -152,8 +148,6 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
 
 
 _SEVERAL = frozenset(("children", "elements", "nodes", "ops", "transforms"))
-
-
 _COLOURS = frozenset(("background", "color", "rgb"))
 
 
@@ -195,7 +189,6 @@ class Frozen(BaseModel):
 
     @classmethod
     def _names(cls) -> list[str]:
-        """Arguments of a constructor, in order."""
         return [name for name in cls.model_fields if name != "kind"]
 
     @classmethod
@@ -271,9 +264,8 @@ def _line(item: ErrorDetails, known: list[str]) -> str:
         from difflib import get_close_matches  # only mistakes need it
 
         near = get_close_matches(path, known, 1)
-        return f"there is no `{path}`, " + (
-            f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
-        )
+        there = f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
+        return f"there is no `{path}`, {there}"
     if kind == "missing":
         return f"`{path}` is missing"
     if kind == "union_tag_invalid":
@@ -303,10 +295,8 @@ class _Turn(Frozen):
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
         if args:
             name = cls.__name__
-            raise TypeError(
-                f"{name}: an angle without its unit: write {name}.degrees({args[0]!r}), "
-                f"or {name}(angle={args[0]!r}) for radians"
-            )
+            ways = f"write {name}.degrees({args[0]!r}), or {name}(angle={args[0]!r}) for radians"
+            raise TypeError(f"{name}: an angle without its unit: {ways}")
         return data
 
 
@@ -575,7 +565,6 @@ class Material(Frozen):
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        """A text such as ``#d33`` alone is the colour."""
         given = super()._arranged(args, data)
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
@@ -698,7 +687,6 @@ class Chain(Frozen):
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        """A child without a word is joined by union."""
         given = super()._arranged(args, data)
         if isinstance(given.get("children"), list | tuple):
             nodes = (Object, Group, Boolean, Chain)

@@ -1,8 +1,7 @@
 """Text to syntax tree: `parse` reads a whole file, reports the mistakes and always returns a tree.
 
-Tokens come as indices into `Tokens`. A node's span runs from its first token to its last, braces and
-semicolon included. What recovery invented is an empty token; an expression that rests on one becomes a
-`BadExpr`, a statement without its name a `BadStmt`.
+Tokens come as indices into `Tokens`. What recovery invented is an empty token; an expression that rests on
+one becomes a `BadExpr`, a statement without its name a `BadStmt`.
 """
 
 from __future__ import annotations
@@ -290,7 +289,6 @@ def _items(rest: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _block(last: Any) -> tree.Block | None:
-    """The block that a statement ends with, None where that is a `;`."""
     return last if isinstance(last, tree.Block) else None
 
 
@@ -301,34 +299,16 @@ _OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range
 
 
 def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
-    """The tree of a whole text; never raises.
-
-    Args:
-        source: the text.
-        diagnostics: takes every syntax mistake, in the order of the text. Where there are any, the tree
-            holds `BadStmt` and `BadExpr` nodes.
-    """
+    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes."""
     report = Report(source)
     tokens = scan(source, report)
-    if _unbalanced(tokens):
+    steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
+    depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
+    if depths[-1] or min(depths) < 0:  # some brace has no counterpart
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.language.recovery import balance
 
         balance(tokens, report)
-    file = parse_tokens(tokens, report)
-    report.flush(diagnostics)
-    return file
-
-
-def _unbalanced(tokens: Tokens) -> bool:
-    """Test whether some brace has no counterpart."""
-    steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
-    depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
-    return depths[-1] != 0 or min(depths) < 0
-
-
-def parse_tokens(tokens: Tokens, report: Report) -> tree.File:
-    """The tree of tokens whose braces match; recovery edits them and reports to ``report``."""
     limit_nesting(tokens, report)
     recovery: Recovery | None = None
     unfinished: list[Any] = []
@@ -343,12 +323,11 @@ def parse_tokens(tokens: Tokens, report: Report) -> tree.File:
         return recovery.resume(states, values, at)
 
     file: tree.File | None = run(tokens.kinds, Builder(tokens, report).callbacks(), mend)
-    return _abandoned(tokens, unfinished) if file is None else file
-
-
-def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
-    """The tree of what came before the mistakes became too many."""
-    statements = values[0] if values and isinstance(values[0], list) else []
+    report.flush(diagnostics)
+    if file is not None:
+        return file
+    # The mistakes became too many: only what came before them is known.
+    statements = unfinished[0] if unfinished and isinstance(unfinished[0], list) else []
     end = tokens.ends[-1]
     start = statements[-1].span.end if statements else 0
     rest = tree.BadStmt(Span(tokens.source, start, end))
@@ -360,7 +339,6 @@ def _abandoned(tokens: Tokens, values: list[Any]) -> tree.File:
 
 @cache
 def _classes() -> tuple[int, ...]:
-    """Class of each kind, by its effect on the depth."""
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
@@ -371,8 +349,7 @@ def _classes() -> tuple[int, ...]:
 def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up.
 
-    Depth counts everything that makes the tree deeper: open brackets and braces, operators between them,
-    and the arms of an `else if` chain. The check runs over tokens, before there is a tree.
+    Open brackets and braces, operators between them and the arms of an `else if` chain make a tree deeper.
     """
     kinds = tokens.kinds
     classes = _classes()

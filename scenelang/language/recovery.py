@@ -3,9 +3,9 @@
 Where braces do not match, the layout tells the line of the slip: one that stands no further in than the head
 of an open block comes after its end. Trying the parser out on it tells which brace is missing or too many.
 
-With braces that match, what people bring from other languages is looked up first (`habits`). Then each way to
-insert, delete or replace a token near the mistake is tried out: it is worth how far the parser reads on, less
-what it costs. Where none helps, the statement is skipped up to its end.
+With braces that match, `habits` are looked up first. Then each way to insert, delete or replace a token near
+the mistake is tried: it is worth how far the parser reads on, less what it costs. Where none helps, the
+statement is skipped up to its end.
 """
 
 from __future__ import annotations
@@ -124,7 +124,6 @@ def _slips(tokens: Tokens) -> list[tuple[int, int]]:
 
 
 def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
-    """Report one brace of a line and mend it."""
     newline = tokens.source.text.find("\n", tokens.starts[first])
     last = len(tokens.kinds) - 1
     stop = last if newline < 0 else bisect_left(tokens.starts, newline, first + 1)
@@ -277,7 +276,6 @@ def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
 
 @cache
 def _replacements() -> dict[int, dict[tuple[int, ...], float]]:
-    """`_REPLACEMENTS` by kinds."""
     rows = _REPLACEMENTS.items()
     return {tables().kind(old): {_kinds(new): cost for new, cost in row.items()} for old, row in rows}
 
@@ -328,7 +326,6 @@ class Recovery:
         return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
 
     def _index(self, value: Any) -> int:
-        """Index of the first token of something on the value stack."""
         if isinstance(value, int):
             return value
         span: Span = value[1] if isinstance(value, tuple) else value.span
@@ -387,7 +384,6 @@ class Recovery:
         return settle()
 
     def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
-        """All repairs at one token."""
         tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
         kind, new_line = kinds[at], tokens.on_new_line(at)
         after = kinds[at + 1] if kind != END else END

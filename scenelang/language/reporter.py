@@ -29,14 +29,11 @@ _CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 
 
 class Damage(Record):
-    """Lines of a file that its syntax mistakes leave unknown, and their words, which may have been defined.
-
-    ``lost`` says that nobody knows what is defined where: braces did not match, or a name is missing.
-    """
+    """Lines of a file that its syntax mistakes leave unknown, and words that may have been defined there."""
 
     lines: frozenset[int] = frozenset()
     words: frozenset[str] = frozenset()
-    lost: bool = False
+    lost: bool = False  # nobody knows what is defined where: a brace or a name is missing
 
     def holds(self, span: Span) -> bool:
         """Test whether a place lies in text that was mended or skipped."""
@@ -95,7 +92,6 @@ class Reporter(Record, frozen=False):
         return self.damaged.get(source, _SOUND)
 
     def words(self, source: SourceFile) -> frozenset[str]:
-        """All words of a file."""
         if source not in self.words_in:
             self.words_in[source] = frozenset(_WORD.findall(source.text))
         return self.words_in[source]
@@ -120,14 +116,16 @@ class Reporter(Record, frozen=False):
     ) -> int | None:
         """Report a mistake with the calls that led to it, unless it may follow from one of syntax.
 
-        One that shows in the library that ships is reported where that is called. Returns the index of the
-        report, None where nothing was added; raises `Halt` where no more mistakes are kept.
+        One in the library is reported where that is called. Returns the index of the report, None where
+        nothing was added; raises `Halt` where no more mistakes are kept.
         """
         calls = self.calls
         site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
             labels, fix, span = (Label(span, "which is used here"),), None, site
-            help = help or _called(site)
+            alias, _, module = site.text.rpartition(".")
+            if not help and alias and module in SHAPES:
+                help = f"it is called {alias}.{SHAPES[module]}"
         elif calls is not None:
             labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
         if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):
@@ -165,9 +163,3 @@ class Reporter(Record, frozen=False):
         if len(again) < _SHOWN and span not in (known.span, *(label.span for label in again)):
             labels = (*known.labels, Label(span, "also here"))
             self.diagnostics.items[index] = replace(known, labels=labels)
-
-
-def _called(site: Span) -> str | None:
-    """Usage line of the library's module that a call names."""
-    alias, _, module = site.text.rpartition(".")
-    return f"it is called {alias}.{SHAPES[module]}" if module in SHAPES and alias else None

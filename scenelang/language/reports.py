@@ -1,17 +1,8 @@
 """Diagnostics as text for people, with marked source lines, and the exception that carries them.
 
-Nothing in a scene may move the cursor or colour a terminal: what does not print is shown as U+FFFD.
-
-Words stand beside the last mark of a line; those of others stand below it, each under its own mark. Of a
-mark over several lines the first is underlined to its end::
-
-    3 |     subtract star { … }
-      |     -------- this is subtracted from
-    4 |     intersect {
-      |     ^^^^^^^^^^^
-
-Columns are counted in code points; on the screen tabs are widened and wide characters take two cells, so
-marks stay under what they mark.
+Nothing in a scene may move the cursor or colour a terminal: what does not print is shown as U+FFFD. Words
+stand beside the last mark of a line, those of others below it, each under its own mark; of a mark over
+several lines the first is underlined. Tabs are widened and wide characters take two cells.
 """
 
 from __future__ import annotations
@@ -47,14 +38,13 @@ def printable(text: str) -> str:
 
 
 def paint(style: str, text: str, color: bool) -> str:
-    """Text in ANSI codes, or as it is."""
     return f"{STYLES[style]}{text}{STYLES['off']}" if color and style and text else text
 
 
 class _Row:
-    """One source line in the cells of a screen, cut to ``width`` around the columns ``first`` to ``last``.
+    """One source line in cells of a screen, cut to ``width`` around columns ``first`` to ``last``, from 0.
 
-    Columns count from 0. ``words`` more cells behind them are shown where there is room.
+    ``words`` more cells behind them are shown where there is room.
     """
 
     def __init__(self, text: str, first: int, last: int, width: int, words: int = 0) -> None:
@@ -202,7 +192,7 @@ def render_text(
     fixer: str = "scenelang check --fix",
     fixable: int | None = None,
 ) -> str:
-    """Snippets with marks, and a line that counts the diagnostics.
+    """Snippets with marks, and a line that counts the diagnostics; empty where there are none.
 
     Args:
         diagnostics: in any order.
@@ -212,9 +202,6 @@ def render_text(
         summary: whether to count.
         fixer: the command that applies fixes, for the summary.
         fixable: how many it would apply; by default all that there are.
-
-    Returns:
-        Text that ends in a newline; empty where there is nothing to say.
     """
     ordered = in_order(diagnostics)
     if not ordered:
@@ -278,7 +265,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
         stop = start
         for _ in range(first, last + 1):
             stop = source.text.find("\n", stop) + 1 or len(source.text) + 1
-        old = source.text[start:stop].removesuffix("\n")
+        old = source.text[start:stop]
         new, at = "", 0
         marks: list[tuple[int, int]] = []  # columns of what is inserted, without spaces at its ends
         for edit in own:
@@ -289,7 +276,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             at = edit.span.end - start
         new += old[at:]
         if all(edit.span.start == edit.span.end and "\n" not in edit.replacement for edit in own):
-            row = _Row(new, marks[0][0], marks[-1][1], width)
+            row = _Row(new.removesuffix("\n"), marks[0][0], marks[-1][1], width)
             places = [(max(row.cell(a), 0), min(row.cell(b), row.size), "+", "added") for a, b in marks]
             under = _underlines([place for place in places if place[0] < place[1]], color)
             rows += [
@@ -298,7 +285,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             ]
             continue
         for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
-            lines = text.split("\n") if text.strip() or sign == "-" else []
+            lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []
             for offset, line in enumerate(lines[:_MOST_LINES]):
                 near = 0 if offset else own[0].span.start - start
                 row = _Row(line.rstrip("\r"), near, near, width)

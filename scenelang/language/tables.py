@@ -1,8 +1,7 @@
 """The parse tables at run time: read from `tables.json`, no Lark import.
 
-The grammar is the source and the tables its product. A wheel brings them; in a checkout they are made by
-`scenelang.language.generate` when they are first needed and whenever the grammar has changed. Importing Lark
-and building them takes over 100 ms of a process that should answer within 250; reading them takes about 2.
+A wheel brings them; a checkout makes them by `scenelang.language.generate` whenever the grammar has changed:
+that takes over 100 ms of a process that should answer within 250, reading them about 2.
 """
 
 from __future__ import annotations
@@ -23,11 +22,7 @@ END = 0
 
 
 class Tables(Record):
-    """The LALR automaton and the terminals of the language.
-
-    Token kinds are small integers, indices into ``kinds``. An action ``s >= 0`` goes to state s after taking
-    the token, ``r < 0`` applies rule ``~r``.
-    """
+    """The LALR automaton; an action ``s >= 0`` takes the token to state s, ``r < 0`` applies rule ``~r``."""
 
     kinds: tuple[str, ...]  # a name for each kind: the text itself for a literal, else the terminal's name
     literals: dict[str, int]  # text of a keyword or of punctuation to its kind
@@ -44,7 +39,6 @@ class Tables(Record):
 
 
 def decode(data: dict[str, Any]) -> Tables:
-    """Tables from the plain data of `tables.json`."""
 
     def pairs(flat: list[int]) -> dict[int, int]:
         return dict(zip(flat[::2], flat[1::2], strict=True))
@@ -75,10 +69,7 @@ def source_mark(grammar: Path) -> int:
 
 
 def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
-    """The plain data of `tables.json` at ``place``, made anew where missing, damaged or of another grammar.
-
-    What was ``shipped`` in a wheel belongs together.
-    """
+    """The plain data at ``place``, made anew if missing, damaged or, where not ``shipped``, out of date."""
     with contextlib.suppress(OSError, ValueError):
         loaded = json.loads(place.read_text("utf-8"))
         if isinstance(loaded, dict) and (shipped or loaded.get("source") == source_mark(grammar)):
@@ -90,6 +81,5 @@ def current(grammar: Path, place: Path, *, shipped: bool) -> dict[str, Any]:
 
 @cache
 def tables() -> Tables:
-    """The tables of the grammar."""
     grammar = grammar_path()
     return decode(current(grammar, PLACE, shipped=grammar.is_relative_to(PACKAGE)))

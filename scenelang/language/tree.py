@@ -1,7 +1,7 @@
 """The syntax tree: frozen, with a span on every node. Names are as written, nothing is resolved.
 
-Spans cover the node's own text. Where recovery had to invent something, a `Bad…` node stands there and
-a diagnostic has been given; later stages skip such nodes silently.
+Where recovery had to invent something, a `Bad…` node stands there and a diagnostic has been given; later
+stages skip such nodes silently.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from scenelang.language.words import Combine
 
 
 class Spanned(Record):
-    """Base of all parts of the tree: a piece of the text."""
-
     span: Span
 
 
@@ -102,8 +100,6 @@ class Argument(Spanned):
 
 
 class CallExpr(Expr):
-    """A function call inside an expression."""
-
     name: Name
     args: tuple[Argument, ...]
 
@@ -149,14 +145,10 @@ class Parameter(Spanned):
 
 
 class Version(Stmt):
-    """``nsg 1;``"""
-
     number: Number
 
 
 class Model(Stmt):
-    """``model "name";``"""
-
     name: Expr
 
 
@@ -201,12 +193,10 @@ class If(Stmt):
 
 
 class Call(Stmt):
-    """Any statement headed by a name, with arguments, a block, both, or neither.
+    """Any statement headed by a name, with arguments, a block, both, or neither (None).
 
-    Geometries (``square { … }``), transforms (``scale(2);``), settings (``canvas(w, h);``,
-    ``background(c);``, ``animate(…);``), texture operations, module calls (``dot(1) { … }``) and uses of
-    material values (``mist;``, ``mist { … }``) look alike; the evaluator tells them apart by name.
-    ``args`` is None where there are no parentheses, ``body`` None where there is no block.
+    Geometries, transforms, settings, texture operations, calls of modules and uses of material values look
+    alike; the evaluator tells them apart by name.
     """
 
     name: Name
@@ -215,10 +205,7 @@ class Call(Stmt):
 
 
 class Node(Stmt):
-    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block.
-
-    ``smooth``, ``subtract`` and ``intersect`` may have arguments, here and as the word of a chain's child.
-    """
+    """``group``, ``union``, ``smooth``, ``subtract``, ``intersect`` or ``chain`` with its block."""
 
     kind: Literal["group", "union", "smooth", "subtract", "intersect", "chain"]
     body: Block
@@ -236,10 +223,7 @@ class Combined(Stmt):
 
 
 class MaterialUse(Stmt):
-    """``material NAME;`` or ``material NAME { … }`` as a statement.
-
-    ``shading`` is the first of two names, as in ``material volumetric zoo.bark;``.
-    """
+    """``material NAME;`` or with a block; ``shading`` is the first of two names (``volumetric zoo.bark``)."""
 
     name: Name
     body: Block | None
@@ -251,8 +235,6 @@ class BadStmt(Stmt):
 
 
 class File(Spanned):
-    """A whole file."""
-
     statements: tuple[Stmt, ...]
 
 

@@ -1,16 +1,14 @@
-"""Slips of the pen, made on purpose: what a mutation study does to sound scenes, and who judges the result.
+"""Slips of the pen, one token of a sound scene each, and a judge of what is reported about them.
 
-Each mutation changes one token of a scene. Lark's own parser, built from the grammar, says whether the text
-still is one of the language; where it is, evaluating it says whether it still means something. What is left
-of neither is a mistake, and its diagnostics are looked at.
+Lark's own parser, built from the grammar, says whether a text still is one of the language, evaluation
+whether it still means something.
 """
 
 from __future__ import annotations
 
 import random
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -32,7 +30,8 @@ KINDS: tuple[Kind, ...] = ("delete", "insert", "swap", "replace", "cut", "keywor
 """A token deleted, one put in, one exchanged with the next, one replaced, the rest of a line cut off, a
 keyword misspelt, a name misspelt."""
 
-Fault = Literal["syntax", "meaning"]
+Fault = Literal["syntax", "meaning", "none"]
+"""Whether a text is no longer one of the language, no longer means anything, or still is a scene."""
 
 PLAUSIBLE = (
     *("{", "}", "(", ")", "[", "]", ";", ",", "=", ".", "..", ":", "+", "-", "*", "/", "==", "<", "?"),
@@ -43,16 +42,17 @@ PLAUSIBLE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Mutation:
-    """One slip in one scene.
+class Scene:
+    """A sound text to make slips in; what it imports lies next to ``path``."""
 
-    Args:
-        kind: what was done.
-        scene: the scene's name.
-        text: what came out.
-        lines: the first and last line that the slip touches, in ``text``.
-        what: in words, for reports.
-    """
+    name: str
+    text: str
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Mutation:
+    """One slip in one scene: the text with it, the lines of it that the slip touches, and its words."""
 
     kind: Kind
     scene: str
@@ -63,14 +63,7 @@ class Mutation:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a mutation that is a mistake.
-
-    Args:
-        mutation: the slip.
-        fault: whether the text is no longer one of the language, or no longer means anything.
-        diagnostics: all that is reported about the scene.
-        tree: whether there was a tree of the whole text.
-    """
+    """All that is reported about a slip, and whether there was a tree of the whole text."""
 
     mutation: Mutation
     fault: Fault
@@ -82,11 +75,6 @@ class Outcome:
         return len(self.diagnostics)
 
     @property
-    def near(self) -> bool:
-        """Whether the first diagnostic is at most one line from the slip."""
-        return bool(self.diagnostics) and self.distance <= 1
-
-    @property
     def distance(self) -> int:
         """Lines between the slip and the nearest diagnostic."""
         first, last = self.mutation.lines
@@ -94,24 +82,13 @@ class Outcome:
         return min((max(first - line, line - last, 0) for line in lines), default=1_000_000)
 
     @property
+    def near(self) -> bool:
+        return self.distance <= 1
+
+    @property
     def good(self) -> bool:
         """One mistake, one diagnostic, where it is."""
         return self.count == 1 and self.near
-
-
-@dataclass(frozen=True, slots=True)
-class Scene:
-    """A sound text to make slips in.
-
-    Args:
-        name: short name.
-        text: the text.
-        path: its file; what it imports lies beside it.
-    """
-
-    name: str
-    text: str
-    path: Path
 
 
 @cache
@@ -140,22 +117,15 @@ def _words(scene: Scene) -> list[tuple[str, int, int, int]]:
 def _misspelt(word: str, generator: random.Random) -> str:
     """A word with one letter left out, doubled, exchanged with the next, or hit beside."""
     at = generator.randrange(len(word))
-    kinds = ["double", "beside"]
+    head, letter, tail = word[:at], word[at], word[at + 1 :]
+    row = next((row for row in ("qwertyuiop", "asdfghjkl", "zxcvbnm") if letter.lower() in row), "xyz")
+    place = row.find(letter.lower())
+    slips = [word[: at + 1] + letter + tail, head + row[place - 1 if place > 0 else 1] + tail]
     if len(word) > 1:
-        kinds.append("drop")
-    if at + 1 < len(word) and word[at] != word[at + 1]:
-        kinds.append("exchange")
-    kind = generator.choice(kinds)
-    if kind == "drop":
-        return word[:at] + word[at + 1 :]
-    if kind == "double":
-        return word[:at] + word[at] + word[at:]
-    if kind == "exchange":
-        return word[:at] + word[at + 1] + word[at] + word[at + 2 :]
-    rows = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
-    row = next((row for row in rows if word[at].lower() in row), "xyz")
-    place = row.find(word[at].lower())
-    return word[:at] + row[place - 1 if place > 0 else 1] + word[at + 1 :]
+        slips.append(head + tail)
+    if tail and letter != tail[0]:
+        slips.append(head + tail[0] + letter + tail[1:])
+    return generator.choice(slips)
 
 
 def _glue(before: str, token: str, after: str) -> str:
@@ -222,18 +192,6 @@ def sample(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> Iterator[tup
                 yield scene, mutation
 
 
-def exhaust(seed: int, tries: int = 2, kinds: Sequence[Kind] = KINDS) -> Iterator[tuple[Scene, Mutation]]:
-    """Slips of each kind at every token of every scene; ``tries`` of those that are drawn."""
-    generator = random.Random(seed)
-    for scene in scenes():
-        for index in range(len(_words(scene))):
-            for kind in kinds:
-                for _ in range(1 if kind in ("delete", "swap", "cut") else tries):
-                    mutation = mutate(scene, kind, index, generator)
-                    if mutation is not None:
-                        yield scene, mutation
-
-
 # ---------------------------------------------------------------- judging
 
 
@@ -259,73 +217,31 @@ def check(scene: Scene, text: str) -> tuple[list[Diagnostic], nodes.File, bool]:
     return list(diagnostics), tree, result is not None
 
 
-class Disagreement(AssertionError):
-    """The judge and the language do not agree on whether a text is sound."""
-
-
-def judge(scene: Scene, mutation: Mutation) -> Outcome | None:
-    """What becomes of a slip; None where the text is still a scene.
-
-    Raises:
-        Disagreement: the parser takes what the grammar refuses, or the other way about.
-    """
+def judge(scene: Scene, mutation: Mutation) -> Outcome:
+    """What becomes of a slip; raises where the parser and Lark do not agree on the text."""
     diagnostics, tree, meant = check(scene, mutation.text)
     sound = is_language(mutation.text)
     # `a.f()` is what the grammar reads and the tree has no place for.
     syntax = [d for d in diagnostics if d.code[1:3] == "01" and d.code != "E0128"]
-    if sound == bool(syntax):
-        raise Disagreement(f"Lark says {sound}, the parser {syntax}: {mutation.what} in\n{mutation.text}")
-    if sound and meant:
-        return None
-    whole = tree.span.end == len(mutation.text)
-    return Outcome(mutation, "meaning" if sound else "syntax", tuple(diagnostics), whole)
+    assert sound != bool(syntax), f"Lark says {sound}, the parser {syntax}: {mutation}"
+    fault: Fault = "syntax" if not sound else "none" if meant else "meaning"
+    return Outcome(mutation, fault, tuple(diagnostics), tree.span.end == len(mutation.text))
 
 
-# ---------------------------------------------------------------- counting
+def study(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Outcome]:
+    """Judge as many slips of each kind."""
+    return [judge(scene, mutation) for scene, mutation in sample(count, seed, kinds)]
 
 
-@dataclass(slots=True)
-class Tally:
-    """Counts of one kind of mistake."""
-
-    outcomes: list[Outcome] = field(default_factory=list)
-    still_sound: int = 0
-
-    def share(self, right: str) -> float:
-        """The share of mistakes that are ``right``: an attribute of `Outcome`."""
-        return sum(bool(getattr(o, right)) for o in self.outcomes) / max(1, len(self.outcomes))
-
-    def counts(self) -> Counter[int]:
-        """How many mistakes gave so many diagnostics."""
-        return Counter(o.count for o in self.outcomes)
-
-
-Table = dict[tuple[Kind, Fault], Tally]
-
-
-def study(slips: Iterator[tuple[Scene, Mutation]]) -> Table:
-    """Judge many slips."""
-    table: Table = {}
-    for scene, mutation in slips:
-        outcome = judge(scene, mutation)
-        if outcome is None:
-            table.setdefault((mutation.kind, "meaning"), Tally()).still_sound += 1
-        else:
-            table.setdefault((mutation.kind, outcome.fault), Tally()).outcomes.append(outcome)
-    return table
-
-
-def parsed_only(tally: Tally) -> Tally:
-    """The same mistakes as the parser alone reports them."""
-    outcomes = [
+def parsed_only(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Mistakes of syntax as the parser alone reports them."""
+    return [
         replace(o, diagnostics=tuple(d for d in o.diagnostics if d.code[1:3] == "01"))
-        for o in tally.outcomes
+        for o in outcomes
         if o.fault == "syntax"
     ]
-    return Tally(outcomes)
 
 
-def together(table: Table, fault: Fault | None = None) -> Tally:
-    """All kinds of mistakes as one."""
-    tallies = [tally for (_, its), tally in table.items() if fault in (None, its)]
-    return Tally([o for tally in tallies for o in tally.outcomes], sum(t.still_sound for t in tallies))
+def share(outcomes: Sequence[Outcome], right: str) -> float:
+    """The share of outcomes that are ``right``, an attribute of `Outcome`."""
+    return sum(bool(getattr(o, right)) for o in outcomes) / max(1, len(outcomes))

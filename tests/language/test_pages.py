@@ -2,68 +2,42 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import scenelang
 from lab.docs.make_errors import index
+from scenelang.cli.main import cli
 from scenelang.compiler import lower
-from scenelang.compiler.check import check_compiles, check_frames
 from scenelang.language import lexer, limits, modifiers, parser, session, values
 from scenelang.language import scene as schema
 from scenelang.language import values as functions
-from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
-from scenelang.language.evaluation import Source
 from scenelang.language.pages import AREAS, CODES, Example, Page, read_page
-from scenelang.language.parser import parse
 from scenelang.language.reports import SceneError, render_text
-from scenelang.language.resolve import find_unused
-from scenelang.language.scene import Scene
-from scenelang.language.session import Defines
 from scenelang.language.tables import tables
 
 PAGES = Path(scenelang.__file__).parent / "language/pages"
 INDEX = (Path(__file__).parents[2] / "docs/errors.md").read_text("utf-8")
 
 
-def check(example: Example, page: Page, folder: Path) -> list[Diagnostic]:
-    """What there is to say about an example."""
-    found = Diagnostics()
+def check(example: Example, page: Page) -> list[str]:
+    """Codes of what there is to say about an example."""
     if example.language == "python":
         try:
             exec(compile(example.text, page.code, "exec"), {})
         except SceneError as error:
-            return list(error.diagnostics)
+            return [d.code for d in error.diagnostics]
         return []
-    spans = None
-    if example.language == "json":
-        try:
-            scene: Scene | None = Scene.from_json(example.text)
-        except SceneError as error:
-            return list(error.diagnostics)
-    else:
-        for name, text in (("scene.nsg", example.text), *page.files):
-            (folder / name).parent.mkdir(exist_ok=True)
-            (folder / name).write_text(text, "utf-8")
-        told = {"-D": [], "--frame": []}
-        for name, value in zip(example.options[::2], example.options[1::2], strict=True):
-            told[name].append(value)
-        defines = Defines(dict(item.split("=", 1) for item in told["-D"]))
-        source = SourceFile("scene.nsg", example.text)
-        path = folder / "scene.nsg"
-        tree = parse(source, found)
-        evaluation = Source(path, tree=tree, params=defines).evaluation(found, replays=True)
-        scene, spans = evaluation.run(int(told["--frame"][-1]) if told["--frame"] else 0)
-        defines.report_unused(found)
-        if not found.errors:
-            find_unused(tree, found)
-    if scene is not None:
-        check_compiles(scene, spans, found)
-    if example.language == "nsg" and not told["--frame"]:
-        check_frames(evaluation, found, first=scene)
-    return list(found)
+    scene = f"scene.{example.language}"
+    for name, text in ((scene, example.text), *page.files):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(text, "utf-8")
+    result = CliRunner().invoke(cli, ["check", scene, *example.options, "--format", "json"])
+    return [d["code"] for d in json.loads(result.stdout)["diagnostics"]]
 
 
 EXAMPLES = [
@@ -75,11 +49,10 @@ EXAMPLES = [
 
 @pytest.mark.parametrize(("example", "page"), EXAMPLES)
 def test_example(example: Example, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     for name, value in example.limits:
         monkeypatch.setattr(name, value)
-    found = check(example, page, tmp_path)
-    wanted = [page.code] if example.kind == "bad" else []
-    assert [d.code for d in found] == wanted, [(d.message, d.span) for d in found]
+    assert check(example, page) == ([page.code] if example.kind == "bad" else [])
 
 
 def test_codes_are_those_of_the_pages() -> None:
@@ -103,18 +76,12 @@ def test_shape_of_a_page(page: Page) -> None:
     assert page.area in AREAS.values()
 
 
-@pytest.mark.parametrize(("model", "label"), [("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')])
-def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part(model: str, label: str) -> None:
-    found = Diagnostics()
-    source = SourceFile("scene.nsg", model + "square { scale(0.5); }\nsphere { scale(0.3); }\n")
-    scene, spans = Source(text=source).scene(found)
-    assert scene is not None
-    check_compiles(scene, spans, found)
-    (only,) = found
-    assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
-    assert only.span is not None
-    assert (only.span.text, only.labels[0].span.text) == ("sphere", label)
-    assert only.labels[0].message == "flat by this"
+def test_a_scene_that_is_flat_and_solid_is_shown_where_these_part() -> None:
+    for model, label in (("", "square"), ('model "shapes2d";\n', 'model "shapes2d";')):
+        (only,) = scenelang.check_text(f"{model}square {{ scale(0.5); }}\nsphere {{ scale(0.3); }}\n")
+        assert only.message == "geometry `sphere` belongs to solid scenes, and this one is flat"
+        assert [only.span and only.span.text, only.labels[0].span.text] == ["sphere", label]
+        assert only.labels[0].message == "flat by this"
 
 
 def test_pages_state_the_lists_and_limits_of_the_code() -> None:
@@ -149,6 +116,5 @@ def test_the_index_is_made_from_the_pages() -> None:
 def test_the_sample_is_what_is_printed() -> None:
     sample = re.search(r"```text\n(.*?)```", INDEX, re.DOTALL)
     assert sample is not None
-    found = Diagnostics()
-    Source(text=SourceFile("scene.nsg", "square { rotate(45); }\n")).scene(found)
+    found = scenelang.check_text("square { rotate(45); }\n", name="scene.nsg")
     assert render_text(found, summary=False) == sample[1]

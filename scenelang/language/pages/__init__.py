@@ -45,8 +45,6 @@ _FENCE: Final = re.compile(
 
 
 class Example(Record):
-    """A scene of a page."""
-
     kind: Literal["bad", "good"]  # ``bad`` gives the page's code and nothing else, ``good`` nothing
     language: str  # ``nsg``, ``json`` or ``python``
     text: str
@@ -55,8 +53,6 @@ class Example(Record):
 
 
 class Page(Record):
-    """Documentation of a code."""
-
     code: str  # such as ``E0302``
     text: str  # the Markdown, with its first line
     examples: tuple[Example, ...]  # in the order of the page
@@ -85,10 +81,7 @@ class Page(Record):
         return self.text.partition("\n")[2].partition("\n## ")[0].strip()
 
     def plain(self, width: int = 96, paint: Callable[[str, str], str] = lambda text, style: text) -> str:
-        """The page without its Markdown: headings alone, code indented, paragraphs wrapped.
-
-        A text in one of the styles of `diagnostics.cells` is coloured by ``paint``.
-        """
+        """The page without its Markdown, coloured by ``paint`` in styles of `reports`."""
         blocks = [paint(f"{self.severity}[{self.code}]", self.severity) + paint(f": {self.title}", "bold")]
         text = re.sub(r"^<!--.*-->\n", "", self.text.partition("\n")[2], flags=re.MULTILINE)
         for part in re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL):
