@@ -75,8 +75,8 @@ def test_what_is_chosen_is_what_is_drawn(shipped: Folder) -> None:
     name = shipped.write("a.nsg", "animate(1, 4); star { scale(0.2 + u); material flat { color(#d33); } }\n")
     pictures = []
     for limit, way in (
-        ("--max-ms 12", "--samples one"),
-        ("--max-ms 20", "--samples adaptive"),
+        ("--max-ms 12", "--samples one --device cpu"),
+        ("--max-ms 20", "--samples adaptive --device cpu"),
         ("--max-flip 0", "--backend reference"),
     ):
         for options in (limit, way):

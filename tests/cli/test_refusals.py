@@ -92,6 +92,10 @@ dump a.nsg --costs --diff                          | 2 | leave out --after, --di
 dump wrong.nsg -o b.dot                            | 1 | E0201
 dump wrong.nsg --costs                             | 1 | E0201
 convert a.nsg -o a.py                              | 2 | --to nsg or json
+export a.nsg -o a.png                              | 2 | a page's file ends in .html
+export a.nsg -o a                                  | 2 | a page has a suffix such as .html
+export a.nsg -o no/a.html                          | 2 | no folder
+export a.nsg a.nsg -o out --title T                | 2 | --title is of one page
 models shapes                                      | 2 | No model `shapes`
 explain E9999                                      | 2 | No code `E9999`
 chekc                                              | 2 | Did you mean `check`?
