@@ -65,11 +65,7 @@ class Film(Record):
 
 
 class Sectioned(click.Command):
-    """A command whose help shows its options under headings.
-
-    Args:
-        sections: options by headings; the others come first.
-    """
+    """A command whose help shows its options under the headings of ``sections``; the others come first."""
 
     def __init__(self, *arguments: Any, sections: Mapping[str, str], **given: Any) -> None:
         super().__init__(*arguments, **given)
@@ -86,12 +82,14 @@ class Sectioned(click.Command):
                 formatter.write_dl(records)
 
 
-# ---------------------------------------------------------------- kinds of options
-
-
 def text(name: str, metavar: str, help: str, **more: Any) -> Option:
     """An option that takes a text, or what its callback makes of that."""
     return click.option(name, metavar=metavar, help=help, **more)
+
+
+def writes(metavar: str, help: str) -> Option:
+    """The option that says where a command writes to."""
+    return click.option("-o", "--out", required=True, metavar=metavar, help=help)
 
 
 def choice(*names: str, words: str, help: str) -> Option:
@@ -100,17 +98,9 @@ def choice(*names: str, words: str, help: str) -> Option:
     return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
 
 
-def count(
-    *names: str,
-    low: int = 1,
-    high: int | None = None,
-    default: int | None = None,
-    metavar: str = "N",
-    help: str,
-) -> Option:
+def count(*names: str, low: int = 1, high: int | None = None, metavar: str = "N", **more: Any) -> Option:
     """An option that takes a whole number in a range."""
-    kind = click.IntRange(low, high)
-    return click.option(*names, type=kind, default=default, show_default=True, metavar=metavar, help=help)
+    return click.option(*names, type=click.IntRange(low, high), show_default=True, metavar=metavar, **more)
 
 
 class Real(click.FloatRange):
@@ -180,8 +170,6 @@ def _originals(ctx: click.Context, param: click.Parameter, value: str | None) ->
     if value is not None:  # as every process that draws frames sees it
         os.environ["SCENELANG_ORIGINALS"] = value
 
-
-# ---------------------------------------------------------------- shared options
 
 define = click.option(
     "-D",
