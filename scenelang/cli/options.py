@@ -180,11 +180,8 @@ define = click.option(
     help="Set a param of the scene; may be given several times.",
 )
 model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
-root = click.option(
-    "--root",
-    type=click.Path(exists=True, file_okay=False),
-    help="Folder that imports cannot leave; by default the scene's.",
-)
+_FOLDER = click.Path(exists=True, file_okay=False)
+root = click.option("--root", type=_FOLDER, help="Folder that imports cannot leave; by default the scene's.")
 size = click.option(
     "--size", metavar="WxH", callback=_size, help="Canvas size in pixels instead of the scene's."
 )
@@ -198,7 +195,7 @@ color = choice(
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
 originals = click.option(
     "--originals",
-    type=click.Path(exists=True, file_okay=False),
+    type=_FOLDER,
     metavar="FOLDER",
     expose_value=False,
     callback=_originals,
@@ -263,11 +260,11 @@ film = partial(
     "film",  # a `Film`
     Film,
     {
-        "frames": click.option(
+        "frames": text(
             "--frames",
-            metavar="A..B",
+            "A..B",
+            "Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
             callback=_frames,
-            help="Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
         ),
         "fps": positive(
             "--fps", "N", "Frames a second instead of the scene's; the length in seconds stays.", high=1000

@@ -49,12 +49,10 @@ _SECTIONS: Final = {
 @options.positive(
     "--max-ms", "N", "Choose the most exact way to draw that takes at most N milliseconds on one thread."
 )
-@click.option(
-    "--max-flip",
+@options.text(
+    "--max-flip", "E", "Choose the fastest way to draw whose promised FLIP error is at most E.",
     type=options.Real(0, 1),
-    metavar="E",
-    help="Choose the fastest way to draw whose promised FLIP error is at most E.",
-)
+)  # fmt: skip
 @options.originals
 @options.strict
 @options.verbose
