@@ -59,14 +59,8 @@ def stem_of(name: str) -> str:
 def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
     """The file that each scene is written to: ``out`` itself for one scene, else one in the folder ``out``.
 
-    The folder is created if need be; for one scene ``out`` is a folder that exists or ends in a slash.
-
-    Args:
-        suffix: of files in a folder: of a picture or of a page.
-
-    Raises:
-        click.UsageError: no format has the suffix, two scenes have one name, or a file or link is in the way.
-        OSError: the folder cannot be created.
+    The folder is created if need be, its files have the suffix; for one scene it exists or ends in a slash.
+    Raises `click.UsageError`: no format has the suffix, two scenes have one name, or something is in the way.
     """
     path = Path(out)
     what = "a page" if suffix == PAGE else "a picture"

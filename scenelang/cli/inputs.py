@@ -150,16 +150,10 @@ def prepare_all(
     stored: str | None = None,
     first: Input | None = None,
 ) -> tuple[list[Input | None], int]:
-    """Every input read and compiled, None where it cannot be read; reports mistakes.
+    """Every input read and compiled, None where it cannot be read, after a report of mistakes.
 
-    Args:
-        strict: warnings count as errors.
-        graphs: keep the graph after each pass.
-        stored: why compiled programs are refused, if they are.
-        first: the only one, where it was read before.
-
-    Returns:
-        The inputs, and the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read.
+    And the exit code so far: 1 where a scene has mistakes, 2 where a file cannot be read. ``stored`` is why
+    compiled programs are refused, if they are; ``first`` the only input, where it was read before.
     """
     inputs: list[Input | None] = []
     code = 0
@@ -190,9 +184,7 @@ def prepare_all(
 def prepare_scene(name: str, request: Request, clock: Clock | None = None) -> Input:
     """Compile the one scene of a command, keep its graphs and report its mistakes.
 
-    Raises:
-        OSError: it cannot be read, or a model has no weights.
-        click.UsageError: it is a compiled program.
+    Raises `OSError` where it cannot be read or a model has no weights, `click.UsageError` for a program.
     """
     if name.endswith(PROGRAM):
         raise click.UsageError(f"`{name}` is a compiled program already.")
@@ -234,17 +226,11 @@ def program_notes(program: Program, why: str) -> list[str]:
     """Lines about a compiled scene."""
     from scenelang.compiler.groups import OPERATOR
 
-    shapes = Counter(program.objects)
-    words = Counter((program.tokens & OPERATOR).tolist())
+    shapes = ", ".join(f"{number} {name}" for name, number in Counter(program.objects).items())
+    tokens = sorted(Counter((program.tokens & OPERATOR).tolist()).items())
     width, height = program.canvas
     return [
         f"{width} x {height} pixels, model {program.model} ({why}), weights {program.weights[:12]}",
-        f"objects: {len(program)}" + _counts(shapes),
-        "tokens: " + (_counts({COMBINE[t]: n for t, n in sorted(words.items())})[2:-1] or "none"),
+        f"objects: {len(program)}" + (f" ({shapes})" if shapes else ""),
+        "tokens: " + (", ".join(f"{number} {COMBINE[token]}" for token, number in tokens) or "none"),
     ]
-
-
-def _counts(counts: dict[str, int]) -> str:
-    """`` (2 star, 1 square)``, or nothing."""
-    listed = ", ".join(f"{number} {name}" for name, number in counts.items())
-    return f" ({listed})" if listed else ""

@@ -65,11 +65,7 @@ class Film(Record):
 
 
 class Sectioned(click.Command):
-    """A command whose help shows its options under headings.
-
-    Args:
-        sections: options by headings; the others come first.
-    """
+    """A command whose help shows its options under the headings of ``sections``; the others come first."""
 
     def __init__(self, *arguments: Any, sections: Mapping[str, str], **given: Any) -> None:
         super().__init__(*arguments, **given)
@@ -86,12 +82,14 @@ class Sectioned(click.Command):
                 formatter.write_dl(records)
 
 
-# ---------------------------------------------------------------- kinds of options
-
-
 def text(name: str, metavar: str, help: str, **more: Any) -> Option:
     """An option that takes a text, or what its callback makes of that."""
     return click.option(name, metavar=metavar, help=help, **more)
+
+
+def writes(metavar: str, help: str) -> Option:
+    """The option that says where a command writes to."""
+    return click.option("-o", "--out", required=True, metavar=metavar, help=help)
 
 
 def choice(*names: str, words: str, help: str) -> Option:
@@ -100,17 +98,9 @@ def choice(*names: str, words: str, help: str) -> Option:
     return click.option(*names, type=click.Choice(known), default=known[0], show_default=True, help=help)
 
 
-def count(
-    *names: str,
-    low: int = 1,
-    high: int | None = None,
-    default: int | None = None,
-    metavar: str = "N",
-    help: str,
-) -> Option:
+def count(*names: str, low: int = 1, high: int | None = None, metavar: str = "N", **more: Any) -> Option:
     """An option that takes a whole number in a range."""
-    kind = click.IntRange(low, high)
-    return click.option(*names, type=kind, default=default, show_default=True, metavar=metavar, help=help)
+    return click.option(*names, type=click.IntRange(low, high), show_default=True, metavar=metavar, **more)
 
 
 class Real(click.FloatRange):
@@ -181,8 +171,6 @@ def _originals(ctx: click.Context, param: click.Parameter, value: str | None) ->
         os.environ["SCENELANG_ORIGINALS"] = value
 
 
-# ---------------------------------------------------------------- shared options
-
 define = click.option(
     "-D",
     "defines",
@@ -192,11 +180,8 @@ define = click.option(
     help="Set a param of the scene; may be given several times.",
 )
 model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
-root = click.option(
-    "--root",
-    type=click.Path(exists=True, file_okay=False),
-    help="Folder that imports cannot leave; by default the scene's.",
-)
+_FOLDER = click.Path(exists=True, file_okay=False)
+root = click.option("--root", type=_FOLDER, help="Folder that imports cannot leave; by default the scene's.")
 size = click.option(
     "--size", metavar="WxH", callback=_size, help="Canvas size in pixels instead of the scene's."
 )
@@ -210,7 +195,7 @@ color = choice(
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
 originals = click.option(
     "--originals",
-    type=click.Path(exists=True, file_okay=False),
+    type=_FOLDER,
     metavar="FOLDER",
     expose_value=False,
     callback=_originals,
@@ -275,11 +260,11 @@ film = partial(
     "film",  # a `Film`
     Film,
     {
-        "frames": click.option(
+        "frames": text(
             "--frames",
-            metavar="A..B",
+            "A..B",
+            "Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
             callback=_frames,
-            help="Frames of an animation to draw: 0..23, 0..<24, 12.. to the end, or 7.",
         ),
         "fps": positive(
             "--fps", "N", "Frames a second instead of the scene's; the length in seconds stays.", high=1000

@@ -13,11 +13,7 @@ GOOD = "square { scale(0.5); material flat { color(#d33); } }\nstar { scale(0.3)
 
 
 class Folder:
-    """A folder of scenes, and commands run in it.
-
-    Args:
-        path: the folder, which is the working directory too.
-    """
+    """A folder of scenes, the working directory, and commands run in it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -29,11 +25,16 @@ class Folder:
         target.write_text(text, "utf-8")
         return name
 
-    def run(self, *arguments: str, stdin: str | None = None) -> Result:
-        """Run a command; whatever is not an exit is raised."""
+    def read(self, name: str) -> str:
+        """A file's text with its line ends."""
+        return (self.path / name).read_bytes().decode("utf-8")
+
+    def run(self, *arguments: str, stdin: str | None = None, code: int | None = None) -> Result:
+        """Run a command; whatever is not an exit is raised, as is another exit code than a wanted one."""
         result = CliRunner().invoke(cli, arguments, input=stdin, prog_name="scenelang")
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
+        assert code in (None, result.exit_code), f"{arguments}: {result.exit_code}, {result.output}"
         return result
 
 

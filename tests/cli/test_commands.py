@@ -1,11 +1,10 @@
-"""The other commands, and whole processes."""
+"""Help, `explain`, `export`, `models`, and whole processes."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +16,9 @@ import pytest
 from scenelang.cli.main import COMMANDS, cli
 from scenelang.cli.options import Real, Sectioned
 from scenelang.compiler.manifest import available
-from tests.cli.conftest import Folder
+from scenelang.language.pages import CODES, read_page
+from scenelang.language.reports import paint
+from tests.cli.conftest import GOOD, Folder
 
 
 def test_help_lists_every_command(folder: Folder) -> None:
@@ -25,30 +26,10 @@ def test_help_lists_every_command(folder: Folder) -> None:
     assert "Draw 2D and 3D scenes" in said
     for name, words in COMMANDS.items():
         assert said.count(f"\n  {name.ljust(max(map(len, COMMANDS)))}  {words}\n") == 1
-        assert folder.run(name, "--help").exit_code == 0
+        folder.run(name, "--help", code=0)
     titles = [line for line in said.splitlines() if line.endswith(":") and not line.startswith(" ")]
     assert titles == ["Options:", "Draw:", "Write:", "Measure:", "Develop:"]
-
-
-def options_of(command: click.Command, path: str = "") -> Iterator[tuple[str, click.Option]]:
-    """All options of all commands, with the commands' names."""
-    yield from ((f"{path} {p.opts[0]}", p) for p in command.params if isinstance(p, click.Option))
-    if isinstance(command, click.Group):
-        context = click.Context(command)
-        for name in command.list_commands(context):
-            found = command.get_command(context, name)
-            assert found is not None
-            yield from options_of(found, f"{path} {name}")
-
-
-def test_the_words_on_an_option_stand_alone() -> None:
-    found = dict(options_of(cli))
-    assert len(found) > 150
-    opening = ("Of", "What", "How", "Where", "Which", "Those", "Whether", "Gets", "Behind", "By")
-    for name, option in found.items():
-        assert option.help is not None, name
-        assert re.match(r"[A-Z]\S", option.help), name
-        assert option.help.split()[0] not in opening, name
+    assert folder.run("--version").stdout.startswith("scenelang ")
 
 
 def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> None:
@@ -63,24 +44,35 @@ def test_options_of_render_stand_under_headings_once_each(folder: Folder) -> Non
         assert len(re.findall(rf"^  (?:-\w, )?{name}\b", said, re.MULTILINE)) == 1
 
 
-def test_no_option_takes_what_is_not_a_number() -> None:
-    """Whose bounds `nan` would pass, as it is neither below nor above them."""
-    found = 0
-    context = click.Context(cli)
-    for name, option in options_of(cli):
+def options_of(command: click.Command, path: str = "") -> Iterator[tuple[str, click.Option]]:
+    """All options of all commands, with the commands' names."""
+    yield from ((f"{path} {p.opts[0]}", p) for p in command.params if isinstance(p, click.Option))
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from options_of(found, f"{path} {name}")
+
+
+def test_options_say_what_they_are_and_take_numbers_alone() -> None:
+    """The words on one stand alone; no bound lets `nan` pass, which is neither below nor above it."""
+    found, numbers = dict(options_of(cli)), 0
+    assert len(found) > 150
+    opening = ("Of", "What", "How", "Where", "Which", "Those", "Whether", "Gets", "Behind", "By")
+    for name, option in found.items():
+        assert option.help is not None, name
+        assert re.match(r"[A-Z]\S", option.help), name
+        assert option.help.split()[0] not in opening, name
         if isinstance(option.type, click.types.FloatParamType):
-            found += 1
+            numbers += 1
             assert isinstance(option.type, Real), name
             with pytest.raises(click.BadParameter, match="not a number"):
-                option.type.convert("nan", option, context)
-    assert found > 5
+                option.type.convert("nan", option, click.Context(cli))
+    assert numbers > 5
 
 
-def test_version(folder: Folder) -> None:
-    assert folder.run("--version").stdout.startswith("scenelang ")
-
-
-def test_models(folder: Folder) -> None:
+def test_models(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     assert folder.run("models").stdout.startswith("shapes2d  2D  ")
     said = folder.run("models", "shapes2d").stdout
     for words in ("square, triangle, star, pentagon", "digest", "seed", "revision", "parameters"):
@@ -92,51 +84,118 @@ def test_models(folder: Folder) -> None:
     assert facts["weights"]["training"]["config"]["model"] == "shapes2d"
     assert facts["weights"]["parameters"] > 1000
     assert not re.search(r"(?<![.\d])\d+\.(\d{6}|0\b)", said)
-
-
-def test_models_without_weights(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenelang.compiler.weights.weights_path", lambda name: folder.path / "none")
     assert "missing or damaged" in folder.run("models", "shapes2d").stdout
 
 
-def process(*arguments: str, **options: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "scenelang", *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)  # type: ignore[call-overload, no-any-return]
+# ---------------------------------------------------------------- explain
+
+
+def test_explain(folder: Folder) -> None:
+    """A page by its code as it was printed, lists, words, and what is near."""
+    page = folder.run("explain", "E0302", code=0).stdout
+    assert page.startswith("error[E0302]: bare number where an angle is wanted\n\n")
+    assert "\n    square { rotate(45); }\n" in page
+    assert not re.search("```|#|\x1b", page)
+    assert "\n    parts.nsg:\n    import" in folder.run("explain", "E0216").stdout
+    assert "\x1b[1;31m" in folder.run("explain", "E0302", "--color", "always").stdout
+    for given in ("e0302", " E0302", "error[E0302]", "[E0302]:"):
+        assert folder.run("explain", given).stdout == page
+    for arguments in ((), ("--list",), ("E0302", "--list")):
+        shown = folder.run("explain", *arguments).stdout
+        assert re.findall(r"^  ([EW]\d{4})  ", shown, re.MULTILINE) == list(CODES)
+        assert shown.startswith("syntax\n  E0101")
+    shown = folder.run("explain", "semicolon").stdout
+    assert re.findall(r"[EW]\d{4}", shown) == ["E0102", "E0130", "W0101"]
+    for word in ("colour", "Color"):
+        found = re.findall(r"[EW]\d{4}", folder.run("explain", word).stdout)
+        assert {"E0118", "E0301", "E0330", "W0301"} <= set(found)
+    for wrong, advice in (("E9302", "Did you mean"), ("rumba", "--list"), ("", "--list")):
+        assert advice in folder.run("explain", wrong, code=2).stderr
+
+
+def test_explain_as_json(folder: Folder) -> None:
+    data = json.loads(folder.run("explain", "E0309", "--format", "json").stdout)
+    assert (data["version"], data["code"], data["severity"]) == (1, "E0309", "error")
+    assert data["title"] == "param outside its range"
+    assert data["text"].startswith("# E0309: ")
+    assert [example["kind"] for example in data["examples"]] == ["bad", "good"]
+    assert data["examples"][0]["options"] == ["-D", "size=7"]
+    listed = json.loads(folder.run("explain", "--format", "json").stdout)
+    assert [item["code"] for item in listed["codes"]] == list(CODES)
+
+
+def test_every_page_reads_well_in_a_terminal() -> None:
+    for page in map(read_page, CODES):
+        text = page.plain(60)
+        assert not re.search(r"```|^#|<!--|\]\(|[ \t]$", text, re.MULTILINE), page.code
+        prose = [line for line in text.splitlines()[1:] if not line.startswith("    ")]
+        assert all(len(line) <= 60 for line in prose if " " in line), page.code
+        assert all(example.text.splitlines()[0] in text for example in page.examples), page.code
+        colored = page.plain(60, lambda text, style: paint(style, text, True))
+        assert re.sub(r"\x1b\[[\d;]*m", "", colored) == text
+
+
+# ---------------------------------------------------------------- export
+
+
+def test_pages_of_scenes_programs_and_json(folder: Folder) -> None:
+    scene = folder.write("a.nsg", "param k = 1 in 0..2;" + GOOD)
+    assert folder.run("export", scene, "-o", "a.html", "-D", "k=2", code=0).output == ""
+    text = folder.read("a.html")
+    assert text.startswith("<!doctype html>")
+    assert "<title>a</title>" in text
+    folder.run("compile", scene, "-o", "b.safetensors", code=0)
+    folder.run("convert", scene, "-o", "c.json", code=0)
+    result = folder.run("export", scene, "b.safetensors", "c.json", "-o", "out", "-v", code=0)
+    assert sorted(os.listdir("out")) == ["a.html", "b.html", "c.html"]
+    assert "out/b.html" in result.output
+    folder.run("export", "-", "-o", "out/", "--title", "Sales & more", stdin=GOOD, code=0)
+    assert "<title>Sales &amp; more</title>" in folder.read("out/stdin.html")
+
+
+def test_scenes_without_pages(folder: Folder) -> None:
+    """Those with errors are left out; a page replaces no input and follows no link nobody wrote."""
+    names = (
+        folder.write("a.nsg"),
+        folder.write("b.nsg", "circle;"),
+        folder.write("c.nsg", 'model "shapes2d-reading"; star;'),
+    )
+    result = folder.run("export", *names, "nowhere.nsg", "-o", "out", code=2)
+    assert os.listdir("out") == ["a.html"]
+    for fact in ("E0204", "nowhere.nsg: no such file", "`shapes2d-reading` draws whole pictures"):
+        assert fact in result.output
+    folder.run("export", names[1], "-o", "b.html", code=1)
+    folder.run("export", names[0], "-o", "a.html", "-D", "k=1", code=1)
+    assert not Path("a.html").exists()
+    folder.write("a.html")
+    assert "an input of the same command" in folder.run("export", "a.html", "-o", "a.html").output
+    os.symlink("elsewhere.html", "out/b.html")
+    assert "is a link" in folder.run("export", "b.nsg", "-o", "out").output
+
+
+# ---------------------------------------------------------------- whole processes
+
+
+def process(*command: str, **environment: str) -> tuple[int, str, str]:
+    run = subprocess.run(
+        [sys.executable, "-m", *command],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        check=False,
+    )
+    return run.returncode, run.stdout, run.stderr
 
 
 def test_whole_processes(folder: Folder) -> None:
     folder.write("a.nsg")
-    with process("render", "a.nsg", "-o", "a.png", "--size", "32x32") as drawn:
-        assert drawn.communicate() == ("", "")
-    assert drawn.returncode == 0
+    assert process("scenelang", "render", "a.nsg", "-o", "a.png", "--size", "32x32") == (0, "", "")
     assert Path("a.png").exists()
-    with process("check", "none.nsg") as checked:
-        assert checked.communicate() == ("", "Error: none.nsg: no such file or directory\n")
-    assert checked.returncode == 2
-
-
-def test_a_scene_of_any_characters_on_a_terminal_of_few(folder: Folder) -> None:
-    name = folder.write("a.nsg", "// ☂\nsquare { scale(☂); }\n")
-    with process("check", name, env={**os.environ, "PYTHONIOENCODING": "latin-1"}) as run:
-        out, err = run.communicate()
-    assert run.returncode == 1
-    assert "\\u2602" in out
-    assert err == ""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
-def test_interrupted(folder: Folder) -> None:
-    name = folder.write("a.nsg", "for (i in 0..<400) { star { scale(4.5, 0.9); rotate(1turn * rand(i)); } }")
-    with process("render", name, "-o", "a.png", "--size", "4096x4096", "-v") as run:
-        assert run.stderr is not None
-        for line in run.stderr:
-            if line.startswith("1 warning"):
-                break  # what comes next takes seconds: torch is loaded, and the picture is drawn
-        run.send_signal(signal.SIGINT)
-        _, err = run.communicate()
-    assert run.returncode == 130, err
-    assert "Traceback" not in err
-    assert os.listdir() == ["a.nsg"]
+    # a terminal may lack characters of a scene
+    folder.write("b.nsg", "// ☂\nsquare { scale(☂); }\n")
+    code, out, err = process("scenelang", "check", "b.nsg", PYTHONIOENCODING="latin-1")
+    assert (code, "\\u2602" in out, err) == (1, True, "")
 
 
 INSIDE_EXEC = """
@@ -152,5 +211,4 @@ main()
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
 def test_interrupted_while_a_class_is_made_from_text(folder: Folder) -> None:
     folder.write("probe.py", INSIDE_EXEC)
-    found = subprocess.run([sys.executable, "-m", "probe"], capture_output=True, check=False)
-    assert (found.returncode, found.stderr) == (130, b"")
+    assert process("probe") == (130, "", "")

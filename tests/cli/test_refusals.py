@@ -31,21 +31,16 @@ render a.nsg b.nsg -o a.nsg                        | 2 | is a file
 render a.nsg b.nsg -o out.png                      | 2 | names a picture
 render a.nsg -o a.png --size 3                     | 2 | not a size such as
 render a.nsg -o a.png --size 9000x1                | 2 | outside 1..8192
-render a.nsg -o a.png --threads 0                  | 2 | --threads
 render moving.nsg -o a.png --frames 0..1           | 2 | holds one picture
-render moving.nsg -o a.png --fps 3                 | 2 | holds one picture
-render moving.nsg -o a.gif --frames 3..1           | 2 | is empty
 render moving.nsg -o a.gif --frames x              | 2 | not a range of frames
 render moving.nsg -o a.gif --frames 2..9           | 1 | frame 9 is outside 0..3
 render moving.nsg -o a.gif --frame 1 --frames 2    | 2 | --frame asks for a picture
 render moving.nsg b.nsg -o out --fps 3             | 2 | take one scene
 render moving.nsg b.nsg -o a.mp4                   | 2 | names an animation
 render moving.nsg -o none/a.gif                    | 2 | no folder `none`
-render moving.nsg -o a-%d-%d.png                   | 2 | more than one place
 render moving.nsg -o a.gif --fps 0                 | 2 | --fps
 render moving.nsg -o a.gif --fps nan               | 2 | `nan` is not a number
 render moving.nsg -o a.gif --fps 5e-324            | 2 | frames a second, where
-render moving.nsg -o a.apng --fps 1e-5             | 2 | frames a second, where
 render b.nsg -o a.gif --fps 3                      | 1 | --fps for a scene without animate
 render b.nsg -o a.gif --frames 0..                 | 1 | --frames for a scene without animate
 render b.nsg -o a.mp4                              | 2 | has no animate
@@ -53,7 +48,6 @@ render late.nsg -o a.gif                           | 1 | E0312
 render a.nsg -o p.png --output depth               | 2 | a 2D picture has no depth; it has object and alpha
 render solids.nsg -o p.jpg --output depth          | 2 | outputs go with .png or .exr pictures, not `p.jpg`
 render orbit.nsg -o p.gif --output depth           | 2 | `p.gif` is one file
-render solids.nsg -o p.png --output z              | 2 | 'z' is not one of 'depth', 'normal', 'object'
 render orbit.nsg -o f-%d.jpg --output depth        | 2 | outputs go with .png or .exr pictures, not `f-0.jpg`
 render solids.nsg -o p.png --prove                 | 2 | solids are not proved
 render learned.nsg -o p.png --prove                | 2 | learned where points lie
@@ -64,34 +58,31 @@ render moving.nsg -o p-%d.png --prove --frames 0..1 | 2 | a proof is for single 
 render a.nsg -o a.png --max-ms 9 --backend exact   | 2 | --max-ms chooses how to draw
 render a.nsg -o a.png --max-ms 9 --samples one     | 2 | leave out --backend and --samples
 render a.nsg -o a.png --max-ms 9 --device cuda     | 2 | leave out --device cuda
-render a.nsg -o a.png --max-ms 0                   | 2 | 0.0 is not in the range
 render a.nsg -o a.png --max-flip 2                 | 2 | 2.0 is not in the range
 render a.nsg -o a.png --backend reference --samples one | 2 | the reference always takes four samples
 render a.nsg -o a.png --backend exact --device cuda | 2 | not by device cuda
 render grown.nsg -o a.gif --max-ms 20              | 2 | for single pictures; --frame draws one
 watch none.nsg                                     | 2 | there is no file `none.nsg`
-watch a.nsg -o none/a.png                          | 2 | no folder `none`
 watch a.nsg -o a.xyz                               | 2 | suffix `.xyz`
 watch a.nsg -o a.png --frames 0..3                 | 2 | holds one picture
-compile a.nsg                                      | 2 | '--out'
 compile a.nsg -o a.png                             | 2 | ends in .safetensors
 compile a.nsg -o none/a.safetensors                | 2 | none/a.safetensors
 compile wrong.nsg -o a.safetensors                 | 1 | E0201
 compile none.nsg -o a.safetensors                  | 2 | none.nsg: no such file
-check                                              | 2 | Missing argument
-check a.nsg --format xml                           | 2 | 'xml' is not one of
 check a.nsg -D k                                   | 2 | not NAME=value
 check a.nsg --ignore E0302                         | 2 | errors always count
 check a.nsg --select W99                           | 2 | no code begins with
 check a.nsg --frame 1 --all-frames                 | 2 | exclude each other
-check a.nsg --root nowhere                         | 2 | 'nowhere' does not exist
-dump a.nsg --after flaten                          | 2 | 'flatten'
 dump a.nsg --after syntax --format mmd             | 2 | The syntax tree has no drawing
 dump a.nsg --format dot --diff                     | 2 | A drawing is of one stage
 dump a.nsg --costs --diff                          | 2 | leave out --after, --diff and drawings
 dump wrong.nsg -o b.dot                            | 1 | E0201
 dump wrong.nsg --costs                             | 1 | E0201
 convert a.nsg -o a.py                              | 2 | --to nsg or json
+export a.nsg -o a.png                              | 2 | a page's file ends in .html
+export a.nsg -o a                                  | 2 | a page has a suffix such as .html
+export a.nsg -o no/a.html                          | 2 | no folder
+export a.nsg a.nsg -o out --title T                | 2 | --title is of one page
 models shapes                                      | 2 | No model `shapes`
 explain E9999                                      | 2 | No code `E9999`
 chekc                                              | 2 | Did you mean `check`?

@@ -1,7 +1,8 @@
-"""`scenelang render` and `compile`: where pictures go, what is refused, that pictures repeat."""
+"""`scenelang render` and `compile`: files, what they say, what is refused, that pictures repeat."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -11,7 +12,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import scenelang as nsg
+from scenelang.drawing.image import PROVED
+from scenelang.output import encoders
 from tests.cli.conftest import GOOD, Folder
+
+MOVING = (
+    "animate(seconds = 1, fps = 4); canvas(16, 16); background(#246);\n"
+    "star { scale(0.6); rotate(0.1turn * u); }\n"
+)
+
+
+SOLIDS = "canvas(24, 16);\nsphere { scale(0.5); }\nsphere { translate(1, 0, 0); }\n"
+ORBIT = "animate(1, 3); camera(eye = [6 * sin(1turn * u), 1, 6 * cos(1turn * u)]);\n" + SOLIDS
 
 
 def picture(path: str | Path) -> np.ndarray:
@@ -19,108 +32,103 @@ def picture(path: str | Path) -> np.ndarray:
         return np.asarray(image).astype(int)
 
 
+def same(*paths: str) -> bool:
+    first, *others = (Path(path).read_bytes() for path in paths)
+    return all(other == first for other in others)
+
+
+# ---------------------------------------------------------------- stills
+
+
 def test_one_scene(folder: Folder) -> None:
-    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png")
-    assert (result.exit_code, result.output) == (0, "")
+    name = folder.write("a.nsg")
+    assert folder.run("render", name, "-o", "a.png", code=0).output == ""
     pixels = picture("a.png")
     assert pixels.shape == (256, 256, 3)
     assert np.abs(pixels[128, 128] - (0xDD, 0x33, 0x33)).max() <= 1
     assert np.abs(pixels[3, 3] - 255).max() <= 1
-
-
-def test_formulas_in_place_of_the_network(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    assert folder.run("render", name, "-o", "a.png", "--backend", "reference").exit_code == 0
-    done = folder.run("render", name, "-o", "b.png", "--backend", "exact", "--samples", "four", "-v")
-    assert done.exit_code == 0
+    folder.run("render", name, "-o", "r.png", "--backend", "reference", code=0)
+    done = folder.run("render", name, "-o", "b.png", "--backend", "exact", "--samples", "four", "-v", code=0)
     assert "formulas in the network's place" in done.stderr
-    assert (np.abs(picture("a.png") - picture("b.png")).max(-1) > 1).sum() <= 2
+    assert (np.abs(picture("r.png") - picture("b.png")).max(-1) > 1).sum() <= 2
+    for _ in range(2):  # into a new folder, and one that is there
+        folder.run("render", name, "-o", "new/", code=0)
+    assert os.listdir("new") == ["a.png"]
 
 
 def test_formats_and_sizes(folder: Folder) -> None:
     name = folder.write("a.nsg", "background(none);" + GOOD)
     for suffix, channels in (("png", 4), ("jpg", 3), ("webp", 4), ("TIFF", 4)):
-        assert folder.run("render", name, "-o", f"a.{suffix}", "--size", "48x32").exit_code == 0
+        folder.run("render", name, "-o", f"a.{suffix}", "--size", "48x32", code=0)
         assert picture(f"a.{suffix}").shape == (32, 48, channels)
     assert picture("a.png")[0, 0, 3] == 0
     assert picture("a.jpg")[0, 0].min() >= 254
 
 
-def test_many_scenes_alone_or_together(folder: Folder) -> None:
+def test_many_scenes(folder: Folder) -> None:
+    """They are drawn as alone; those with errors are left out."""
     names = [folder.write("a.nsg"), folder.write("b.nsg", "star { scale(0.4); twirl(1); }")]
-    assert folder.run("render", *names, "-o", "out").exit_code == 0
-    assert sorted(os.listdir("out")) == ["a.png", "b.png"]
-    for name in ("a", "b"):
-        assert folder.run("render", f"{name}.nsg", "-o", f"{name}.png").exit_code == 0
-        assert Path(f"{name}.png").read_bytes() == Path(f"out/{name}.png").read_bytes()
-
-
-def test_one_scene_into_a_folder(folder: Folder) -> None:
-    name = folder.write("a.nsg")
-    assert folder.run("render", name, "-o", "new/").exit_code == 0
-    assert folder.run("render", name, "-o", "new").exit_code == 0
-    assert os.listdir("new") == ["a.png"]
-
-
-def test_scenes_with_errors_are_left_out(folder: Folder) -> None:
-    bad, good = folder.write("bad.nsg", "square { scale(foo); }"), folder.write("good.nsg")
-    result = folder.run("render", bad, good, "-o", "out")
-    assert result.exit_code == 1
+    bad = folder.write("bad.nsg", "square { scale(foo); }")
+    result = folder.run("render", bad, *names, "-o", "out", code=1)
     assert "bad.nsg:1:16" in result.stderr
     assert "^^^" in result.stderr
-    assert os.listdir("out") == ["good.png"]
-    missing = folder.run("render", "none.nsg", good, bad, "-o", "more")
-    assert missing.exit_code == 2
-    assert os.listdir("more") == ["good.png"]
+    assert sorted(os.listdir("out")) == ["a.png", "b.png"]
+    for name in ("a", "b"):
+        folder.run("render", f"{name}.nsg", "-o", f"{name}.png", code=0)
+        assert same(f"{name}.png", f"out/{name}.png")
+    folder.run("render", "none.nsg", names[0], bad, "-o", "more", code=2)
+    assert os.listdir("more") == ["a.png"]
 
 
 def test_warnings_are_shown_and_strict_refuses(folder: Folder) -> None:
     name = folder.write("a.nsg", "square { material flat { color([2, 0, 0]); } }")
-    result = folder.run("render", name, "-o", "a.png", "--size", "16x16")
-    assert result.exit_code == 0
-    assert "W0301" in result.stderr
-    assert folder.run("render", name, "-o", "b.png", "--strict").exit_code == 1
-    assert not Path("b.png").exists()
+    assert "W0301" in folder.run("render", name, "-o", "a.png", "--size", "16x16", code=0).stderr
+    folder.run("render", name, "-o", "b.png", "--strict", code=1)
+    late = folder.write(
+        "b.nsg", MOVING + "square { material flat { color([1 + frame, 0, 0]); } scale(0.1); }"
+    )
+    assert "W0301" in folder.run("render", late, "-o", "b.gif", "--strict", code=1).stderr
+    assert not {"b.png", "b.gif"} & set(os.listdir())
+    assert "W0301" in folder.run("render", late, "-o", "b.gif", code=0).stderr
 
 
 def test_an_unused_define_draws_nothing(folder: Folder) -> None:
     used, other = folder.write("a.nsg", "param k = 0.5; square { scale(k); }"), folder.write("b.nsg")
     small = ("--size", "16x16")
-    assert folder.run("render", used, other, "-o", "out", "-D", "k=0.2", *small).exit_code == 0
-    result = folder.run("render", used, other, "-o", "none", "-D", "q=0.2", *small)
-    assert result.exit_code == 1
+    folder.run("render", used, other, "-o", "out", "-D", "k=0.2", *small, code=0)
+    result = folder.run("render", used, other, "-o", "none", "-D", "q=0.2", *small, code=1)
     assert "E0211" in result.stderr
     assert not os.listdir("none")
 
 
-def test_what_cannot_be_written(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device", ".a.png.x.part")
+def test_what_is_not_there(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """CUDA, a library of EXR, ffmpeg."""
+    import torch
 
-    monkeypatch.setattr(os, "replace", full)
-    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "--size", "16x16")
-    assert result.exit_code == 2
-    assert result.stderr == "Error: cannot write `a.png`: no space left on device\n"
+    name = folder.write("a.nsg", MOVING)
+    if not torch.cuda.is_available():
+        result = folder.run("render", name, "-o", "a.png", "--device", "cuda", code=2)
+        assert result.stderr.startswith("Error: CUDA is asked for")
+    monkeypatch.setattr("scenelang.drawing.image.find_spec", lambda name: None)
+    result = folder.run("render", name, "-o", "p.exr", code=2)
+    assert "pip install 'scenelang[exr]'" in result.stderr
+    encoders.find_ffmpeg.cache_clear()
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert folder.run("render", name, "-o", "a.mp4", code=2).stderr == f"Error: {encoders.MISSING}\n"
+    encoders.find_ffmpeg.cache_clear()
     assert os.listdir() == ["a.nsg"]
 
 
-def test_cuda_that_is_not_there(folder: Folder) -> None:
-    import torch
-
-    if torch.cuda.is_available():
-        pytest.skip("it is there")
-    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "--device", "cuda")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("Error: CUDA is asked for")
-
-
 def test_verbose(folder: Folder) -> None:
-    result = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "-v")
-    said = result.stderr
-    assert "objects: 2 (1 square, 1 star)" in said
-    assert "tokens: 2 union" in said
-    assert "model shapes2d (the usual one of its dimension)" in said
-    assert "drawn by numpy on one core: about " in said
+    said = folder.run("render", folder.write("a.nsg"), "-o", "a.png", "-v").stderr
+    for fact in (
+        "objects: 2 (1 square, 1 star)",
+        "tokens: 2 union",
+        "model shapes2d (the usual one of its dimension)",
+        "drawn by numpy on one core: about ",
+    ):
+        assert fact in said
     for stage in ("parse", "evaluate", "compile", "draw", "save"):
         assert f"{stage} " in said.rpartition("time (ms):")[2]
     said = folder.run("render", "a.nsg", "-o", "b.png", "-v", "--device", "cpu").stderr
@@ -130,18 +138,13 @@ def test_verbose(folder: Folder) -> None:
 
 
 def test_programs(folder: Folder) -> None:
+    """They draw what their scenes do, and refuse what they cannot; damaged ones are reported."""
     name = folder.write("a.nsg")
-    assert folder.run("compile", name, "-o", "a.safetensors").exit_code == 0
-    assert folder.run("render", "a.safetensors", "-o", "p.png").exit_code == 0
-    assert folder.run("render", name, "-o", "s.png").exit_code == 0
-    assert Path("p.png").read_bytes() == Path("s.png").read_bytes()
-    assert folder.run("render", "a.safetensors", "-o", "p.png", "--size", "64x64").exit_code == 0
-    assert folder.run("render", name, "-o", "s.png", "--size", "64x64").exit_code == 0
-    assert Path("p.png").read_bytes() == Path("s.png").read_bytes()
-
-
-def test_what_programs_cannot(folder: Folder) -> None:
-    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
+    folder.run("compile", name, "-o", "a.safetensors", code=0)
+    for options in ((), ("--size", "64x64")):
+        folder.run("render", "a.safetensors", "-o", "p.png", *options, code=0)
+        folder.run("render", name, "-o", "s.png", *options, code=0)
+        assert same("p.png", "s.png")
     for arguments, said in (
         (("--size", "64x32"), "another shape"),
         (("--backend", "reference"), "the reference draws scenes"),
@@ -150,53 +153,177 @@ def test_what_programs_cannot(folder: Folder) -> None:
         (("-D", "k=1"), "E0211"),
         (("--prove",), "a proof is of a scene"),
     ):
-        result = folder.run("render", "a.safetensors", "-o", "p.png", *arguments)
-        assert (result.exit_code, said in result.stderr) == (1, True), arguments
-        assert not Path("p.png").exists()
-
-
-def test_damaged_programs(folder: Folder) -> None:
-    folder.run("compile", folder.write("a.nsg"), "-o", "a.safetensors")
+        assert said in folder.run("render", "a.safetensors", "-o", "q.png", *arguments, code=1).stderr
+        assert not Path("q.png").exists()
     Path("b.safetensors").write_bytes(Path("a.safetensors").read_bytes()[:200])
-    result = folder.run("render", "a.safetensors", "b.safetensors", "-o", "out")
-    assert result.exit_code == 1
+    result = folder.run("render", "a.safetensors", "b.safetensors", "-o", "out", code=1)
     assert result.stderr.startswith("Error: b.safetensors: not a program")
     assert os.listdir("out") == ["a.png"]
 
 
 def test_without_torch_what_it_draws_is_refused(folder: Folder) -> None:
     """Small pictures are drawn by numpy alone; the others say what is missing."""
-    folder.write("a.nsg", "for (i in 0..<20) { star { scale(0.5); translate(rand(i), 0); } }")
-    code = "import sys; sys.modules['torch'] = None\nfrom scenelang.cli.main import main; main(sys.argv[1:])"
-    command = (sys.executable, "-c", code, "render", "a.nsg", "-o", "a.png")
-    assert subprocess.run(command, check=True).returncode == 0
-    for options in (("--size", "4096x4096"), ("--max-ms", "5")):
-        done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
-        assert done.returncode == 2
-        assert done.stderr == "Error: this needs torch, which is not installed; pip install torch\n"
-
-
-def test_a_picture_of_one_colour_is_told(folder: Folder) -> None:
-    """White on white, which no warning of the compiler tells; once where one does."""
-    result = folder.run(
-        "render", folder.write("a.nsg", "square { scale(0.5); }"), "-o", "a.png", "--size", "16x16"
+    folder.write(
+        "a.nsg", "background(#246); for (i in 0..<20) { star { scale(0.5); translate(rand(i), 0); } }"
     )
-    assert result.exit_code == 0
-    assert result.stderr.startswith("a.png: one colour throughout")
-    away = folder.write("b.nsg", "square { scale(0.5); translate(4, 0); }")
-    result = folder.run("render", away, "-o", "b.png", "--size", "16x16")
-    assert "W0402" in result.stderr
-    assert "throughout" not in result.stderr
+    code = """import sys
+sys.modules["torch"] = None
+from scenelang.cli.main import main
+for options in [], ["--size", "4096x4096"]:
+    try:
+        main(["render", "a.nsg", "-o", "a.png", *options])
+    except SystemExit as end:
+        print(end.code)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n2\n"
+    assert done.stderr == "Error: this needs torch, which is not installed; pip install torch\n"
 
 
 def test_why_a_picture_has_one_colour(folder: Folder) -> None:
-    """Another reason where the background is not white; and a scene may have no objects."""
+    """Unless a warning of the compiler tells it; and a scene may have no objects."""
     for text, said in (
+        ("square { scale(0.5); }", "a.png: one colour throughout; flat objects are white"),
         ("background(#222); square { scale(0.001); }", "smaller than a pixel"),
         ("background(#222); subtract { star; star; }", "cut away"),
         ("background(#222); module part() { star; }", "no objects to draw"),
         ("group { scale(0.5); }", "no objects to draw"),
+        ("square { scale(0.5); translate(4, 0); }", "W0402"),
     ):
-        result = folder.run("render", folder.write("a.nsg", text), "-o", "a.png", "--size", "16x16")
-        assert (result.exit_code, said in result.stderr) == (0, True), text
-        assert "white" not in result.stderr
+        name = folder.write("a.nsg", text)
+        shown = folder.run("render", name, "-o", "a.png", "--size", "16x16", code=0).stderr
+        assert said in shown, text
+        assert ("throughout" in shown) == (said not in ("W0402", "no objects to draw")), text
+
+
+# ---------------------------------------------------------------- animations
+
+
+def frames(name: str) -> int:
+    with Image.open(name) as image:
+        return getattr(image, "n_frames", 1)
+
+
+def test_names_of_sequences(folder: Folder) -> None:
+    name = folder.write("a.nsg", MOVING)
+    result = folder.run("render", name, "-o", "out/", "--frames", "1..2", code=0)
+    assert "out/a-0001.png … a-0002.png: 2 frames" in result.stderr
+    assert sorted(os.listdir("out")) == ["a-0001.png", "a-0002.png"]
+    result = folder.run("render", name, "-o", "out/a-%04d.png", "--frames", "0..<1")
+    assert "also holds 2 such files of another run, `a-0001.png` among them" in result.stderr
+    assert sorted(os.listdir("out")) == ["a-0000.png", "a-0001.png", "a-0002.png"]
+    folder.run("render", "-", "-o", "f-%d.png", stdin=MOVING, code=0)
+    assert sorted(Path().glob("f-*")) == [Path(f"f-{n}.png") for n in range(4)]
+
+
+def test_pictures_of_animations_and_films_of_stills(folder: Folder) -> None:
+    name = folder.write("a.nsg", MOVING)
+    for out in ("a.png", "a.gif"):
+        folder.run("render", name, "-o", out, "--frame", "3", code=0)
+        assert frames(out) == 1
+    folder.run("render", name, "-o", "f-%d.png", "--frames", "3", code=0)
+    assert same("f-3.png", "a.png")
+    folder.run("render", name, "-o", "zero.png", code=0)
+    assert frames("zero.png") == 1
+    name = folder.write("b.nsg", "canvas(16, 16);" + GOOD)
+    for source, out in ((name, "b.gif"), ("-", "b.webp")):
+        folder.run("render", source, "-o", out, stdin=folder.read(name), code=0)
+        assert frames(out) == 1
+    folder.run("render", name, "-o", "out/", code=0)
+    assert os.listdir("out") == ["b.png"]
+
+
+def test_params_and_rates(folder: Folder) -> None:
+    name = folder.write("a.nsg", "param k = 0.5;" + MOVING.replace("0.6", "k"))
+    result = folder.run("render", name, "-o", "a.gif", "--fps", "10", "-v", "-D", "k=0.3", code=0)
+    assert frames("a.gif") == 10
+    assert "10 pictures drawn by 1 process, 0 kept" in result.stderr
+    assert "compile " in result.stderr
+    assert "E0211" in folder.run("render", name, "-o", "b.gif", "-D", "q=0.3", code=1).stderr
+    assert not Path("b.gif").exists()
+
+
+def test_films_are_drawn_as_stills_are(folder: Folder) -> None:
+    """By other processes too, here of solids, which load no torch."""
+    flat, solid = folder.write("flat.nsg", MOVING), folder.write("solid.nsg", ORBIT)
+    for name, options in (
+        (flat, ("--samples", "one")),
+        (flat, ("--backend", "exact")),
+        (flat, ("--backend", "reference")),
+        (solid, ("--samples", "draft", "--jobs", "2")),
+    ):
+        folder.run("render", name, "-o", "f-%d.png", *options, code=0)
+        folder.run("render", name, "-o", "f.png", "--frame", "1", *options[:2], code=0)
+        folder.run("render", name, "-o", "p.png", "--frame", "1", code=0)
+        assert same("f-1.png", "f.png"), options
+        assert not same("f-1.png", "p.png"), options
+
+
+# ---------------------------------------------------------------- outputs and proofs
+
+DEPTH, OBJECT = ("--output", "depth"), ("--output", "object")
+
+
+def told(path: str) -> dict:
+    with Image.open(path) as picture:
+        return json.loads(picture.text["scenelang"])
+
+
+def test_outputs_beside_the_picture(folder: Folder) -> None:
+    name = folder.write("a.nsg", SOLIDS)
+    for backend in ("neural", "reference"):
+        options = ("--backend", backend)
+        ran = folder.run("render", name, "-o", "p.png", *DEPTH, *OBJECT, *DEPTH, *options, code=0)
+        assert ran.stderr.count("\n") == 2
+        near, far = told("p.depth.png")["near"], told("p.depth.png")["far"]
+        assert f"p.depth.png: depth from {near:.6g} to {far:.6g} scene units" in ran.stderr
+        assert [entry["line"] for entry in told("p.object.png")["objects"]] == [2, 3]
+        folder.run("render", name, "-o", "q.png", *options, code=0)
+        assert same("p.png", "q.png")
+        assert sorted(os.listdir()) == ["a.nsg", "p.depth.png", "p.object.png", "p.png", "q.png"]
+
+
+def test_outputs_of_programs_and_several_scenes(folder: Folder) -> None:
+    names = folder.write("a.nsg", SOLIDS), folder.write("b.nsg")
+    folder.run("compile", names[0], "-o", "a.safetensors", code=0)
+    folder.run("render", "a.safetensors", "-o", "p.png", *OBJECT, code=0)
+    folder.run("render", *names, "-o", "all/", *OBJECT, code=0)
+    assert told("p.object.png") == told("all/a.object.png")
+    assert [entry["geometry"] for entry in told("all/b.object.png")["objects"]] == ["square", "star"]
+
+
+def test_outputs_of_frames(folder: Folder) -> None:
+    name = folder.write("a.nsg", ORBIT)
+    folder.run("render", name, "-o", "f-%d.png", *OBJECT, "--frames", "1..", code=0)
+    assert sorted(path.name for path in folder.path.glob("f*")) == [
+        f"f-{n}{kind}.png" for n in (1, 2) for kind in (".object", "")
+    ]
+    folder.run("render", name, "-o", "one.png", *OBJECT, "--frame", "2", code=0)
+    assert same("one.object.png", "f-2.object.png")
+    assert np.array_equal(picture("one.png"), picture("f-2.png"))
+    Path("p.depth.png").symlink_to("a.nsg")
+    folder.run("render", name, "-o", "p.png", *DEPTH, "--frame", "0", code=2)
+    assert (folder.read("a.nsg"), Path("p.png").exists()) == (ORBIT, False), "no link is followed"
+
+
+def test_proofs(folder: Folder) -> None:
+    """They are told and written, and what is not proved is drawn again where that is asked for."""
+    stars = "star { scale(0.8); twirl(0.7); material flat { color(#d33); } } smooth star { scale(0.7); }"
+    name = folder.write("a.nsg", f"canvas(90, 60);\nchain {{ {stars} }}\n")
+    scene = nsg.load(name)
+    _, proof = nsg.prove(scene)
+    assert proof.share < 1
+    assert folder.run("render", name, "-o", "p.png", code=0).stderr == ""
+    ran = folder.run("render", name, "-o", "q.png", "--prove")
+    left = int((proof.bound > PROVED).sum())
+    assert ran.stderr == f"q.png: {proof.told()}\n"
+    assert f"{left} are not, by at most {255 * proof.worst:.0f}/255" in ran.stderr
+    assert same("q.png", "p.png")
+    ran = folder.run("render", name, "-o", "r.png", "--output", "proof", "--output", "alpha", code=0)
+    assert ran.stderr.count("\n") == 3
+    assert told("r.proof.png") == {"output": "proof", **proof.facts(), "stored": "65535 bound"}
+    stored = np.asarray(Image.open("r.proof.png"), np.float64)
+    np.testing.assert_array_equal(stored, np.ceil(65535.0 * proof.bound.astype(np.float64)))
+    ran = folder.run("render", name, "-o", "p.png", "--redraw", "-v", code=0)
+    assert "p.png: 100 % of pixels proved right to 1/255" in ran.stderr
+    exact = nsg.render(scene, backend="reference").to_uint8().astype(int)
+    assert abs(picture("p.png") - exact).max() <= 1

@@ -6,12 +6,10 @@ import csv
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
 import scenelang as nsg
-from scenelang.cli.main import cli
+from tests.cli.conftest import Folder
 
-LIB = "module petal(k) { star { scale(0.2 + 0.3 * k); } }"
 TEXT = """\
 import "lib.nsg" as l;
 canvas(16, 12);
@@ -19,22 +17,16 @@ animate(seconds = 1, fps = 4);
 param k = 0.5 in 0..1;
 param ink = #d33;
 param lift = 0.1 in -0.5..0.5;
-group { l.petal(k); translate(u, lift); material_is(ink); }
+group { l.petal(k); translate(u, lift); }
+square { material flat { color(ink); } }
 """
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    Path("lib.nsg").write_text(LIB)
-    Path("a.nsg").write_text(
-        TEXT.replace(" material_is(ink);", "") + "square { material flat { color(ink); } }"
-    )
-    return tmp_path
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(cli, ["sweep", "a.nsg", *arguments])
+def scenes(folder: Folder) -> Folder:
+    folder.write("lib.nsg", "module petal(k) { star { scale(0.2 + 0.3 * k); } }")
+    folder.write("a.nsg", TEXT)
+    return folder
 
 
 def rows(path: str) -> list[dict[str, str]]:
@@ -42,14 +34,9 @@ def rows(path: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_a_frame_of_an_animation_with_imports(folder: Path) -> None:
-    done = run(
-        "--grid", "k=0..1/2", "--random", "lift, ink", "--count", "4", "--seed", "7", "-D", "k=0.5", "-o", "o"
-    )
-    assert done.exit_code == 2
-    assert "param `k` with one value for all pictures" in done.output
-    done = run("--grid", "k=0..1/2", "--random", "lift, ink", "--count", "4", "--frame", "2", "-o", "o", "-v")
-    assert done.exit_code == 0, done.output
+def test_a_frame_of_an_animation_with_imports(scenes: Folder) -> None:
+    wanted = ("--grid", "k=0..1/2", "--random", "lift,ink", "--count", "4", "--frame", "2")
+    done = scenes.run("sweep", "a.nsg", "-o", "o", "-v", *wanted, code=0)
     assert done.output.startswith("o/a.csv: 4 pictures, ")
     for row in rows("o/a.csv"):
         values = {name: row[name] for name in ("k", "lift", "ink")}
@@ -58,23 +45,19 @@ def test_a_frame_of_an_animation_with_imports(folder: Path) -> None:
     assert len({row["ink"] for row in rows("o/a.csv")}) == 4
 
 
-def test_rows_with_mistakes(folder: Path) -> None:
-    done = run("--grid", "k=0.5,7,8,9,10", "-o", "o/", "--sheet", "sheet.png")
-    assert done.exit_code == 1
+def test_rows_with_mistakes(scenes: Folder) -> None:
+    arguments = ("sweep", "a.nsg", "--grid", "k=0.5,7,8,9,10", "-o", "o/")
+    done = scenes.run(*arguments, "--sheet", "sheet.png", code=1)
     assert "1 picture, 4 rows whose values give no scene" in done.output
     assert done.output.count("E0309") == 3  # of the first three; the table has all
     assert "row 1: k=7" in done.output
     assert [row["error"][:5] for row in rows("o/a.csv")] == ["", *["E0309"] * 4]
     assert Path("sheet.png").exists()
-    again = run("--grid", "k=0.5,7,8,9,10", "-o", "o/")
-    assert again.exit_code == 1
-    assert "1 kept from a run before" in again.output
-    Path("o/a-000000.png").unlink()
-    assert run("--grid", "k=0.5,7,8,9,10", "-o", "o/").exit_code == 1
-    assert Path("o/a-000000.png").exists()
+    assert "1 kept from a run before" in scenes.run(*arguments, code=1).output
 
 
 REFUSED = """
+--grid k=0..1/2 -D k=0.5 -o o                           | param `k` with one value for all pictures
 --grid q=1 -o o                                         | no param `q`
 --grid k -o o                                           | say how many
 --grid k=0,1 --grid k=1 -o o                            | given twice
@@ -86,27 +69,17 @@ REFUSED = """
 --grid k=0,1 -o o --sheet s.what                        | no image format
 --grid k=0,1 -o o --backend reference --cluster local   | draws by the network
 --grid k=0,1 -o o --backend reference --output program  | no programs
+--grid k=0.5,1 -o old          | `old/a.csv` has other values in row 0: 0 where 0.5 are asked for
 """
 
 
-def test_what_cannot_be_done(folder: Path) -> None:
+def test_what_cannot_be_done(scenes: Folder) -> None:
+    scenes.run("sweep", "a.nsg", "--grid", "k=0,1", "-o", "old", code=0)
     for row in REFUSED.strip().splitlines():
         arguments, said = (part.strip() for part in row.split(" | "))
-        done = run(*arguments.split())
+        done = scenes.run("sweep", "a.nsg", *arguments.split())
         assert (done.exit_code, said in done.output) == (2, True), f"{arguments}: {done.output}"
         assert not list(Path("o").glob("*.png")), arguments
-
-
-def test_a_scene_with_mistakes(folder: Path) -> None:
-    Path("a.nsg").write_text("param k = 0.5 in 0..1; star { scale(what); }")
-    done = run("--grid", "k=0,1", "-o", "o")
-    assert done.exit_code == 1
-    assert "E02" in done.output
-    assert not Path("o").exists()
-
-
-def test_another_sweep_in_the_folder(folder: Path) -> None:
-    assert run("--grid", "k=0,1", "-o", "o").exit_code == 0
-    done = run("--grid", "k=0.5,1", "-o", "o")
-    assert done.exit_code == 2
-    assert "`o/a.csv` has other values in row 0: 0 where 0.5 are asked for" in done.output
+    scenes.write("b.nsg", "param k = 0.5 in 0..1; star { scale(what); }")
+    assert "E02" in scenes.run("sweep", "b.nsg", "--grid", "k=0,1", "-o", "new", code=1).output
+    assert not Path("new").exists()

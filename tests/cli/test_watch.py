@@ -8,31 +8,27 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from scenelang.output.watch import settle, stamps
+from scenelang.output import watch
+from scenelang.output.watch import Screen, settle, stamps
 
 LONG_S = 120  # on a busy machine
-HEAD = "canvas(16, 16); background(#000);\n"
+HEAD = "canvas(16, 16); background(#000); animate(seconds = 1, fps = 5); param k = 1;\n"
 
 
 class Watcher:
-    """``scenelang watch`` in a folder.
-
-    Args:
-        folder: where it runs.
-        arguments: after ``watch``.
-    """
+    """``scenelang watch a.nsg`` in a folder, which Ctrl-C ends."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder = folder
         self.process = subprocess.Popen(
-            [sys.executable, "-u", "-m", "scenelang", "watch", *arguments],
+            [sys.executable, "-u", "-m", "scenelang", "watch", "a.nsg", *arguments],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -43,9 +39,20 @@ class Watcher:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
+    def __enter__(self) -> Watcher:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        self.process.send_signal(signal.SIGINT if kind is None else signal.SIGKILL)
+        code = self.process.wait(LONG_S)
+        self._reader.join()
+        if kind is None:
+            assert (code, "Traceback" in "".join(self.lines)) == (130, False)
+
     def _read(self) -> None:
         assert self.process.stdout is not None
-        self.lines.extend(iter(self.process.stdout.readline, ""))
+        with self.process.stdout as stream:
+            self.lines.extend(iter(stream.readline, ""))
 
     def said(self, text: str, times: int = 1) -> None:
         """Wait until it has said something so often."""
@@ -56,30 +63,23 @@ class Watcher:
         while not holds():
             assert self.process.poll() is None, "".join(self.lines)
             assert time.monotonic() < deadline, f"no {what} in:\n{''.join(self.lines)}"
-            time.sleep(0.005)
+            time.sleep(0.01)
 
-    def shows(self, red: int, name: str = "a.png") -> None:
-        """Wait until the picture's middle has this much red."""
+    def shows(self, name: str, value: int, of: Callable[[Image.Image], int]) -> None:
+        """Wait until what is read from a picture is a value, or next to it."""
 
         def holds() -> bool:
             if not (self.folder / name).exists():
                 return False
             with Image.open(self.folder / name) as image:
                 assert image.size == (16, 16)
-                return abs(int(np.asarray(image.convert("RGB"))[8, 8, 0]) - red) <= 1
+                return abs(of(image) - value) <= 1
 
-        self.until(holds, f"picture with red {red}")
-
-    def end(self) -> int:
-        """Send Ctrl-C; the exit code."""
-        self.process.send_signal(signal.SIGINT)
-        code = self.process.wait(LONG_S)
-        self._reader.join()
-        return code
+        self.until(holds, f"{value} in {name}")
 
 
-def square(red: int) -> str:
-    return f"square {{ material flat {{ color([{red} / 255, 0, 0]); }} }}\n"
+def square(red: object) -> str:
+    return f"square {{ material flat {{ color([{red} * k * frame / 6 / 255, 0, 0]); }} }}\n"
 
 
 def save(path: Path, text: str) -> None:
@@ -89,108 +89,64 @@ def save(path: Path, text: str) -> None:
     os.replace(part, path)
 
 
-@pytest.fixture
-def watcher(tmp_path: Path) -> Iterator[Watcher]:
-    (tmp_path / "a.nsg").write_text(HEAD + square(50))
-    found = Watcher(tmp_path, "a.nsg", "--backend", "reference")
-    yield found
-    found.process.kill()
-    found.process.communicate()
-
-
-def test_a_day_of_an_author(watcher: Watcher) -> None:
+def test_a_day_of_an_author(tmp_path: Path) -> None:
     """Save, err, mend, import, change the import, lose the file: the picture follows, or stays."""
-    scene, lib = watcher.folder / "a.nsg", watcher.folder / "parts" / "lib.nsg"
-    watcher.shows(50)
-    scene.write_text(HEAD + square(60))
-    watcher.shows(60)
-    save(scene, HEAD + "square { scale(foo); }")
-    watcher.said("E0201")
-    watcher.said("^^^")
-    watcher.said("1 error; a.png stays as it was")
-    watcher.shows(60)
-    save(scene, HEAD + square(70))
-    watcher.shows(70)
-    save(scene, "// nothing new\n" + HEAD + square(70))
-    watcher.said("the same picture")
-    save(scene, 'import "parts/lib.nsg" as lib;\n' + HEAD + square(0).replace("0 / 255", "lib.red"))
-    watcher.said("E0214")  # which is not there yet, nor is its folder
-    lib.parent.mkdir()
-    lib.write_text("let red = 80 / 255;")
-    watcher.shows(80)
-    save(lib, "let red = 90 / 255;")
-    watcher.shows(90)
-    lib.write_text("let red = ;")
-    watcher.said("lib.nsg:1")
-    lib.write_text("let red = 100 / 255;")
-    watcher.shows(100)
-    scene.unlink()
-    watcher.said("a.nsg is gone; waiting for it")
-    save(scene, HEAD + square(110))
-    watcher.shows(110)
-    (watcher.folder / "a.png").unlink()
-    save(scene, HEAD + square(110) + " ")
-    watcher.shows(110)
-    assert watcher.end() == 130
-    assert "Traceback" not in "".join(watcher.lines)
-    assert sorted(os.listdir(watcher.folder)) == ["a.nsg", "a.png", "parts"]
+    scene, lib = tmp_path / "a.nsg", tmp_path / "parts" / "lib.nsg"
+    scene.write_text(HEAD + square(50))
+    with Watcher(tmp_path, "--backend", "reference", "-D", "k=2", "--frame", "3") as watcher:
 
+        def shows(red: int) -> None:
+            watcher.shows("a.png", red, lambda image: int(np.asarray(image.convert("RGB"))[8, 8, 0]))
 
-def test_params_frames_and_times(tmp_path: Path) -> None:
-    text = (
-        HEAD
-        + "animate(seconds = 1, fps = 5); param k = 1; "
-        + square(0).replace("0 / 255", "k * frame / 255")
-    )
-    (tmp_path / "a.nsg").write_text(text)
-    watcher = Watcher(tmp_path, "a.nsg", "-o", "b.png", "-D", "k=40", "--frame", "3")
-    try:
-        watcher.shows(120, "b.png")
-        watcher.said("b.png: ")
+        shows(50)
+        watcher.said("a.png: ")
         watcher.said(" ms (compile ")
-        save(tmp_path / "a.nsg", text.replace("animate", "// \nanimate").replace("square", "star"))
-        watcher.said("b.png: ", 2)
-        watcher.shows(120, "b.png")
-        assert watcher.end() == 130
-    finally:
-        watcher.process.kill()
-        watcher.process.communicate()
+        scene.write_text(HEAD + square(60))
+        shows(60)
+        save(scene, HEAD + "square { scale(foo); }")
+        for words in ("E0201", "^^^", "1 error; a.png stays as it was"):
+            watcher.said(words)
+        shows(60)
+        save(scene, HEAD + square(70))
+        shows(70)
+        save(scene, "// nothing new\n" + HEAD + square(70))
+        watcher.said("the same picture")
+        save(scene, 'import "parts/lib.nsg" as lib;\n' + HEAD + square("lib.red"))
+        watcher.said("E0214")  # which is not there yet, nor is its folder
+        lib.parent.mkdir()
+        lib.write_text("let red = 80;")
+        shows(80)
+        save(lib, "let red = 90;")
+        shows(90)
+        lib.write_text("let red = ;")
+        watcher.said("lib.nsg:1")
+        lib.write_text("let red = 100;")
+        shows(100)
+        scene.unlink()
+        watcher.said("a.nsg is gone; waiting for it")
+        save(scene, HEAD + square(110))
+        shows(110)
+        (tmp_path / "a.png").unlink()
+        save(scene, HEAD + square(110) + " ")
+        shows(110)
+    assert sorted(os.listdir(tmp_path)) == ["a.nsg", "a.png", "parts"]
 
 
 def test_animations(tmp_path: Path) -> None:
-    text = HEAD + "animate(seconds = 1, fps = 5);" + square(0).replace("0 / 255", "frame / 9")
-    (tmp_path / "a.nsg").write_text(text)
-    watcher = Watcher(tmp_path, "a.nsg", "-o", "a.gif", "--backend", "reference")
-
-    def has(frames: int) -> None:
-        def holds() -> bool:
-            if not (tmp_path / "a.gif").exists():
-                return False
-            with Image.open(tmp_path / "a.gif") as image:
-                return image.n_frames == frames
-
-        watcher.until(holds, f"{frames} frames")
-
-    try:
-        has(5)
-        save(tmp_path / "a.nsg", text.replace("fps = 5", "fps = 7"))
-        has(7)
+    (tmp_path / "a.nsg").write_text(HEAD + square(9))
+    with Watcher(tmp_path, "-o", "a.gif", "--backend", "reference") as watcher:
+        for rate in (5, 8):
+            save(tmp_path / "a.nsg", (HEAD + square(90)).replace("fps = 5", f"fps = {rate}"))
+            watcher.shows("a.gif", rate, lambda image: getattr(image, "n_frames", 1))
         watcher.said("a.gif: ", 2)
-        assert watcher.end() == 130
-    finally:
-        watcher.process.kill()
-        watcher.process.communicate()
     assert sorted(os.listdir(tmp_path)) == ["a.gif", "a.nsg"]
 
 
-def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing better is known, coloured characters; never more than the screen holds."""
     pytest.importorskip("textual_image")
-    from scenelang.output.watch import Screen
-
-    picture = Image.new("RGBA", (4000, 3000), (200, 10, 20, 255))
-    never, auto = Screen("never", False), Screen("auto", False)
-    for screen in (never, auto):
+    picture = Image.new("RGBA", (1000, 750), (200, 10, 20, 255))
+    for screen in (Screen("never", False), Screen("auto", False)):
         screen.show(picture)
         assert not screen.shows
     assert capsys.readouterr().out == ""
@@ -199,18 +155,9 @@ def test_pictures_in_terminals(capsys: pytest.CaptureFixture[str]) -> None:
     assert "▀" in shown
     assert "38;2;200;10;20" in shown
     assert 4 <= shown.count("\n") <= 24
-
-
-def test_terminals_that_misbehave(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Some report a size of 0 columns: the watcher says so once and goes on."""
-    pytest.importorskip("textual_image")
-    from scenelang.output import watch as module
-
-    monkeypatch.setattr(module, "over_grey", lambda _: 1 // 0)
-    screen = module.Screen("always", False)
-    picture = Image.new("RGB", (8, 8))
+    # Some terminals report a size of 0 columns: the watcher says so once and goes on.
+    monkeypatch.setattr(watch, "over_grey", lambda _: 1 // 0)
+    screen = Screen("always", False)
     screen.show(picture)
     screen.show(picture)
     assert capsys.readouterr().out.count("cannot show pictures in this terminal") == 1

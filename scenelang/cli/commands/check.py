@@ -101,6 +101,7 @@ def command(
         settled = scenes.fix()
         changed = {n: text for n, text in settled.texts.items() if text != scenes.sources[n].text}
         left = [d for _, d in settled.left]
+        wrong = any(strict or d.severity == "error" for d in left)
         if diff:
             for name, text in changed.items():
                 show_difference(scenes.sources[name].name, scenes.sources[name].text, text, color)
@@ -112,7 +113,7 @@ def command(
         if not quiet:
             _say_fixed(scenes, settled, "would fix" if diff else "fixed", lost)
         if diff:
-            ctx.exit(2 if not readable else int(bool(changed) or _wrong(left, strict)))
+            ctx.exit(2 if not readable else int(bool(changed) or wrong))
         readable &= not lost
     stream = sys.stderr if to_stderr else sys.stdout
     if kind == "human":
@@ -123,11 +124,7 @@ def command(
     if all_frames and scenes.unseen:
         unseen = plural(scenes.unseen, "frame")
         click.echo(f"{unseen} left out: together they exceed the limits of one.", err=True)
-    ctx.exit(2 if not readable else int(_wrong(left, strict)))
-
-
-def _wrong(left: Sequence[Diagnostic], strict: bool) -> bool:
-    return any(strict or d.severity == "error" for d in left)
+    ctx.exit(2 if not readable else int(any(strict or d.severity == "error" for d in left)))
 
 
 def _store(changed: Mapping[str, str]) -> set[str]:
@@ -204,12 +201,7 @@ class Scenes(Record, frozen=False):
     def check(
         self, sources: Mapping[str, SourceFile] | None = None, texts: Mapping[Path, str] | None = None
     ) -> Diagnostics:
-        """All diagnostics that are wanted; those of other texts where these are given.
-
-        Args:
-            sources: the scenes.
-            texts: imported files by their resolved paths.
-        """
+        """All diagnostics that are wanted; of other scenes, and imports by resolved paths, if given."""
         # `Defines` record the params that they were used for, so each round needs its own.
         given = self.request.source
         request = replace(self.request, source=replace(given, params=Defines(given.values), texts=texts))
@@ -220,11 +212,11 @@ class Scenes(Record, frozen=False):
             self.unseen += check_evaluated(*facts, frames=self.frames)
             parts.append(result.diagnostics.items)
         every = merged([*parts, unused_defines(request)])
-        every.items[:] = [d for d in every.items if d.severity == "error" or self._selects(d.code)]
+        wanted = ("E", *(self.select or "W"))
+        every.items[:] = [
+            d for d in every if d.code.startswith(wanted) and not d.code.startswith(self.ignore)
+        ]
         return every
-
-    def _selects(self, code: str) -> bool:
-        return code.startswith(self.select or "W") and not (self.ignore and code.startswith(self.ignore))
 
     def owner(self, diagnostic: Diagnostic) -> str | None:
         """The name of the scene that a diagnostic is in; None for an import that was not named."""

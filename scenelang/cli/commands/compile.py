@@ -11,7 +11,7 @@ from scenelang.cli.say import Clock
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
-@click.option("-o", "--out", required=True, metavar="OUT", help="Program to write, .safetensors.")
+@options.writes("OUT", "Program to write, .safetensors.")
 @options.request()
 @options.strict
 @options.verbose

@@ -140,22 +140,18 @@ def _whole(job: Input, wanted: tuple[str, ...], kind: str) -> Iterator[dict[str,
             yield {"stage": name, **({key: data(value)} if kind == "json" else {"text": text(value)})}
 
 
-# ---------------------------------------------------------------- drawings
-
-
 def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
     """The graph of a stage as Mermaid or DOT, of so many boxes at most."""
-    from scenelang.editors.dumps import draw_graph, draw_program, draw_scene, to_dot, to_mermaid
+    from scenelang.editors import dumps
 
-    assert job.scene is not None
-    assert job.program is not None
-    if stage == "scene":
-        drawing = draw_scene(job.scene, most)
-    elif stage == "program":
-        drawing = draw_program(job.program, most)
+    if stage in job.graphs:
+        drawing = dumps.draw_graph(job.graphs[stage], most)
+    elif stage == "program" and job.program is not None:
+        drawing = dumps.draw_program(job.program, most)
     else:
-        drawing = draw_graph(job.graphs[stage], most)
-    return to_mermaid(drawing) if kind == "mmd" else to_dot(drawing)
+        assert job.scene is not None
+        drawing = dumps.draw_scene(job.scene, most)
+    return dumps.to_mermaid(drawing) if kind == "mmd" else dumps.to_dot(drawing)
 
 
 def _picture(kind: str, text: str) -> bytes:
@@ -178,9 +174,6 @@ def _picture(kind: str, text: str) -> bytes:
     return done.stdout
 
 
-# ---------------------------------------------------------------- costs
-
-
 def _plan(job: Input, request: options.Request, how: How) -> dict[str, Any]:
     """Draw the scene and say what that took."""
     from scenelang.drawing.torch_backend import choose_device, open_model
@@ -201,9 +194,8 @@ def _costs_text(plan: dict[str, Any]) -> str:
     else:
         others = "no other has all the scene uses" if plan["lacking"] else "there is no other"
     tokens = ", ".join(f"{number:,} {word}" for word, number in plan["tokens"].items())
-    if cost["unknown"] is not None:
-        error = f"not known: {cost['unknown']}"
-    else:
+    error = f"not known: {cost['unknown']}"
+    if cost["unknown"] is None:
         flip = "" if cost["flip"] is None else f", FLIP {cost['flip']:.4f},"
         error = f"{cost['psnr']:.2f} dB PSNR (50 at most){flip} against the exact picture"
     return "\n".join(

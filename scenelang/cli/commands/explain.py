@@ -37,7 +37,9 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
     if wanted in CODES:
         _print_page(read_page(wanted), kind, painted)
         return
-    about = _about(wanted) if len(wanted) >= 3 else []
+    word, about = _plain(wanted), []
+    if len(word) >= 3:
+        about = [code for code in CODES if word in _plain(read_page(code).text)]
     if not about:
         near = get_close_matches(wanted.upper(), list(CODES), 3, 0.7)
         advice = "Codes look like E0401 and W0501; `scenelang explain --list` shows all."
@@ -47,13 +49,9 @@ def command(code: str | None, listed: bool, kind: str, color: options.Color) -> 
     _print_list(about, kind, painted)
 
 
-def _about(word: str) -> list[str]:
-    """The codes whose pages have a word, in British or American spelling, in their text or examples."""
-
-    def plain(text: str) -> str:
-        return text.lower().replace("colour", "color").replace("grey", "gray")
-
-    return [code for code in CODES if plain(word) in plain(read_page(code).text)]
+def _plain(text: str) -> str:
+    """Lower case, in American spelling."""
+    return text.lower().replace("colour", "color").replace("grey", "gray")
 
 
 def _print_list(codes: list[str], kind: str, painted: bool) -> None:
@@ -72,19 +70,12 @@ def _print_list(codes: list[str], kind: str, painted: bool) -> None:
 
 def _print_page(page: Page, kind: str, painted: bool) -> None:
     if kind == "json":
-        data = {
-            "version": 1,
-            "code": page.code,
-            "severity": page.severity,
-            "area": page.area,
-            "title": page.title,
-            "text": page.text,
-            "examples": [
-                {"kind": e.kind, "language": e.language, "text": e.text, "options": list(e.options)}
-                for e in page.examples
-            ],
-            "files": dict(page.files),
-        }
+        examples = [
+            {"kind": e.kind, "language": e.language, "text": e.text, "options": list(e.options)}
+            for e in page.examples
+        ]
+        data = {key: getattr(page, key) for key in ("code", "severity", "area", "title", "text")}
+        data = {"version": 1, **data, "examples": examples, "files": dict(page.files)}
         click.echo(json.dumps(data, indent=2, ensure_ascii=False))
         return
     width = min(shutil.get_terminal_size((_WIDEST, 24)).columns, _WIDEST)

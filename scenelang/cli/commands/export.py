@@ -12,7 +12,7 @@ from scenelang.cli.say import Clock, say_trouble
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@click.option("-o", "--out", required=True, metavar="OUT", help="Page (.html) or folder to write.")
+@options.writes("OUT", "Page (.html) or folder to write.")
 @click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
 @options.request()
 @options.strict

@@ -39,7 +39,7 @@ def command(ctx: click.Context, paths: tuple[str, ...], check: bool, diff: bool)
     """
     names, readable = scenes_of(paths)
     with deep_stack():
-        counts: Counter[str] = Counter(_format(name, check, diff) for name in names)
+        counts = Counter[str](_format(name, check, diff) for name in names)
     would = "would be " if check or diff else ""
     told = {
         "changed": f"{would}formatted",

@@ -18,9 +18,7 @@ from scenelang.cli.say import Bar
 
 @click.command("learn")
 @click.argument("files", metavar="FILE…", nargs=-1, required=True)
-@click.option(
-    "-o", "--out", required=True, metavar="ZOO", help="File of elements to write or to add to, .safetensors."
-)
+@options.writes("ZOO", "File of elements to write or to add to, .safetensors.")
 @click.option("--name", metavar="NAME", help="Name of the element; by default the file's.")
 @options.choice(
     "--as",

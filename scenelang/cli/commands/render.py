@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import click
 
 from scenelang.cli import options
 from scenelang.cli.files import PROGRAM, check_outputs, targets
-from scenelang.cli.main import Trouble
-from scenelang.cli.say import Bar, Clock
+from scenelang.cli.main import Trouble, describe
+from scenelang.cli.say import Bar, Clock, say_diagnostics
 from scenelang.drawing.how import How, threads_for
-from scenelang.language.diagnostics import plural
+from scenelang.language.diagnostics import listing, plural
+from scenelang.language.reports import SceneError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from scenelang.cli.inputs import Input
+    from scenelang.cli.options import Film
     from scenelang.drawing.image import Image, Output
-
+    from scenelang.output.frames import Target
 
 _SECTIONS: Final = {
     "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
@@ -32,13 +34,7 @@ _SECTIONS: Final = {
 
 @click.command("render", cls=options.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    metavar="OUT",
-    help="Picture, animation, numbered pictures or folder to write.",
-)
+@options.writes("OUT", "Picture, animation, numbered pictures or folder to write.")
 @options.request()
 @options.film()
 @options.drawing()
@@ -53,12 +49,10 @@ _SECTIONS: Final = {
 @options.positive(
     "--max-ms", "N", "Choose the most exact way to draw that takes at most N milliseconds on one thread."
 )
-@click.option(
-    "--max-flip",
+@options.text(
+    "--max-flip", "E", "Choose the fastest way to draw whose promised FLIP error is at most E.",
     type=options.Real(0, 1),
-    metavar="E",
-    help="Choose the fastest way to draw whose promised FLIP error is at most E.",
-)
+)  # fmt: skip
 @options.originals
 @options.strict
 @options.verbose
@@ -118,15 +112,13 @@ def command(
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
         target = film.target(files[0], out)
         if target is not None:
-            from scenelang.cli.animation import animate, moves
-
             result = read_input(files[0], request, clock, how)
-            if moves(result, target, film, out):
+            if _moves(result, target, film, out):
                 if limits or prove:
                     what = "a proof is" if prove else "--max-ms and --max-flip are"
                     raise click.UsageError(f"{what} for single pictures; --frame draws one of an animation.")
                 result.diagnostics.items += unused_defines(request)
-                animate(result, target, film, out, outputs, strict, verbose)
+                _animate(result, target, film, out, outputs, strict, verbose)
                 return
     elif film.certain:
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
@@ -153,8 +145,11 @@ def command(
     told: list[str] = []
     with Bar() as bar:
         for index, (job, path) in enumerate(able):
-            progress = partial(_progress, bar, index, len(able))
-            told += _save(job, path, outputs, (prove, redraw), clock, progress)
+
+            def progress(share: float, done: int = index) -> None:
+                bar("drawing", done + share, len(able))
+
+            told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
                 lines = "".join(f"\n  {note}" for note in job.notes)
                 click.echo(f"{job.name} -> {path}{lines}", err=True)
@@ -165,27 +160,92 @@ def command(
     ctx.exit(code)
 
 
-def _progress(bar: Bar, index: int, count: int, share: float) -> None:
-    bar("drawing", index + share, count)
+def _moves(job: Input, target: Target, film: Film, out: str) -> bool:
+    """True where a scene is drawn as an animation, or has errors; refuses ``out`` that holds no picture."""
+    from scenelang.output.frames import PICTURES
+
+    if job.diagnostics.errors or (job.evaluation is not None and job.evaluation.animates):
+        return True
+    if film.certain:
+        which = "--frames" if film.frames is not None else "--fps"
+        job.diagnostics.add("E0337", f"{which} for a scene without animate(…)", None)
+        return True
+    if target.kind == "sequence":
+        return "%" in out
+    if target.path.suffix.lower() in PICTURES:
+        return True
+    fact = f"`{out}` is for animations, and the scene has no animate(…)"
+    raise click.UsageError(f"{fact}; {listing(sorted(PICTURES))} hold a picture too.")
+
+
+def _animate(
+    job: Input, target: Target, film: Film, out: str, outputs: tuple[Output, ...], strict: bool, verbose: bool
+) -> None:
+    """Draw an animation and report what was written; ``out`` is the target as the user wrote it."""
+    from rich.filesize import decimal
+
+    from scenelang.output.animate import make
+    from scenelang.output.frames import Clip, FrameRange
+    from scenelang.output.painting import Painter
+
+    started, diagnostics = time.perf_counter(), job.diagnostics
+    drawn = job.evaluation or ((job.scene,) if job.scene is not None else ())
+    if diagnostics.errors or not drawn:
+        raise SceneError(diagnostics)
+    clip = Clip(drawn, diagnostics)
+    numbers = clip.numbers(film.frames or FrameRange())
+    if strict and diagnostics.items:
+        raise SceneError(diagnostics)
+    if outputs and target.kind != "sequence":
+        what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
+        raise click.UsageError(f"{what}.")
+    check_outputs([target.file(number) for number in numbers], outputs)
+    try:
+        with Bar() as bar:
+            result = make(
+                Painter(clip, job.how, outputs=outputs), target, numbers, jobs=film.jobs,
+                cluster=film.cluster, palette=film.palette, dither=film.dither, strict=strict,
+                progress=lambda now: bar(now.told, now.done, now.total),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        if target.work.exists():
+            note = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
+            click.echo(note, err=True)
+        raise
+    except OSError as error:
+        raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
+    say_diagnostics(diagnostics)
+    first, last = result.files[0], result.files[-1]
+    name = f"{first} … {last.name}" if len(result.files) > 1 else str(first)
+    parts = [plural(result.frames, "frame"), decimal(sum(file.stat().st_size for file in result.files))]
+    if result.resumed:
+        parts.append(f"{result.resumed} kept from a run before")
+    if same := result.frames - result.drawn - result.resumed:
+        parts.append(f"{same} the same as others")
+    click.echo(f"{name}: {', '.join(parts)}, {time.perf_counter() - started:.1f} s", err=True)
+    strays = {path.name for path in target.there()} if target.kind == "sequence" else set()
+    if strays := strays - {file.name for file in result.files}:
+        count, among = plural(len(strays), "such file"), " among them" if len(strays) > 1 else ""
+        found = f"{count} of another run, `{min(strays)}`{among}"
+        click.echo(f"note: `{target.path}` also holds {found}", err=True)
+    for line in result.lines() if verbose else ():
+        click.echo(f"  {line}", err=True)
 
 
 def _save(
     job: Input,
     path: Path,
     outputs: tuple[Output, ...],
-    proof_options: tuple[bool, bool],
+    prove: bool,
+    redraw: bool,
     clock: Clock,
     progress: Callable[[float], None],
 ) -> list[str]:
-    """Draw a job to a file; lines about it.
-
-    Args:
-        proof_options: prove the picture, and draw again what is not proved right.
-    """
+    """Draw a job to a file, with a proof and what is not proved drawn again if need be; lines about it."""
     from scenelang.drawing.image import Outputs, save_outputs
     from scenelang.drawing.render import outputs_of, prove_drawn
 
-    (prove, redraw), proof, result = proof_options, None, Outputs()
+    proof, result = None, Outputs()
     drawn = job.scene if job.how.backend == "reference" else job.program
     if outputs and drawn is not None:  # before the picture: what it lacks is said at once
         with clock("outputs"):
@@ -210,7 +270,7 @@ def _save(
 
 
 def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
-    """Draw a job with its options and add its notes; ``progress`` gets the share done, in [0, 1]."""
+    """Draw a job and add its notes; ``progress`` gets the share done, in [0, 1]."""
     from scenelang.drawing.render import draw, draw_exact
 
     how, program = job.how, job.program
@@ -220,9 +280,9 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
             image = draw_exact(job.scene, spans=job.spans, progress=progress)
         job.notes.append("drew the exact picture, four samples a pixel")
         return image
+    assert program is not None
     from scenelang.drawing.small import choose_drawer
 
-    assert program is not None
     library, why = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
     if library == "numpy":
         cores = how.threads or threads_for(program.canvas) if program.stage else 1

@@ -36,24 +36,16 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
 
 @click.command("sweep")
 @click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--out", required=True, metavar="OUT", help="Folder to write to, or pictures such as out/%05d.png."
-)
-@click.option(
-    "--grid",
-    multiple=True,
-    metavar="NAME=VALUES",
-    callback=_grid,
-    help="Values of a param: k=0..1/10 for ten, k=0.1,0.5, k=0..1 step 0.25, k=../5 of its own range, "
-    "or k alone for each choice. Of several all combinations are drawn.",
-)
-@click.option(
-    "--random",
-    multiple=True,
-    metavar="NAME,…",
-    callback=_random,
-    help="Params to draw at random from their ranges, or NAME=A..B from another range.",
-)
+@options.writes("OUT", "Folder to write to, or pictures such as out/%05d.png.")
+@options.text(
+    "--grid", "NAME=VALUES", "Values of a param: k=0..1/10 for ten, k=0.1,0.5, k=0..1 step 0.25, k=../5 of "
+    "its own range, or k alone for each choice. Of several all combinations are drawn.",
+    multiple=True, callback=_grid,
+)  # fmt: skip
+@options.text(
+    "--random", "NAME,…", "Params to draw at random from their ranges, or NAME=A..B from another range.",
+    multiple=True, callback=_random,
+)  # fmt: skip
 @options.count("--count", help="Number of pictures; by default the grid once.")
 @options.count("--seed", low=0, default=0, help="Seed of the random values.")
 @options.several(
