@@ -24,6 +24,36 @@ def moving() -> list[nsg.Scene]:
     return [nsg.loads(MOVING, frame=frame, size=SMALL) for frame in range(6)]
 
 
+def test_values_of_params_and_mistakes(tmp_path: Path) -> None:
+    path, text = tmp_path / "a.nsg", "param k = 0.5 in 0..1; square { scale(0.1 + k); }"
+    path.write_text(text)
+    expected = nsg.Scene(nodes=nsg.Object("square", nsg.Scale(1.0)))
+    assert nsg.load(path, k=0.9) == nsg.load(str(path), k="0.9") == expected
+    assert nsg.load(path, params={"k": 0.9}) == nsg.loads(text, k=0.9) == expected
+    with pytest.raises(nsg.SceneError, match="E0302") as caught:
+        nsg.loads("square { rotate(45); scale(foo); }")
+    assert [d.code for d in caught.value.diagnostics] == ["E0302", "E0201"]
+
+
+@pytest.mark.torch
+def test_public_names() -> None:
+    assert nsg.__all__ == sorted(nsg.__all__)
+    assert set(nsg.__all__) <= set(dir(nsg))
+    for name in nsg.__all__:
+        assert not Path(str(nsg.__file__)).with_name(name).is_dir()  # importing a package would hide it
+        assert getattr(nsg, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'lode'"):
+        nsg.lode  # noqa: B018
+
+
+def test_a_model_that_is_not_named_is_that_of_the_dimension() -> None:
+    for text, name in (("square { twirl(1); }", "shapes2d"), ("sphere;", "solids3d"), ("", "shapes2d")):
+        assert nsg.compile(nsg.loads(text)).model == name
+    assert nsg.compile(nsg.loads('model "textures2d"; square;')).model == "shapes2d"  # its earlier name
+    with pytest.raises(nsg.SceneError, match="E0514"):
+        nsg.compile(nsg.Scene(model="other"))
+
+
 def test_size_is_the_canvas_wherever_it_is_given(tmp_path: Path) -> None:
     (tmp_path / "a.nsg").write_text(MOVING)
     loaded = nsg.load(tmp_path / "a.nsg", size=SMALL)
@@ -65,20 +95,19 @@ def test_scenes_of_several_canvases_are_a_batch() -> None:
     assert np.array_equal(only, drawn[0])
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
+def test_what_scenes_cannot_be(tmp_path: Path) -> None:
+    calls: list[tuple[Callable[[Path], object], str]] = [
         (lambda out: nsg.animate([STAR, STAR], out), "fps says how fast"),
         (lambda out: nsg.animate([STAR, STAR.sized((9, 9))], out, fps=2), "several canvases"),
         (lambda out: nsg.animate([], out), "neither a path nor Scenes"),
         (lambda out: list(nsg.render_frames([1, 2])), "neither a path nor Scenes"),  # type: ignore[list-item]
         (lambda out: list(nsg.render_frames(STAR, params={"k": 1})), "params and root are for files"),
         (lambda out: list(nsg.render_frames([STAR], frames="3..4")), "frame 3"),
-    ],
-)
-def test_what_scenes_cannot_be(call: Callable[[Path], object], words: str, tmp_path: Path) -> None:
-    with pytest.raises((ValueError, nsg.FramesError), match=words):
-        call(tmp_path / "a.gif")
+        (lambda out: nsg.render_many(STAR, out), "several Scenes are drawn by `animate`"),  # type: ignore[arg-type]
+    ]
+    for call, words in calls:
+        with pytest.raises((TypeError, ValueError, nsg.FramesError), match=words):
+            call(tmp_path / "a.gif")
     assert not list(tmp_path.iterdir())
 
 
@@ -159,24 +188,9 @@ def test_mistakes_of_a_file_that_is_drawn_have_their_places(tmp_path: Path) -> N
         nsg.render(file)
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        nsg.compile,
-        nsg.render,
-        lambda x: nsg.render(x, backend="reference"),
-        lambda x: nsg.render_outputs(x, ("alpha",)),
-        nsg.prove,
-        lambda x: nsg.render_many(x, "never"),
-    ],
-)
-def test_what_is_neither_a_scene_nor_a_path(call: Callable[[Any], object]) -> None:
-    with pytest.raises(TypeError, match=r"^list where .* path"):
-        call([STAR])
-
-
-def test_a_scene_has_no_values_to_sweep(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="several Scenes are drawn by `animate`"):
-        nsg.render_many(STAR, tmp_path / "out")  # type: ignore[arg-type]
-    nsg.animate([STAR, STAR], tmp_path / "%d.png")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.png", "1.png"]
+def test_what_is_neither_a_scene_nor_a_path() -> None:
+    calls: list[Callable[[Any], object]] = [nsg.compile, nsg.render, nsg.prove]
+    calls += [lambda x: nsg.render(x, backend="reference"), lambda x: nsg.render_many(x, "never")]
+    for call in (*calls, lambda x: nsg.render_outputs(x, ("alpha",))):
+        with pytest.raises(TypeError, match=r"^list where .* path"):
+            call([STAR])
