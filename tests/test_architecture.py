@@ -12,6 +12,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from scenelang.language.tables import tables
+from tests.mutants import TARGETS
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "scenelang"
@@ -131,6 +132,12 @@ def test_files_and_folders_stay_small() -> None:
         if size > most
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_mutants_have_files_and_tests() -> None:
+    for pattern, tests in TARGETS.items():
+        assert list(ROOT.glob(pattern)), pattern
+        assert all((ROOT / test).exists() for test in tests), pattern
 
 
 def loaded_after(code: str) -> set[str]:

@@ -271,6 +271,11 @@ def test_values() -> None:
     assert value(" + ".join(["1"] * 190)) == value("(" * 190 + "190" + ")" * 190) == 190
 
 
+def test_step_and_as_are_names_too() -> None:
+    text = "fn step(as, k = 1,) = as * k; let as = 2; square { translate(step(as, k = 3), 0); }"
+    assert transform(run_text(text).good()).x == 6
+
+
 def test_rand_is_splitmix64() -> None:
     """SplitMix64 of the bits of 1.0 and 2.0, by the published recurrence in exact integers."""
 

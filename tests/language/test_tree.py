@@ -10,99 +10,25 @@ from scenelang.language.diagnostics import Span
 from tests.language.reading import MALFORMED, SCENES, read, read_well
 
 
-def show(node: Any) -> str:
-    """An expression with all its parentheses."""
-    match node:
-        case nodes.Number():
-            return f"{node.value:g}{node.unit}"
-        case nodes.NameRef():
-            return node.name.text
-        case nodes.Unary():
-            return f"({node.op}{show(node.operand)})"
-        case nodes.Binary():
-            return f"({show(node.left)} {node.op} {show(node.right)})"
-        case nodes.Conditional():
-            return f"({show(node.condition)} ? {show(node.then)} : {show(node.otherwise)})"
-        case nodes.Member():
-            return f"{show(node.value)}.{node.name.text}"
-        case nodes.Index():
-            return f"{show(node.value)}[{show(node.index)}]"
-        case nodes.Vector():
-            return f"[{', '.join(map(show, node.items))}]"
-        case nodes.CallExpr():
-            args = (f"{a.name.text}={show(a.value)}" if a.name else show(a.value) for a in node.args)
-            return f"{node.name.text}({', '.join(args)})"
-        case nodes.Range():
-            step = f" step {show(node.step)}" if node.step else ""
-            return f"{show(node.start)}{'..<' if node.exclusive else '..'}{show(node.stop)}{step}"
-        case nodes.Bool():
-            return str(node.value).lower()
-        case nodes.String():
-            return repr(node.value)
-        case nodes.MaterialExpr():
-            return f"material {node.name.text}" + (" {}" if node.body else "")
-    raise AssertionError(node)
-
-
 def expression(text: str) -> nodes.Expr:
     statement = read_well(f"let it = {text};").statements[0]
     assert isinstance(statement, nodes.Let)
     return statement.value
 
 
-def test_expressions() -> None:
-    wrong = []
-    for text, tree in (
-        ("-2^2", "(-(2 ^ 2))"),
-        ("2^3^2", "(2 ^ (3 ^ 2))"),
-        ("2^-1", "(2 ^ (-1))"),
-        ("1 - 2 - 3", "((1 - 2) - 3)"),
-        ("1 + 2 * 3 % 4", "(1 + ((2 * 3) % 4))"),
-        ("-a * b", "((-a) * b)"),
-        ("!a && b || c", "(((!a) && b) || c)"),
-        ("a < b == c >= d", "((a < b) == (c >= d))"),
-        ("a ? b : c ? d : e", "(a ? b : (c ? d : e))"),
-        ("(1 + 2) * 3", "((1 + 2) * 3)"),
-        ("v.x + w[0][1].y", "(v.x + w[0][1].y)"),
-        ("lib.wave(1, k = 2)", "lib.wave(1, k=2)"),
-        ("f()", "f()"),
-        ("f(1, 2,)", "f(1, 2)"),
-        ("[1, [2, 3],]", "[1, [2, 3]]"),
-        ("[]", "[]"),
-        ("0..3", "0..3"),
-        ("1..<n", "1..<n"),
-        ("0..1 step 0.25", "0..1 step 0.25"),
-        ("a + 1..b * 2", "(a + 1)..(b * 2)"),
-        ("(0..3)", "0..3"),
-        ("step(as, 2)", "step(as, 2)"),
-        ("a ? material flat : material m { hue(1turn); }", "(a ? material flat : material m {})"),
-        ("material lib.red", "material lib.red"),
-        ('"a\\"b\\\\\\n"', repr('a"b\\\n')),
-        ("true != false", "(true != false)"),
-    ):
-        if (shown := show(expression(text))) != tree:
-            wrong.append((text, shown))
-    assert wrong == []
-
-
-NUMBERS: list[tuple[str, float, str, bool]] = [
-    ("1", 1, "", True),
-    ("007", 7, "", True),
-    ("1.5", 1.5, "", False),
-    (".5", 0.5, "", False),
-    ("1.", 1, "", False),
-    ("1e-3", 1e-3, "", False),
-    ("2.5E+2", 250, "", False),
-    ("30deg", 30, "deg", True),
-    ("0.5rad", 0.5, "rad", False),
-    (".25turn", 0.25, "turn", False),
-    ("1e3ms", 1000, "ms", False),
-    ("2s", 2, "s", True),
-]
-
-
 def test_numbers() -> None:
-    for text, *meant in NUMBERS:
+    for text, *meant in (
+        ("1", 1, "", True),
+        ("007", 7, "", True),
+        (".5", 0.5, "", False),
+        ("1.", 1, "", False),
+        ("1e-3", 1e-3, "", False),
+        ("2.5E+2", 250, "", False),
+        ("30deg", 30, "deg", True),
+        (".25turn", 0.25, "turn", False),
+        ("1e3ms", 1000, "ms", False),
+        ("2s", 2, "s", True),
+    ):
         number = expression(text)
         assert isinstance(number, nodes.Number)
         assert [number.value, number.unit, number.is_integer] == meant
