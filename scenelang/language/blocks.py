@@ -281,19 +281,14 @@ def prepare_if(stmt: tree.If, place: Place) -> Action | None:
 
 
 class Replayed(Record, frozen=False):
-    """The action of a statement of a file or a group that runs at most once in a frame.
-
-    Args:
-        varies: whether frames change it, once that was asked.
-        kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
-    """
+    """The action of a statement of a file or a group that runs at most once in a frame."""
 
     action: Callable[[Any, Builder], None]
     needs: Needs
     session: Session
     span: Span
-    varies: bool | None = None
-    kept: tuple[Builder, SpanMap, int, int, int] | None = None
+    varies: bool | None = None  # whether frames change it, once that was asked
+    kept: tuple[Builder, SpanMap, int, int, int] | None = None  # what it added; steps, objects and parts
 
     def __call__(self, env: Any, out: Builder) -> None:
         """Run the statement, or replay what it did."""
@@ -332,12 +327,11 @@ def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
     """Test whether children may stand here, and report it if not."""
     if place.kind in HOLDERS:
         return True
-    if place.kind == "material":
-        help = "a material's block holds texture operations"
-        misplaced(place, span, f"{what} inside a material", name, help)
-    else:
+    within, help = "a material", "a material's block holds texture operations"
+    if place.kind != "material":
         help = "a block of an object or a call holds transforms and a material; use group { … } for children"
-        misplaced(place, span, f"{what} inside an object", name, help)
+        within = "an object"
+    misplaced(place, span, f"{what} inside {within}", name, help)
     return False
 
 
@@ -568,11 +562,7 @@ def place_called(
 
 
 def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None:
-    """A statement headed by the name of a geometry or a group.
-
-    Args:
-        called: what a Scene calls it.
-    """
+    """A statement headed by the name of a geometry or a group, which a Scene calls ``called``."""
     alias, _, name = called.partition(".")
     file = next(file for file in place.session.elements.values() if file.name == alias)
     zoo = file.zoo

@@ -63,7 +63,7 @@ class Source(Record):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Values for params, by name."""
+        """Values for params."""
         return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
 
     def parsed(self, diagnostics: Diagnostics) -> Source:
@@ -86,15 +86,10 @@ class Source(Record):
         return replace(self, text=text, tree=parse(text, diagnostics))
 
     def evaluation(
-        self,
-        diagnostics: Diagnostics,
-        *,
-        frame: int = 0,
-        replays: bool = False,
-        watch: Watch | None = None,
+        self, diagnostics: Diagnostics, *, frame: int = 0, replays: bool = False, watch: Watch | None = None
     ) -> Evaluation:
         """Prepare the scene; arguments as for `Evaluation`, and raises as `parsed`."""
-        return Evaluation(self.parsed(diagnostics), diagnostics, frame=frame, replays=replays, watch=watch)
+        return Evaluation(self.parsed(diagnostics), diagnostics, frame, replays, watch)
 
     def scene(self, diagnostics: Diagnostics, frame: int = 0) -> tuple[Scene | None, SpanMap]:
         """Evaluate one frame.
@@ -140,13 +135,7 @@ class Evaluation:
     """
 
     def __init__(
-        self,
-        source: Source,
-        diagnostics: Diagnostics,
-        *,
-        frame: int = 0,
-        replays: bool = False,
-        watch: Watch | None = None,
+        self, source: Source, diagnostics: Diagnostics, frame: int, replays: bool, watch: Watch | None
     ) -> None:
         assert source.tree is not None
         self.file = file = source.tree
@@ -154,18 +143,11 @@ class Evaluation:
         self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
         self._errors = len(diagnostics.errors)
         self._steps = self._objects = 0
-        self._session = session = Session(
-            Reporter(diagnostics),
-            EXPRESSIONS,
-            STATEMENTS,
-            frame,
-            source.fps,
-            replays=replays and self.animates,
-            watch=watch,
-        )
+        session = Session(Reporter(diagnostics), EXPRESSIONS, STATEMENTS, frame, source.fps, watch=watch)
+        session.replays = replays and self.animates
+        self._session = session
         path = None if source.path is None else Path(source.path).resolve()
-        folder = path.parent if path is not None else None
-        folder = folder if source.root is None else Path(source.root).resolve()
+        folder = (path and path.parent) if source.root is None else Path(source.root).resolve()
         loader = Loader(folder, [path] if path is not None else [], texts=source.texts or {})
         params = source.params
         self.inputs = given = params if isinstance(params, Defines) else Defines(params or {})
@@ -360,36 +342,22 @@ class ParamError(ValueError):
 
 
 class Axis(Record):
-    """One number, or one choice, that is searched.
+    """One number, or one choice, that is searched."""
 
-    Args:
-        label: what reports call it: ``k``, or ``ink.2`` of a vector.
-        low, high: of a continuous one, in base units.
-        choices: values there are, else; none where it is continuous.
-        wraps: whether both ends mean the same, as those of a full turn do.
-    """
-
-    label: str
-    low: float = 0.0
+    label: str  # what reports call it: ``k``, or ``ink.2`` of a vector
+    low: float = 0.0  # in base units
     high: float = 1.0
-    choices: tuple[Any, ...] = ()
-    wraps: bool = False
+    choices: tuple[Any, ...] = ()  # none where it is continuous
+    wraps: bool = False  # whether both ends mean the same, as those of a full turn do
 
 
 class Knob(Record):
-    """A param that is searched.
-
-    Args:
-        stmt: its statement.
-        value: its default.
-        axes: one, or one for each number of a vector.
-        inner: whether the value is a vector of the axes' numbers.
-    """
+    """A param that is searched."""
 
     stmt: nodes.Param
-    value: Any
-    axes: tuple[Axis, ...]
-    inner: bool
+    value: Any  # its default
+    axes: tuple[Axis, ...]  # one, or one for each number of a vector
+    inner: bool  # whether the value is a vector of the axes' numbers
 
     @property
     def name(self) -> str:
@@ -441,10 +409,8 @@ def check_width(name: str, low: float, high: float) -> None:
 
 def _axis(label: str, allowed: RangeValue) -> Axis:
     check_width(label, allowed.start, allowed.stop)
-    if allowed.step is not None and math.isinf((allowed.stop - allowed.start) / allowed.step):
-        raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
     if allowed.step is not None:
-        if allowed.count() > MOST_CHOICES:
+        if math.isinf((allowed.stop - allowed.start) / allowed.step) or allowed.count() > MOST_CHOICES:
             raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
         return Axis(label, choices=_few(label, tuple(allowed)))
     low, high = allowed.start, allowed.stop
@@ -483,11 +449,7 @@ def value_at(axis: Axis, u: float, like: Any) -> Any:
 
 
 def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:
-    """A value as its statement would have it: in the default's unit, with digits enough for its range.
-
-    Args:
-        digits: decimal places, of the range's width.
-    """
+    """A value as its statement would have it, in the default's unit; ``digits`` are of the range's width."""
     if not knob.inner:
         return _literal(value, knob.axes[0], knob.stmt.default, digits)
     if is_colour(knob.stmt.default):

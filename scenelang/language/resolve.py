@@ -41,21 +41,15 @@ _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.f
 
 
 class Symbol(Record, frozen=False):
-    """A definition.
-
-    Args:
-        node: its statement or formal parameter.
-        since: the offset from which on it is in sight.
-        owner: the fn or module that it is a parameter of.
-    """
+    """A definition."""
 
     name: str
     kind: Kind
     span: Span
     node: tree.Stmt | tree.Parameter
     scope: Scope
-    since: int
-    owner: Symbol | None = None
+    since: int  # the offset from which on it is in sight
+    owner: Symbol | None = None  # the fn or module that it is a parameter of
     params: list[Symbol] = field(default_factory=list)
 
     @property
@@ -85,22 +79,15 @@ class Scope(Record, frozen=False):
 
 
 class Use(Record, frozen=False):
-    """A place where a name stands.
-
-    Args:
-        start, end: the place.
-        symbol: its definition in this file, or that of the import a member belongs to.
-        callee: for an argument, the use of what is called.
-        defines: whether this is the definition itself.
-    """
+    """A place where a name stands."""
 
     start: int
     end: int
     text: str
     role: Role
-    symbol: Symbol | None = None
-    callee: Use | None = None
-    defines: bool = False
+    symbol: Symbol | None = None  # its definition in this file, or that of the import a member belongs to
+    callee: Use | None = None  # for an argument, the use of what is called
+    defines: bool = False  # whether this is the definition itself
 
 
 class Names:

@@ -333,11 +333,7 @@ def _range_meant(value: Any, allowed: Any, range: tree.Expr) -> tuple[str | None
 
 
 def within(value: Any, allowed: Any) -> bool:
-    """Test whether a value, or each number of a vector, is in a range or among choices.
-
-    Raises:
-        Problem: a value and a range that do not compare.
-    """
+    """Test whether a value, or each number of a vector, is in a range or among choices; raises Problem."""
     if allowed.__class__ is Vec:
         return any(equal(value, choice) for choice in allowed.items)
     if value.__class__ is Vec:

@@ -30,12 +30,9 @@ class Problem(Exception):
     Args:
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
-            with the fix; a ``colour`` of a string.
+        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, a ``colour`` of a string.
         notes: words for further operands, by their numbers.
-        found: the kind that is odd about a value, whatever was going to be done with it. Problems that found
-            the same may have one cause.
-        expected: the kind that was expected.
+        found: the kind that is odd about a value; problems that found the same may have one cause.
     """
 
     def __init__(
@@ -84,11 +81,7 @@ class Time(_Quantity):
 
 
 class Vec:
-    """A vector of values.
-
-    Raises:
-        Problem: more than `MAX_VECTOR` numbers, or nested deeper than `MAX_VECTOR_DEPTH`.
-    """
+    """A vector of values; raises Problem beyond `MAX_VECTOR` numbers or `MAX_VECTOR_DEPTH` levels."""
 
     __slots__ = ("count", "depth", "items")
 
@@ -112,21 +105,13 @@ class Vec:
 
 
 class RangeValue(Record):
-    """Numbers, angles or times from ``start`` towards ``stop``, made one at a time.
-
-    Args:
-        start: first value, in base units.
-        stop: bound, in base units.
-        exclusive: whether ``stop`` itself is left out.
-        step: distance of neighbours, not 0; None where none was written, which steps by 1.
-        unit: ``number``, ``angle`` or ``time``.
-    """
+    """Numbers, angles or times from ``start`` towards ``stop``, in base units, made one at a time."""
 
     start: float
     stop: float
-    exclusive: bool
-    step: float | None
-    unit: str
+    exclusive: bool  # whether ``stop`` itself is left out
+    step: float | None  # not 0; None where none was written, which steps by 1
+    unit: str  # ``number``, ``angle`` or ``time``
 
     def count(self) -> int:
         """Number of values; 0 when descending."""
@@ -268,12 +253,9 @@ COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
 
 
 def same_unit(a: float, ua: str, b: float, ub: str) -> str:
-    """The common unit of two scalars for sums and comparisons.
+    """The common unit of two scalars for sums and comparisons; raises Problem where there is none.
 
     A bare number beside a time is seconds; 0 goes with any angle.
-
-    Raises:
-        Problem: a number other than 0 with an angle, or a time with an angle.
     """
     if ua == ub:
         return ua
