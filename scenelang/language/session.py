@@ -80,7 +80,7 @@ class Definition(Record, frozen=False):
 class Binding(Record, frozen=False):
     """Meaning of a name.
 
-    Its value is a `Definition`, an imported file, a Scene's name of an element, or that of a constant ``let``.
+    Its value: a `Definition`, an imported file, a Scene's name of an element, or that of a constant ``let``.
     """
 
     kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
