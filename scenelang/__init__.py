@@ -12,7 +12,6 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from scenelang.assets.notebook import set_notebook as set_notebook
     from scenelang.compiler.check import check as check
     from scenelang.compiler.check import check_text as check_text
     from scenelang.compiler.check import fix_text as fix_text
@@ -70,11 +69,11 @@ if TYPE_CHECKING:
     from scenelang.output.frames import FramesError as FramesError
     from scenelang.output.sweep import render_many as render_many
     from scenelang.web.export import export as export
+    from scenelang.web.notebook import set_notebook as set_notebook
 
 
 # Module -> public names it defines. A new public name is added here and above.
 _HOME: Final = {
-    "scenelang.assets.notebook": "set_notebook",
     "scenelang.compiler.check": "check check_text fix_text",
     "scenelang.compiler.compile": "compile",
     "scenelang.compiler.program": "load_program Place Program ProgramError",
@@ -97,15 +96,26 @@ _HOME: Final = {
     "scenelang.output.frames": "FramesError",
     "scenelang.output.sweep": "render_many",
     "scenelang.web.export": "export",
+    "scenelang.web.notebook": "set_notebook",
 }
 _MODULE: Final = {name: module for module, names in _HOME.items() for name in names.split()}
 
 __all__ = sorted(_MODULE)
 
 
+def _show(value: Any, canvas: tuple[int, int], said: str) -> dict[str, Any]:
+    """Show a Scene or Program in a notebook."""
+    from scenelang.web.notebook import bundle
+
+    return bundle(value, canvas, said)
+
+
 def __getattr__(name: str) -> Any:
     if name not in _MODULE:
         raise AttributeError(f"module 'scenelang' has no attribute {name!r}")
+    from scenelang.assets import notebook
+
+    notebook.show = _show
     value = getattr(importlib.import_module(_MODULE[name]), name)
     globals()[name] = value
     return value

@@ -22,9 +22,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets import notebook
 from scenelang.assets.element import Element
 from scenelang.assets.files import read_regular, write_output
-from scenelang.assets.notebook import bundle
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 from scenelang.assets.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
 from scenelang.assets.zoo import entry_of, read_elements
@@ -191,7 +191,7 @@ class Program:
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
         said = f"Program of {plural(len(self), 'object')} for `{self.model}`"
-        return bundle(self, self.canvas, said)
+        return notebook.show(self, self.canvas, said)
 
     def digest(self) -> str:
         """SHA-256, hex, of all that decides the picture: names and places in source text do not."""

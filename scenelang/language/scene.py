@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
+from scenelang.assets import notebook
 from scenelang.assets.element import Element, Part
 from scenelang.assets.files import depth_of_json, no_number
 from scenelang.assets.records import Record, deep_stack
@@ -274,10 +275,7 @@ class Scene(Frozen):
     __str__ = __repr__
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any]:
-        count = len(self.nodes)
-        from scenelang.assets.notebook import bundle
-
-        return bundle(self, self.canvas, f"Scene of {plural(count, 'node')}")
+        return notebook.show(self, self.canvas, f"Scene of {plural(len(self.nodes), 'node')}")
 
     def to_nsg(self) -> str:
         """Canonical text that evaluates back to an equal Scene."""
