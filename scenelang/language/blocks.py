@@ -85,10 +85,7 @@ def prepare_inner(block: tree.Block | None, place: Place) -> Body:
 
 
 def _collected(stmt: tree.Stmt, place: Place) -> Action | None:
-    """`prepare_statement`, noting what the statement depends on; one that no frame changes runs once.
-
-    That holds of statements of a file or its groups. Loops and modules run more than once in a frame.
-    """
+    """`prepare_statement`, noting dependencies; what no frame changes, in a file or its groups, runs once."""
     session = place.session
     if not session.replays or place.repeated or place.scope.slots.root is None:
         return prepare_statement(stmt, place)
@@ -120,10 +117,10 @@ def _unbind(scope: Scope) -> list[Action]:
 def misplaced(
     place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
-    """Report a statement in the wrong place, unless nothing is known about the place.
+    """Report a statement in the wrong place; several in one block with the same ``fact`` are one report.
 
-    Several in one block with the same ``fact``, a message with ``{}`` for the name, are one report: it is the
-    block that is of the wrong kind.
+    Args:
+        fact: the message, with ``{}`` for the name.
     """
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
@@ -436,19 +433,19 @@ def _width(stmt: tree.Node | tree.Combined, place: Place) -> Callable[[Env], flo
     if not bound or bound[0] is None:
         return lambda env: None
     get, operand = bound[0].code.run, bound[0].arg.value
-    check = guarded(place, _above_0, operand.span, (operand,))
+
+    def above_0(k: Any) -> float:
+        if number(k) <= 0.0:
+            raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
+        return float(k)
+
+    check = guarded(place, above_0, operand.span, (operand,))
 
     def run(env: Env) -> float | None:
         k = check(get(env))
         return None if k is POISON else blend_width(op, float(k))
 
     return run
-
-
-def _above_0(k: Any) -> float:
-    if number(k) <= 0.0:
-        raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
-    return float(k)
 
 
 def _finish(

@@ -69,9 +69,7 @@ class Source(Record):
     def parsed(self, diagnostics: Diagnostics) -> Source:
         """The same with its text and tree; mistakes of the syntax are reported once, here.
 
-        Raises:
-            SceneError: the file is not text.
-            OSError: it cannot be opened.
+        Raises OSError where the file cannot be opened, and SceneError where it is not text.
         """
         if self.tree is not None:
             return self
@@ -92,17 +90,9 @@ class Source(Record):
         return Evaluation(self.parsed(diagnostics), diagnostics, frame, replays, watch)
 
     def scene(self, diagnostics: Diagnostics, frame: int = 0) -> tuple[Scene | None, SpanMap]:
-        """Evaluate one frame.
+        """Evaluate one frame: the Scene, None if anything is wrong with it, and where its nodes were written.
 
-        Args:
-            diagnostics: where mistakes go, in the order of the text.
-
-        Returns:
-            The Scene, or None if anything is wrong with it, and where its nodes were written.
-
-        Raises:
-            OSError: the file cannot be opened.
-            ValueError: ``size`` is not a canvas.
+        Mistakes are reported in the order of the text; raises OSError for the file, ValueError for ``size``.
         """
         before, start = len(diagnostics.errors), len(diagnostics)
         try:
@@ -119,14 +109,12 @@ def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) ->
 
 
 class Evaluation:
-    """A file prepared once, to be run for any number of frames.
+    """A file prepared once, to be run for any number of frames; the first with a mistake reports it.
 
     Args:
         source: the scene; its text is parsed.
-        diagnostics: where mistakes go; each is reported for the first frame that has it.
         frame: the first frame that is run, from 0.
-        replays: run what no frame changes once.
-        watch: shown every name's value and every node; see `Session`.
+        replays, watch: see `Session`.
 
     Attributes:
         wanted: all files that it imports, also those that are not there.
@@ -185,10 +173,7 @@ class Evaluation:
                 self.diagnostics.add("W0303", message, span, help=help)
 
     def run(self, frame: int) -> tuple[Scene | None, SpanMap]:
-        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame.
-
-        What is found in another frame than the first has the frame's number.
-        """
+        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame."""
         session, before = self._session, len(self.diagnostics)
         if not self.animates and frame != 0:
             self.diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
@@ -311,13 +296,7 @@ def loads(
 def opened(
     given: Scene | str | os.PathLike[str], diagnostics: Diagnostics, size: tuple[int, int] | None = None
 ) -> tuple[Scene, SpanMap | None]:
-    """A Scene as it is, or that of a file, and where its nodes were written.
-
-    Raises:
-        SceneError: the file has errors.
-        TypeError: neither a Scene nor a path.
-        ValueError, OSError: as `load`.
-    """
+    """A Scene as it is, or a file's, and where its nodes were written; raises TypeError, and as `load`."""
     if isinstance(given, Scene):
         return given if size is None else given.sized(size), None
     if not isinstance(given, str | os.PathLike):
