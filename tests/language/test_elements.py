@@ -326,13 +326,6 @@ def test_materials_of_elements(garage: Path) -> None:
     jsonschema.validate(json.loads(scene.to_json()), scene_schema())
 
 
-def test_materials_come_through_other_files(garage: Path) -> None:
-    library = f"{IMPORT} let bark = material zoo.bark {{ flip(); }}; module tile() {{ square {{ bark; }} }}"
-    text = 'import "lib.nsg" as lib; square { lib.bark { hue(0.1turn); } } lib.tile();'
-    found = worn(garage, text, lib=library)
-    assert found == [nsg.Material("zoo.bark", (FLIP, TURN)), nsg.Material("zoo.bark", FLIP)]
-
-
 def test_mistakes(garage: Path) -> None:
     (garage / "text.safetensors").write_text("let size = 1;")
     (garage / "lib.nsg").write_text("let bark = material flat;")

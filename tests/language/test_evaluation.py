@@ -375,19 +375,6 @@ def test_a_range_may_be_computed() -> None:
     assert run_text(text, params={"p": "4.5"}).codes == ["E0309"]
 
 
-def test_declarations_that_are_wrong() -> None:
-    for text, code in (
-        ("param p = none;", "E0301"),
-        ("param p = 0..1;", "E0301"),
-        ("param p = material flat;", "E0301"),
-        ("param p = 1 in 2;", "E0301"),
-        ('param p = "a" in 0..1;', "E0301"),
-        ("param p = 1 in 0deg..90deg;", "E0302"),
-        ("param p = 2 in 1..0;", "E0309"),
-    ):
-        assert run_text(text).codes == [code], text
-
-
 def test_a_colour_by_its_name_is_told_its_number() -> None:
     outcome = run_text("param main = #d33;", params={"main": "red"})
     assert outcome.only().help == "colours have no names; red is #f00"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -90,27 +89,6 @@ def test_the_first_geometry_and_then_the_stage_say_the_dimension() -> None:
         ("torus; square;", 3),
     ):
         assert scene_dimension(run_text(text).good()) == dimension, text
-
-
-def test_what_models_refuse() -> None:
-    shapes, learned = load_manifest("shapes2d"), load_manifest("shapes2d-streaming")
-    other = replace(SOLIDS, any_blend=False)
-    for scene, manifest, codes in (
-        (nsg.Scene(camera=nsg.Camera(), ground=None), shapes, ["E0511", "E0511"]),
-        (nsg.Scene(camera=nsg.Camera(), ground=None), SOLIDS, []),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")] * 2, k=0.2)), other, ["E0512"]),
-        (nsg.Scene(nodes=nsg.Boolean("smooth", [nsg.Object("torus")], k=0.2)), other, []),
-        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("diffuse"))), shapes, ["E0502"]),
-        (nsg.Scene(nodes=nsg.Object("sphere", (), nsg.Material("wood", (), "volumetric"))), SOLIDS, []),
-        (nsg.Scene(nodes=nsg.Object("star", (), nsg.Material("wood"))), learned, ["E0509", "E0502"]),
-        (nsg.Scene(nodes=[nsg.Object("star"), nsg.Object("sphere")]), shapes, ["E0501"]),
-        (nsg.Scene(nodes=nsg.Group(nsg.Object("sphere"), nsg.Displace(1, 2))), SOLIDS, ["E0407"]),
-        (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Displace(1, 3)])), SOLIDS, ["E0407"]),
-        (nsg.Scene(nodes=nsg.Object("sphere", [nsg.Displace(1, 2), nsg.Twist(3)])), SOLIDS, []),
-    ):
-        found = Diagnostics()
-        lower(scene, manifest, None, found)
-        assert [d.code for d in found] == codes, scene.nodes
 
 
 def test_the_width_of_each_blend_reaches_the_graph() -> None:
