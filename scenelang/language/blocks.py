@@ -127,9 +127,6 @@ def misplaced(
         place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
 
 
-# ---------------------------------------------------------------- definitions
-
-
 def define(name: tree.Name, binding: Binding, place: Place) -> bool:
     """Bind a name in this scope; reports a second definition and keeps the first."""
     scope = place.scope
@@ -210,9 +207,6 @@ def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Pl
         definition.run, definition.weight = body
     session.needs = around
     definition.size = slots.size
-
-
-# ---------------------------------------------------------------- control flow
 
 
 def _items(value: Any) -> Any:
@@ -350,9 +344,6 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
         session.watch(where.statement, node)
 
 
-# ---------------------------------------------------------------- objects
-
-
 def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
@@ -390,9 +381,6 @@ def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -
         place_child(make(Object, fields), where, out, session)
 
     return action
-
-
-# ---------------------------------------------------------------- groups, booleans, chains
 
 
 def prepare_node(stmt: tree.Node, place: Place) -> Action | None:
@@ -461,9 +449,6 @@ def _finish(
     return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
 
 
-# ---------------------------------------------------------------- chains
-
-
 def _check_first(stmt: tree.Node, place: Place) -> None:
     """The first child that a chain names outright joins nothing and carries no word."""
     makers = (tree.Combined, tree.Call, tree.Node, tree.For, tree.If)
@@ -507,9 +492,6 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         out.op, out.k = "union", None
 
     return action
-
-
-# ---------------------------------------------------------------- modules
 
 
 def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -> Action | None:

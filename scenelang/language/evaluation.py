@@ -1,7 +1,6 @@
 """From the syntax tree to a concrete Scene, and params as values to choose among.
 
-A file is prepared (names resolved, expressions made into closures), then run once; both steps report
-what they find and go on. A Scene comes out only where nothing is wrong.
+A file is prepared (names resolved, expressions made into closures), then run; both steps report and go on.
 """
 
 from __future__ import annotations
@@ -401,17 +400,15 @@ def _axis(label: str, allowed: RangeValue) -> Axis:
 
 def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
     if not 0 < len(choices) <= MOST_CHOICES:
-        raise ParamError(
-            f"param `{name}` has {len(choices):,} choices, where 1 to {MOST_CHOICES:,} can be tried"
-        )
+        found = f"{len(choices):,} choices, where 1 to {MOST_CHOICES:,} can be tried"
+        raise ParamError(f"param `{name}` has {found}")
     return choices
 
 
 def is_colour(expr: nodes.Expr) -> bool:
     """Test whether an expression is written as a colour."""
-    return isinstance(expr, nodes.Color) or (
-        isinstance(expr, nodes.CallExpr) and expr.name.text in ("rgb", "hsv")
-    )
+    called = expr.name.text if isinstance(expr, nodes.CallExpr) else ""
+    return isinstance(expr, nodes.Color) or called in ("rgb", "hsv")
 
 
 def value_at(axis: Axis, u: float, like: Any) -> Any:
@@ -422,9 +419,6 @@ def value_at(axis: Axis, u: float, like: Any) -> Any:
         like = like.items[0]
     x = axis.low + u * (axis.high - axis.low)
     return like.__class__(x) if like.__class__ in (Angle, Time) else x
-
-
-# ---------------------------------------------------------------- values as text
 
 
 def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:

@@ -214,9 +214,6 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
     return computed(place, make, expr.span, parts)
 
 
-# ---------------------------------------------------------------- parts of values
-
-
 def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = COMPONENTS.get(name.text)

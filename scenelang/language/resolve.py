@@ -1,9 +1,4 @@
-"""Definitions and their uses, found without running anything.
-
-The walk follows the evaluator's rules of sight: functions and modules are known in their whole block,
-everything else from its line on, and an inner block may bind a name anew. One file is looked at by itself;
-what an imported file brings is asked of the `Library` when somebody wants to know.
-"""
+"""Definitions of a file and their uses, found without running anything by the evaluator's rules of sight."""
 
 from __future__ import annotations
 
@@ -138,8 +133,6 @@ class Names:
         """Definitions that files that import this one see."""
         return [symbol for symbol in self.top.symbols.values() if symbol.is_exported]
 
-    # ------------------------------------------------------------ definitions
-
     def _define(
         self,
         name: tree.Name,
@@ -177,8 +170,6 @@ class Names:
                 formal = self._define(param.name, "argument", param, around, param.span.end, symbol)
                 symbol.params.append(formal)
             self._walk(definition.body, around, "group")
-
-    # ------------------------------------------------------------ statements and expressions
 
     def _walk(self, node: Any, scope: Scope, kind: str) -> None:
         """Note the names in a statement or an expression, in a block of some kind."""
@@ -262,9 +253,8 @@ class Names:
             role = "operation"
         elif name in TRANSFORMS:
             role = "transform"
-        head = (
-            self._add(stmt.name.span, name, role) if role else self._reference(stmt.name, scope, "geometry")
-        )
+        span = stmt.name.span
+        head = self._add(span, name, role) if role else self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")

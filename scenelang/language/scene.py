@@ -348,8 +348,6 @@ def same_nodes(a: Scene, b: Scene) -> bool:
     )
 
 
-# ---------------------------------------------------------------- JSON
-
 Key = str | int
 _HEADINGS: Final = ("model", "geometry", "op", "name", "kind")
 """Keys that tell what a node is, the most telling first."""

@@ -1,7 +1,6 @@
 """One evaluation: limits, names, files that it may read, and what it shares.
 
-Names are resolved while a file is prepared, before it runs. A running file, function or module has one
-list of slots; slot 0 of a function's or module's list is the list it was defined in.
+A running file, function or module has one list of slots; slot 0 of a call's is the list it was defined in.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """Values of expressions: their kinds, operators, functions and constants.
 
-Numbers are Python floats, booleans and strings Python's own, ``none`` is None. A colour is a vector of
-three numbers. `POISON` stands for a value whose mistake has been reported; whatever meets it stays quiet.
-
-Everything here raises `Problem` and nothing else; results are finite.
+Numbers, booleans and strings are Python's, ``none`` is None, a colour is a vector. What meets `POISON`, a
+value whose mistake has been reported, stays quiet. Only `Problem` is raised; results are finite.
 """
 
 from __future__ import annotations
@@ -365,9 +363,7 @@ def equal(a: Any, b: Any) -> bool:
     if ca is not cb:
         raise _unfit(f"cannot compare {describe(a)} with {describe(b)}", a, b, 1, shared=False)
     if ca is Vec:
-        return len(a.items) == len(b.items) and all(
-            equal(x, y) for x, y in zip(a.items, b.items, strict=True)
-        )
+        return len(a.items) == len(b.items) and all(map(equal, a.items, b.items))
     return bool(a == b)
 
 
