@@ -26,7 +26,7 @@ from scenelang.language import scene_text as to_nsg
 from scenelang.language.resolve import Names, Symbol, Use
 from scenelang.language.tables import tables
 from scenelang.language.tree import walk
-from scenelang.language.values import POISON, Angle, MaterialValue, RangeValue, Time, Vec, pack, show
+from scenelang.language.values import Angle, MaterialValue, RangeValue, Time, Vec, pack, show
 from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, UNITS
 
 COLOURED: Final = ("color", "background", "light", "ground")
@@ -39,6 +39,7 @@ TYPES: Final = (
 MODIFIERS: Final = ("declaration", "readonly", "defaultLibrary")
 LEGEND: Final = types.SemanticTokensLegend(list(TYPES), list(MODIFIERS))
 _COMMENTS: Final = re.compile(r"//[^\n]*|/\*[\s\S]*?(?:\*/|\Z)")
+_LINE: Final = re.compile(r"[^\r\n]+")
 _ROLES: Final = {
     "function": ("function", 4),
     "constant": ("variable", 6),
@@ -112,15 +113,9 @@ def _tokens(docs: Workspace, document: Document, low: int, high: int) -> list[tu
 
 def _comments(text: str, start: int, end: int) -> list[tuple[int, int, str, int]]:
     """Comments between two tokens, line by line, as a token must not span lines."""
-    result = []
-    for match in _COMMENTS.finditer(text, start, end):
-        at = match.start()
-        for part in match[0].splitlines(keepends=True):
-            bare = part.rstrip("\r\n")
-            if bare:
-                result.append((at, at + len(bare), "comment", 0))
-            at += len(part)
-    return result
+    matches = _COMMENTS.finditer(text, start, end)
+    parts = (part for match in matches for part in _LINE.finditer(text, *match.span()))
+    return [(part.start(), part.end(), "comment", 0) for part in parts]
 
 
 def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
@@ -156,21 +151,19 @@ def colours(document: Document) -> list[types.ColorInformation]:
 def _colour(node: object, wanted: bool) -> tuple[float, float, float] | None:
     if isinstance(node, tree.Color):
         return node.rgb
+    letters, given = "rgb", []
     if isinstance(node, tree.Vector) and wanted:
-        return _clamped([_number(item) for item in node.items])
-    if isinstance(node, tree.CallExpr) and node.name.text in ("rgb", "hsv"):
-        order = ("r", "g", "b") if node.name.text == "rgb" else ("h", "s", "v")
-        given: dict[str, float | None] = {}
-        for index, arg in enumerate(node.args):
-            if index < 3:
-                name = arg.name.text if arg.name is not None else order[index]
-                given[name] = _number(arg.value)
-        parts = [given.get(name) for name in order]
-        rgb = _clamped(parts, first_free=node.name.text == "hsv")
-        if rgb is None or node.name.text == "rgb":
-            return rgb
-        return colorsys.hsv_to_rgb(rgb[0] % 1.0, rgb[1], rgb[2])
-    return None
+        given = [_number(item) for item in node.items]
+    elif isinstance(node, tree.CallExpr) and node.name.text in ("rgb", "hsv"):
+        letters = node.name.text
+        pairs = zip(letters, node.args, strict=False)
+        named = {arg.name.text if arg.name else letter: _number(arg.value) for letter, arg in pairs}
+        given = [named.get(letter) for letter in letters]
+    parts = [part for part in given if part is not None]
+    if not len(parts) == len(given) == 3:
+        return None
+    first, second, third = (min(max(part, 0.0), 1.0) for part in parts)
+    return colorsys.hsv_to_rgb(parts[0] % 1.0, second, third) if letters == "hsv" else (first, second, third)
 
 
 def _number(expr: tree.Expr) -> float | None:
@@ -182,14 +175,6 @@ def _number(expr: tree.Expr) -> float | None:
         return None
     per_turn = {"": 1.0, "turn": 1.0, "deg": 360.0, "rad": 6.283185307179586}
     return expr.value / per_turn[expr.unit] if expr.unit in per_turn else None
-
-
-def _clamped(parts: list[float | None], first_free: bool = False) -> tuple[float, float, float] | None:
-    known = [part for part in parts if part is not None]
-    if not len(known) == len(parts) == 3:
-        return None
-    first, second, third = (min(max(part, 0.0), 1.0) for part in known)
-    return known[0] if first_free else first, second, third
 
 
 def presentations(
@@ -217,7 +202,7 @@ def presentations(
     return [types.ColorPresentation(forms[form], types.TextEdit(place, forms[form])) for form in order]
 
 
-_MOST_ITEMS = 8
+_MOST_ITEMS: Final = 8
 
 
 def dimensions_of(document: Document) -> tuple[int, ...]:
@@ -239,8 +224,6 @@ def space_of(document: Document) -> Space:
 def show_value(value: Any) -> str | None:
     """A value in the notation of the language; None for one that a mistake has made unknown."""
     cls = value.__class__
-    if value is POISON:
-        return None
     if isinstance(value, float):
         return show(value)
     if cls is bool:
@@ -326,28 +309,23 @@ def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -
         start += 1
         end = max(end - (end > start and document.text[end - 1] == '"'), start)
     place = document.lines.range(start, end)
-    items = []
-    seen = set()
+    items: dict[str, types.CompletionItem] = {}
     for item in _Maker(docs, document, cursor, names).items():
-        if item.label in seen:
-            continue
-        seen.add(item.label)
         filled = item.snippet and snippets
         text = item.text if item.text and (filled or not item.snippet) else item.label
         about = types.MarkupContent(types.MarkupKind.Markdown, item.about) if item.about else None
-        items.append(
-            types.CompletionItem(
-                label=item.label,
-                kind=item.kind,
-                detail=item.detail or None,
-                documentation=about,
-                sort_text=f"{item.rank}{item.label}",
-                filter_text=item.label,
-                insert_text_format=types.InsertTextFormat.Snippet if filled else None,
-                text_edit=types.TextEdit(place, text),
-            )
+        proposed = types.CompletionItem(
+            label=item.label,
+            kind=item.kind,
+            detail=item.detail or None,
+            documentation=about,
+            sort_text=f"{item.rank}{item.label}",
+            filter_text=item.label,
+            insert_text_format=types.InsertTextFormat.Snippet if filled else None,
+            text_edit=types.TextEdit(place, text),
         )
-    return types.CompletionList(is_incomplete=False, items=items)
+        items.setdefault(item.label, proposed)
+    return types.CompletionList(is_incomplete=False, items=[*items.values()])
 
 
 class _Maker:
@@ -364,7 +342,7 @@ class _Maker:
     def items(self) -> Iterator[Item]:
         cursor, before = self.cursor, self.cursor.before
         last = before[-1] if before else ""
-        if cursor.inside == "comment":
+        if cursor.inside in ("comment", "colour"):
             return
         if cursor.inside == "string":
             yield from self._strings()
@@ -374,8 +352,6 @@ class _Maker:
             for unit in UNITS:
                 if number is not None and unit.startswith(number[2]):
                     yield Item(f"{number[1]}{unit}", Kind.Unit)
-        elif cursor.inside == "colour":
-            return
         elif last == ".":
             yield from self._members(before)
         elif not before:
@@ -418,8 +394,6 @@ class _Maker:
                 if path != own:
                     yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
 
-    # ------------------------------------------------------------ statements
-
     def _keyword(self, word: str, rank: str = "p") -> Item:
         known = words.KEYWORDS[word]
         text = known.snippet or f"{word} {{\n\t$0\n}}"
@@ -428,25 +402,21 @@ class _Maker:
     def _statements(self) -> Iterator[Item]:
         block = self.cursor.block
         kind = block.kind
-        if kind == "material":
-            yield from _calls(words.OPERATIONS, "a")
+        if kind in ("material", "object"):
+            yield from _calls(words.OPERATIONS if kind == "material" else self.transforms, "a")
+            if kind == "object":
+                yield self._keyword("material", "b")
+                yield from self._material_values("b")
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
-            tops = [s for s in self.document.file.statements if isinstance(s, tree.Version | tree.Model)]
-            given = {type(stmt) for stmt in tops}
+            given = {type(stmt) for stmt in self.document.file.statements}
             if tree.Version not in given:
                 yield self._keyword("nsg", "c")
             if tree.Model not in given:
                 yield self._keyword("model", "q")
             yield from (self._keyword(word, "q") for word in ("param", "import"))
             yield from _calls(words.SETTINGS, "q")
-        if kind == "object":
-            yield from _calls(self.transforms, "a")
-            yield self._keyword("material", "b")
-            yield from self._material_values("b")
-            yield from (self._keyword(word) for word in ("let", "for", "if"))
-            return
         yield from self._children("a")
         if kind == "chain":
             for word in COMBINE:
@@ -484,8 +454,6 @@ class _Maker:
             zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None
             if zoo is not None and zoo.materials:
                 yield self._symbol(symbol)
-
-    # ------------------------------------------------------------ expressions
 
     def _symbol(self, symbol: Symbol, *, statement: bool = False) -> Item:
         text, snippet = "", False

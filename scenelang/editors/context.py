@@ -1,7 +1,4 @@
-"""The context of a place: nodes around it, tokens before it, the call and the block that it is in.
-
-A `Cursor` is made from tokens alone, which are there however broken the text is.
-"""
+"""The context of a place: nodes around it, and the call and block that it is in, by tokens alone."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from scenelang.assets.records import Record
 from scenelang.editors.workspace import Document, Workspace, width
 from scenelang.language import tree
 from scenelang.language.lexer import Tokens
-from scenelang.language.resolve import Names, Symbol
+from scenelang.language.resolve import Symbol
 from scenelang.language.tables import tables
 from scenelang.language.tree import children
 from scenelang.language.words import COMBINE, NODES, Word, word_for_call
@@ -214,24 +211,20 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
     call = cursor.call
     if call is None:
         return None
-    result = find_symbol(docs, document, document.names, call.name, call.start)
-    return (
-        word_of(result) if result is not None else word_for_call(call.name, cursor.block.kind == "material")
-    )
+    result = find_symbol(docs, document, call.name, call.start)
+    return word_of(result) if result else word_for_call(call.name, cursor.block.kind == "material")
 
 
-def find_symbol(docs: Workspace, document: Document, names: Names, name: str, offset: int) -> Symbol | None:
-    """The fn or module of a plain or dotted name at an offset; ``names`` are those of its file."""
+def find_symbol(docs: Workspace, document: Document, name: str, offset: int) -> Symbol | None:
+    """The fn or module of a plain or dotted name at an offset."""
     alias, _, rest = name.partition(".")
-    symbol = names.scope_at(offset).find(alias)
-    if symbol is None:
-        return None
-    if rest and symbol.kind == "import" and isinstance(symbol.node, tree.Import):
+    symbol = document.names.scope_at(offset).find(alias)
+    if rest and symbol is not None and isinstance(symbol.node, tree.Import):
         library = docs.imported(document, symbol.node.path.value)
         symbol = library.names.top.symbols.get(rest) if library is not None else None
         if symbol is None or not symbol.is_exported:
             return None
-    return symbol if symbol.kind in ("fn", "module") else None
+    return symbol if symbol is not None and symbol.kind in ("fn", "module") else None
 
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
@@ -241,8 +234,7 @@ def signature_help(docs: Workspace, document: Document, offset: int) -> types.Si
     if callee is None or cursor.call is None or cursor.inside == "comment":
         return None
     active: int | None = cursor.call.index
-    if cursor.call.named is not None:
-        named = cursor.call.named
+    if (named := cursor.call.named) is not None:
         active = callee.params.index(named) if named in callee.params else None
     elif callee.variadic:
         active = min(cursor.call.index, len(callee.params) - 1)

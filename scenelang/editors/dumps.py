@@ -1,8 +1,4 @@
-"""Trees, graphs and Programs as data, text or drawings, and the JSON Schemas of scenelang's files.
-
-The Scene's schema leaves out checks that need code: that a matrix is not singular, that numbers fit into
-float64, and how deep nodes may nest.
-"""
+"""Trees, graphs and Programs as data, text or drawings, and the JSON Schemas of scenelang's files."""
 
 from __future__ import annotations
 
@@ -81,23 +77,19 @@ def _lines(node: Any, margin: str, label: str) -> Iterator[str]:
         elif isinstance(value, tuple) and hasattr(value[0], "__dataclass_fields__"):
             one = len(value) == 1 and each.name not in ("statements", "items")
             inside += [(f"{each.name}: " if one else "", item) for item in value]
+        elif value is True:
+            words.append(each.name)
         else:
-            words.append(
-                repr(value) if isinstance(value, str) and each.name == "value" else _word(each.name, value)
-            )
+            if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+                value = int(value)
+            elif isinstance(value, str) and each.name == "value":
+                value = repr(value)
+            words.append(str(value) if each.name in ("value", "op", "unit") else f"{each.name}={value}")
     line, column = node.span.locate()[0]
     said = " ".join([f"{label}{type(node).__name__}", *words])
     yield f"{margin}{said}  @{line}:{column}\n"
     for name, child in inside:
         yield from _lines(child, margin + "  ", name)
-
-
-def _word(name: str, value: Any) -> str:
-    if value is True:
-        return name
-    if isinstance(value, float) and value.is_integer():
-        value = int(value) if abs(value) < 1e15 else value
-    return str(value) if name in ("value", "op", "unit") else f"{name}={value}"
 
 
 def dump(graph: Graph) -> str:
@@ -158,7 +150,7 @@ def stage_text(stage: Stage | None) -> list[str]:
     camera, light, ground = stage.camera, stage.light, stage.ground
 
     def point(p: Triple) -> str:
-        return f"[{p[0]:g}, {p[1]:g}, {p[2]:g}]"
+        return "[{:g}, {:g}, {:g}]".format(*p)
 
     def colour(rgb: Triple) -> str:
         return hex_text(encoded(rgb))
@@ -358,11 +350,7 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
 
     model = () if scene.model is None else (f"model {scene.model}",)
     nodes: list[tuple[str, Child]] = [("", (node, None)) for node in scene.nodes]
-    return _draw_tree((_sized("scene", scene.canvas), *model), nodes, look, most)
-
-
-def _sized(kind: str, canvas: tuple[int, int]) -> str:
-    return f"{kind} {canvas[0]} x {canvas[1]}"
+    return _draw_tree(("scene {} x {}".format(*scene.canvas), *model), nodes, look, most)
 
 
 def _rounded(statement: str) -> str:
@@ -385,13 +373,13 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
         return Box((node.geometry, *texture, *moves), rgb, leaf=True), []
 
     return _draw_tree(
-        (_sized("scene", graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
+        ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
     )
 
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
     """The stream of a Program: each object and the token that joins it to what came before."""
-    head = (_sized("program", program.canvas), f"model {program.model}", *stage_text(program.stage))
+    head = ("program {} x {}".format(*program.canvas), f"model {program.model}", *stage_text(program.stage))
     boxes, tokens = [Box(head)], token_names(program)
     for at, name in enumerate(program.objects[:most]):
         place = program.places[at]
@@ -453,11 +441,15 @@ def _ink(fill: str) -> str:
 
 
 def scene_schema() -> dict[str, Any]:
-    """The schema of a Scene, as `Scene.from_json` reads and `Scene.to_json` writes it."""
-    model = Scene.model_json_schema()
+    """The schema of a Scene, as `Scene.from_json` reads and `Scene.to_json` writes it.
+
+    It leaves out checks that need code: singular matrices, numbers beyond float64, the depth of nodes.
+    """
+    # Descriptions as Markdown writes code, not as Python's documentation does.
+    model = json.loads(json.dumps(Scene.model_json_schema()).replace("``", "`"))
     described = {"title": "Scene", "description": model.pop("description", ""), **model}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": "urn:scenelang:schema:scene:1"}
-    return _plain({**head, **described})  # type: ignore[no-any-return]
+    return head | described
 
 
 def _written(name: str) -> dict[str, Any]:
@@ -470,13 +462,3 @@ SCHEMAS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
     "manifest": partial(_written, "manifest"),
 }
 """Schemas of a Scene, of the output of ``scenelang check --format json`` and of a model's manifest."""
-
-
-def _plain(value: Any) -> Any:
-    """Descriptions as Markdown writes code, not as Python's documentation does."""
-    if isinstance(value, dict):
-        return {
-            key: item.replace("``", "`") if key == "description" and isinstance(item, str) else _plain(item)
-            for key, item in value.items()
-        }
-    return [_plain(item) for item in value] if isinstance(value, list) else value

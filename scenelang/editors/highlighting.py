@@ -70,9 +70,6 @@ class NsgLexer(RegexLexer):  # type: ignore[misc]  # Pygments has no types
     }
 
 
-_CAPTURES: Final = "punctuation.definition.{}.nsg"
-
-
 def textmate() -> dict[str, Any]:
     """The grammar as data."""
     return {
@@ -88,44 +85,36 @@ def _any(texts: Iterable[str]) -> str:
     return "|".join(re.escape(text) for text in texts)
 
 
-def _words(texts: Iterable[str], scope: str, after: str = "") -> dict[str, Any]:
-    return {"match": rf"\b(?:{_any(texts)})\b{after}", "name": f"{scope}.nsg"}
-
-
-def _named(word: str, scope: str, what: str = _NAME) -> dict[str, Any]:
+def _named(word: str, scope: str) -> dict[str, Any]:
     """A keyword and the name after it."""
     captures = {"1": {"name": f"keyword.declaration.{word}.nsg"}, "2": {"name": f"{scope}.nsg"}}
-    return {"match": rf"\b({word})\s+({what})", "captures": captures}
+    return {"match": rf"\b({word})\s+({_NAME})", "captures": captures}
+
+
+def _between(begin: str, end: str, scope: str, **more: Any) -> dict[str, Any]:
+    return {"begin": begin, "end": end, "name": f"{scope}.nsg", **more}
+
+
+def _mark(kind: str) -> dict[str, Any]:
+    return {"0": {"name": f"punctuation.definition.{kind}.nsg"}}
 
 
 _UNITS: Final = _any(nsg.UNITS)
 _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
     "comments": [
-        {
-            "begin": "//",
-            "end": "$",
-            "name": "comment.line.double-slash.nsg",
-            "beginCaptures": {"0": {"name": _CAPTURES.format("comment")}},
-        },
-        {
-            "begin": r"/\*",
-            "end": r"\*/",
-            "name": "comment.block.nsg",
-            "captures": {"0": {"name": _CAPTURES.format("comment")}},
-        },
+        _between("//", "$", "comment.line.double-slash", beginCaptures=_mark("comment")),
+        _between(r"/\*", r"\*/", "comment.block", captures=_mark("comment")),
     ],
     "strings": [
-        {
-            "begin": '"',
-            "end": '"|(?=$)',
-            "name": "string.quoted.double.nsg",
-            "beginCaptures": {"0": {"name": "punctuation.definition.string.begin.nsg"}},
-            "endCaptures": {"0": {"name": "punctuation.definition.string.end.nsg"}},
-            "patterns": [
+        _between(
+            *('"', '"|(?=$)', "string.quoted.double"),
+            beginCaptures=_mark("string.begin"),
+            endCaptures=_mark("string.end"),
+            patterns=[
                 {"match": r"\\[\"\\nt]", "name": "constant.character.escape.nsg"},
                 {"match": r"\\.", "name": "invalid.illegal.escape.nsg"},
             ],
-        }
+        )
     ],
     "declarations": [
         _named("fn", "entity.name.function"),
@@ -133,7 +122,10 @@ _REPOSITORY: Final[dict[str, list[dict[str, Any]]]] = {
         _named("let", "variable.other.constant"),
         _named("param", "variable.parameter"),
     ],
-    "keywords": [_words(texts, scope, after) for texts, after, _, scope in WORDS],
+    "keywords": [
+        {"match": rf"\b(?:{_any(texts)})\b{after}", "name": f"{scope}.nsg"}
+        for texts, after, _, scope in WORDS
+    ],
     "names": [
         {"match": rf"{_NAME}(?=\s*\{{)", "name": "entity.name.type.nsg"},
         {"match": rf"{_NAME}(?=\s*\()", "name": "entity.name.function.call.nsg"},

@@ -94,8 +94,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
         case "path":
             library = docs.imported(document, text)
             return f"`{library.path}`" if library is not None else "no such file"
-        case _:
-            return None
+    return None
 
 
 def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[Element], str]) -> str | None:
@@ -153,7 +152,6 @@ def _offered(head: str, text: str, about: Mapping[str, str]) -> str | None:
 
 
 def _model(manifest: Manifest) -> str:
-    """A model's facts."""
     ranges = [f"{name} {low:g} to {high:g}" for name, (low, high) in manifest.trained.items()]
     rows = [
         ("geometries", ", ".join(manifest.geometries)),
@@ -163,9 +161,6 @@ def _model(manifest: Manifest) -> str:
     table = "\n".join(f"| {name} | {text} |" for name, text in rows if text)
     head = f"{_code(f'model {chr(34)}{manifest.name}{chr(34)};')}\n\n{manifest.summary}"
     return f"{head}\n\n| {manifest.dimension}D | |\n|---|---|\n{table}"
-
-
-# ---------------------------------------------------------------- transforms and objects
 
 
 def _calls(document: Document, use: Use) -> Iterator[tree.Call]:
@@ -210,10 +205,8 @@ def _node_facts(document: Document, node: Any) -> str:
 
 
 _LONGEST: Final = 28
-_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color)
-_CLEAR: Final = frozenset(
-    {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
-)
+_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color, tree.Unary, tree.Vector)
+_CLEAR: Final = {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
 
 
 def inlay_hints(
@@ -222,25 +215,20 @@ def inlay_hints(
     """The hints of a range."""
     low, high = document.lines.offset(place.start), document.lines.offset(place.end)
     result: list[types.InlayHint] = []
-    for stmt in document.file.statements:
-        if stmt.span.end < low or stmt.span.start > high:
+    inside = (s for s in document.file.statements if s.span.end >= low and s.span.start <= high)
+    for node in (node for stmt in inside for node in walk(stmt)):
+        if node.span.end < low or node.span.start > high:
             continue
-        for node in walk(stmt):
-            if node.span.end < low or node.span.start > high:
-                continue
-            if isinstance(node, tree.Let) and settings.value_hints:
-                hint = _value(document, node)
-                if hint is not None:
-                    result.append(hint)
-            elif isinstance(node, tree.Call | tree.CallExpr) and settings.argument_hints:
-                result += _arguments(docs, document, node)
-    result.sort(key=lambda hint: (hint.position.line, hint.position.character))
-    return result
+        if isinstance(node, tree.Let) and settings.value_hints and (hint := _value(document, node)):
+            result.append(hint)
+        elif isinstance(node, tree.Call | tree.CallExpr) and settings.argument_hints:
+            result += _arguments(docs, document, node)
+    return sorted(result, key=lambda hint: (hint.position.line, hint.position.character))
 
 
 def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
     """The value of a let, unless it is written there or differs from pass to pass."""
-    if _is_plain(let.value):
+    if all(isinstance(node, _PLAIN) for node in walk(let.value)):
         return None
     seen = seen_at(document, document, let.name.span.start, let.name.span.end)
     if seen is None or not seen.values:
@@ -249,20 +237,8 @@ def _value(document: Document, let: tree.Let) -> types.InlayHint | None:
     text = shown.pop()
     if shown or text is None or len(text) > _LONGEST or text == let.value.span.text:
         return None
-    return types.InlayHint(
-        document.lines.position(let.value.span.end),
-        f" = {text}",
-        padding_left=False,
-        tooltip="the value that this scene gives it",
-    )
-
-
-def _is_plain(expr: tree.Expr) -> bool:
-    if isinstance(expr, tree.Unary):
-        return _is_plain(expr.operand)
-    if isinstance(expr, tree.Vector):
-        return all(_is_plain(item) for item in expr.items)
-    return isinstance(expr, _PLAIN)
+    place, tooltip = document.lines.position(let.value.span.end), "the value that this scene gives it"
+    return types.InlayHint(place, f" = {text}", padding_left=False, tooltip=tooltip)
 
 
 def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallExpr) -> list[types.InlayHint]:
@@ -270,7 +246,7 @@ def _arguments(docs: Workspace, document: Document, call: tree.Call | tree.CallE
     args = call.args or ()
     if name in _CLEAR or not args:
         return []
-    result = find_symbol(docs, document, document.names, name, call.name.span.start)
+    result = find_symbol(docs, document, name, call.name.span.start)
     callee = word_of(result) if result is not None else word_for_call(name, False)
     if callee is None or callee.variadic or len(callee.params) < 2:
         return []

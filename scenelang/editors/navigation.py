@@ -87,8 +87,7 @@ def rename(
 ) -> types.WorkspaceEdit | None:
     """Rename a definition and all its uses, in all files, in versioned edits where the client takes them.
 
-    Raises:
-        Refused: the new name is not a name, or would mean something else somewhere.
+    Raises `Refused` where the new name is not a name, or would mean something else somewhere.
     """
     use = document.names.at(offset)
     result = docs.definition(document, use) if use is not None else None
@@ -157,12 +156,11 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
     """Links of imports whose files there are."""
     result = []
-    for stmt in document.file.statements:
-        if isinstance(stmt, tree.Import):
-            library = docs.imported(document, stmt.path.value)
-            if library is not None and library.path is not None:
-                place = document.lines.range(stmt.path.span.start + 1, max(stmt.path.span.end - 1, 0))
-                result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
+    for path in (stmt.path for stmt in document.file.statements if isinstance(stmt, tree.Import)):
+        library = docs.imported(document, path.value)
+        if library is not None and library.path is not None:
+            place = document.lines.range(path.span.start + 1, max(path.span.end - 1, 0))
+            result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
     return result
 
 

@@ -41,7 +41,6 @@ from scenelang.editors.workspace import (
 )
 from scenelang.language import pages, tree
 from scenelang.language.diagnostics import Diagnostic, Span, apply_fixes
-from scenelang.language.pages import CODES
 from scenelang.language.reports import SceneError
 
 
@@ -80,9 +79,7 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
     return types.Diagnostic(
         range=place,
         message=message,
-        severity=types.DiagnosticSeverity.Error
-        if d.severity == "error"
-        else types.DiagnosticSeverity.Warning,
+        severity=types.DiagnosticSeverity[d.severity.capitalize()],
         code=d.code,
         code_description=_description(d.code),
         source="scenelang",
@@ -94,8 +91,6 @@ def to_diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnosti
 @cache
 def _description(code: str) -> types.CodeDescription | None:
     """The page that explains a code; it ships with the package, so it needs no network."""
-    if code not in CODES:
-        return None
     page = Path(pages.__file__).with_name(f"{code}.md")
     return types.CodeDescription(uri_of(page)) if page.is_file() else None
 
@@ -138,14 +133,9 @@ def _is_ours(document: Document, d: Diagnostic) -> bool:
 def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeAction:
     assert d.fix is not None
     edits = [types.TextEdit(document.lines.span(e.span), e.replacement) for e in d.fix.edits]
-    shown = to_diagnostic(d, document)
-    return types.CodeAction(
-        title=d.fix.message[:1].upper() + d.fix.message[1:],
-        kind=types.CodeActionKind.QuickFix,
-        diagnostics=[shown] if shown is not None else None,
-        is_preferred=preferred,
-        edit=types.WorkspaceEdit(changes={document.uri: edits}),
-    )
+    shown, title = to_diagnostic(d, document), d.fix.message[:1].upper() + d.fix.message[1:]
+    edit, kind = types.WorkspaceEdit(changes={document.uri: edits}), types.CodeActionKind.QuickFix
+    return types.CodeAction(title, kind, [shown] if shown else None, preferred, edit=edit)
 
 
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
@@ -241,8 +231,6 @@ class Server(LanguageServer):
                 self._drawn[element.digest] = ""
         return self._drawn[element.digest]
 
-    # ------------------------------------------------------------ diagnostics
-
     def publish(self, document: Document) -> None:
         """Send all current diagnostics: those of syntax, and those of the last check, moved."""
         result = [*document.syntax, *document.semantic]
@@ -260,11 +248,9 @@ class Server(LanguageServer):
 
     def forget(self, uri: str) -> None:
         """Drop the check that waits or runs for a document."""
-        timer = self._timers.pop(uri, None)
-        if timer is not None:
+        if (timer := self._timers.pop(uri, None)) is not None:
             timer.cancel()
-        stop = self._running.pop(uri, None)
-        if stop is not None:
+        if (stop := self._running.pop(uri, None)) is not None:
             stop.set()
 
     def _start(self, uri: str) -> None:
@@ -358,8 +344,7 @@ def _changed(server: Server, params: types.DidChangeTextDocumentParams) -> None:
 
 
 def _saved(server: Server, params: types.DidSaveTextDocumentParams) -> None:
-    document = server.docs.open.get(params.text_document.uri)
-    if document is not None:
+    if (document := server.docs.open.get(params.text_document.uri)) is not None:
         server.schedule(document, 0.0)
 
 
@@ -373,8 +358,7 @@ def _closed(server: Server, params: types.DidCloseTextDocumentParams) -> None:
 
 
 def _files_changed(server: Server, params: types.DidChangeWatchedFilesParams) -> None:
-    for change in params.changes:
-        path = path_of(change.uri)
+    for path in (path_of(change.uri) for change in params.changes):
         if path is not None:
             server.changed(path.resolve())
             server.changed(path)

@@ -95,7 +95,6 @@ class Lines:
         return end
 
     def position(self, offset: int) -> types.Position:
-        """The position of an offset."""
         offset = min(max(offset, 0), len(self.text))
         line = bisect_right(self.starts, offset) - 1
         start = self.starts[line]
@@ -104,7 +103,6 @@ class Lines:
         return types.Position(line, width(self.text[start:offset], self.encoding))
 
     def range(self, start: int, end: int) -> types.Range:
-        """The range between two offsets."""
         return types.Range(self.position(start), self.position(end))
 
     def span(self, span: Span) -> types.Range:
@@ -158,12 +156,8 @@ def check(
 ) -> Checked:
     """Evaluate a scene and run the compiler's checks; raises `Superseded` where ``stop`` was set meanwhile.
 
-    Args:
-        file, path: the tree, and its file if it has one.
-        root: the folder that imports cannot leave; by default the file's.
-        texts: texts of open files.
-        model: draw with this model instead of the scene's.
-        parsed: the text has no syntax mistakes.
+    Imports read ``texts`` of open files and cannot leave ``root``, by default the file's folder. ``parsed``
+    says that the text has no syntax mistakes.
     """
     result, frame = Diagnostics(), 0
     seen: dict[tuple[str, int, int], Seen] = {}
@@ -202,17 +196,11 @@ MAX_PAUSE_MS: Final = 60_000
 
 
 class Settings(Record):
-    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``.
+    """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``."""
 
-    Args:
-        debounce_ms: pause in typing after which a scene is evaluated.
-        model: draw with this model instead of the scene's.
-        root: the folder that imports cannot leave, instead of the scene's.
-    """
-
-    debounce_ms: float = 200.0
-    model: str | None = None
-    root: Path | None = None
+    debounce_ms: float = 200.0  # pause in typing after which a scene is evaluated
+    model: str | None = None  # draws instead of the scene's
+    root: Path | None = None  # the folder that imports cannot leave, instead of the scene's
     value_hints: bool = True
     argument_hints: bool = True
 
@@ -272,7 +260,6 @@ class Document:
 
     @property
     def file(self) -> tree.File:
-        """The tree."""
         return self._parsed[0]
 
     @cached_property
@@ -293,9 +280,8 @@ class Document:
     @cached_property
     def _parsed(self) -> tuple[tree.File, tuple[Diagnostic, ...]]:
         if self._is_too_long:
-            message = (
-                f"a text of more than {MAX_TEXT // 1_000_000} MB, which the language server does not read"
-            )
+            size = f"{MAX_TEXT // 1_000_000} MB"
+            message = f"a text of more than {size}, which the language server does not read"
             help = "`scenelang check` does, up to 10 MB"
             nowhere = Span(self.source, 0, 0)
             return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
@@ -359,8 +345,6 @@ class Workspace:
         self.open: dict[str, Document] = {}
         self._closed: dict[Path, tuple[tuple[int, int], Document]] = {}
 
-    # ------------------------------------------------------------ the client's buffers
-
     def put(self, uri: str, text: str, version: int | None) -> Document:
         """Open a buffer, or open it anew."""
         path = path_of(uri)
@@ -411,8 +395,6 @@ class Workspace:
                     document = self.by_path(path)
                     if document is not None:
                         yield document
-
-    # ------------------------------------------------------------ names across files
 
     def imported(self, document: Document, text: str) -> Document | None:
         """The document of an import's path."""

@@ -1,8 +1,4 @@
-"""A client of the language server over real standard input and output, written against the protocol alone.
-
-It keeps its own copy of each text and knows nothing of the server's code, so that both can be held against
-each other.
-"""
+"""A client of the language server over real pipes, written against the protocol alone, with its own texts."""
 
 from __future__ import annotations
 
@@ -10,8 +6,10 @@ import json
 import queue
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +27,7 @@ CAPABILITIES: Json = {
         "completion": {"completionItem": {"snippetSupport": True}},
         "rename": {"prepareSupport": True},
         "publishDiagnostics": {"relatedInformation": True, "versionSupport": True},
-        "semanticTokens": {
-            "requests": {"full": True, "range": True},
-            "tokenTypes": [],
-            "tokenModifiers": [],
-            "formats": ["relative"],
-        },
+        "semanticTokens": {"requests": {}, "tokenTypes": [], "tokenModifiers": [], "formats": ["relative"]},
     },
 }
 
@@ -49,11 +42,12 @@ class Client:
         options: Json | None = None,
         command: list[str] | None = None,
     ) -> None:
+        self.errors = tempfile.TemporaryFile()  # noqa: SIM115
         self.process = subprocess.Popen(
             command or [sys.executable, "-m", "scenelang", "lsp"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self.errors,
         )
         self.encoding = encoding
         self.texts: dict[str, str] = {}
@@ -61,19 +55,16 @@ class Client:
         self.published: dict[str, list[Json]] = {}
         self.logged: list[Json] = []
         self.asked: list[Json] = []
-        self._answers: dict[int | None, Json] = {}
+        self._answers: dict[int, Json] = {}
         self._inbox: queue.Queue[Json | None] = queue.Queue()
         self._id = 0
-        self.stderr: list[bytes] = []
-        for target in (self._read, self._drain):
-            threading.Thread(target=target, daemon=True).start()
+        threading.Thread(target=self._read, daemon=True).start()
         capabilities = json.loads(json.dumps(CAPABILITIES))
         capabilities["general"]["positionEncodings"] = [encoding]
-        folder = {"uri": root.as_uri(), "name": root.name} if root else None
         params = {
             "processId": None,
-            "rootUri": folder["uri"] if folder else None,
-            "workspaceFolders": [folder] if folder else None,
+            "rootUri": root.as_uri() if root else None,
+            "workspaceFolders": [{"uri": root.as_uri(), "name": root.name}] if root else None,
             "capabilities": capabilities,
             "initializationOptions": {"debounceMs": 20} if options is None else options,
         }
@@ -83,8 +74,6 @@ class Client:
             self.kill()
             raise
         self.notify("initialized", {})
-
-    # ------------------------------------------------------------ messages
 
     def _read(self) -> None:
         stream = self.process.stdout
@@ -98,11 +87,6 @@ class Client:
                 self._inbox.put(None)
                 return
             self._inbox.put(json.loads(stream.read(length)))
-
-    def _drain(self) -> None:
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
-            self.stderr.append(line)
 
     def send(self, message: Json) -> None:
         data = json.dumps({"jsonrpc": "2.0", **message}).encode()
@@ -119,14 +103,15 @@ class Client:
         self.send({"id": self._id, "method": method, "params": params})
         return self._id
 
-    def _take(self, seconds: float) -> bool:
-        """Take one message in; False where none came."""
+    def _take(self, what: str, end: float) -> None:
+        """Take one message in before a time; one that does not come fails the test."""
         try:
-            message = self._inbox.get(timeout=max(seconds, 0.0))
+            message = self._inbox.get(timeout=max(end - time.monotonic(), 0.0))
         except queue.Empty:
-            return False
+            raise AssertionError(f"no {what}") from None
         if message is None:
-            raise EOFError(b"".join(self.stderr).decode())
+            self.errors.seek(0)
+            raise EOFError(self.errors.read().decode())
         method = message.get("method")
         if method == "textDocument/publishDiagnostics":
             self.published.setdefault(message["params"]["uri"], []).append(message["params"])
@@ -137,13 +122,12 @@ class Client:
             self.send({"id": message["id"], "result": None})
         elif method is None:
             self._answers[message["id"]] = message
-        return True
 
-    def answer(self, request: int | None, seconds: float = PATIENCE_S) -> Json:
-        """The whole answer to a request; to None, that to what is not a request."""
-        end = time.monotonic() + seconds
+    def answer(self, request: int) -> Json:
+        """The whole answer to a request."""
+        end = time.monotonic() + PATIENCE_S
         while request not in self._answers:
-            assert self._take(end - time.monotonic()), f"no answer to {request}"
+            self._take(f"answer to {request}", end)
         return self._answers.pop(request)
 
     def request(self, method: str, params: Any) -> Any:
@@ -157,8 +141,6 @@ class Client:
         message = self.answer(self.start(method, params))
         assert "error" in message, message
         return str(message["error"]["message"])
-
-    # ------------------------------------------------------------ documents
 
     def open(self, uri: str, text: str) -> str:
         self.texts[uri], self.versions[uri] = text, 1
@@ -193,10 +175,8 @@ class Client:
         return {"line": line, "character": self.units(column)}
 
     def units(self, text: str) -> int:
-        name, size = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}[
-            self.encoding
-        ]
-        return len(text.encode(name)) // size
+        size = {"utf-8": 1, "utf-16": 2, "utf-32": 4}[self.encoding]
+        return len(text.encode(f"{self.encoding}-le" if size > 1 else "utf-8")) // size
 
     def offset(self, text: str, place: Json) -> int:
         start = 0
@@ -221,16 +201,12 @@ class Client:
 
     def applied(self, text: str, edits: list[Json]) -> str:
         """A text after edits, which must not overlap."""
-        spans = sorted(
-            (self.offset(text, e["range"]["start"]), self.offset(text, e["range"]["end"]), e["newText"])
-            for e in edits
-        )
-        out, at = [], 0
-        for start, end, new in spans:
-            assert start >= at, "edits overlap"
-            out += [text[at:start], new]
-            at = end
-        return "".join([*out, text[at:]])
+        places = [[self.offset(text, e["range"][side]) for side in ("start", "end")] for e in edits]
+        first = len(text)
+        for (start, end), edit in sorted(zip(places, edits, strict=True), key=itemgetter(0), reverse=True):
+            assert end <= first, "edits overlap"
+            text, first = text[:start] + edit["newText"] + text[end:], start
+        return text
 
     def diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
         """What is published for the latest text of a document, once its check has ended too."""
@@ -239,14 +215,14 @@ class Client:
             found = [p for p in self.published.get(uri, []) if p.get("version") == self.versions[uri]]
             if len(found) >= 2:  # the syntax at once, the rest later
                 return list(found[-1]["diagnostics"])
-            assert self._take(end - time.monotonic()), f"not enough publications for {uri}"
+            self._take(f"diagnostics of {uri}", end)
 
-    def next_diagnostics(self, uri: str, seconds: float = PATIENCE_S) -> list[Json]:
+    def next_diagnostics(self, uri: str) -> list[Json]:
         """The publication after those that have come so far."""
-        end = time.monotonic() + seconds
+        end = time.monotonic() + PATIENCE_S
         count = len(self.published.get(uri, []))
         while len(self.published.get(uri, [])) == count:
-            assert self._take(end - time.monotonic()), "nothing published"
+            self._take(f"more diagnostics of {uri}", end)
         return list(self.published[uri][-1]["diagnostics"])
 
     def stop(self) -> int:
@@ -255,10 +231,16 @@ class Client:
         self.notify("exit", None)
         return self.process.wait(PATIENCE_S)
 
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+
     def kill(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait(PATIENCE_S)
-        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
-            if stream is not None:
-                stream.close()
+        for stream in (self.process.stdin, self.process.stdout, self.errors):
+            assert stream is not None
+            stream.close()

@@ -39,9 +39,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="package")
 def client(folder: Path) -> Iterator[Client]:
-    client = Client(folder)
-    yield client
-    client.kill()
+    with Client(folder) as client:
+        yield client
+        assert client.stop() == 0
+        assert "internal error" not in str(client.logged)
 
 
 @pytest.fixture
@@ -52,12 +53,3 @@ def uri(client: Client, folder: Path) -> Iterator[str]:
     client.close(uri)
     client.next_diagnostics(uri)
     client.published.pop(uri)
-
-
-@pytest.fixture(scope="module")
-def lasting() -> Iterator[Client]:
-    client = Client()
-    yield client
-    assert client.logged == [], client.logged
-    assert client.stop() == 0
-    client.kill()

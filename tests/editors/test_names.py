@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lsprotocol import types
 
 from scenelang.editors.context import cursor_at
-from scenelang.editors.workspace import Encoding, Lines, difference, width
+from scenelang.editors.workspace import Encoding, Lines, difference
 from scenelang.language import expressions, tree
 from scenelang.language.builder import Place
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
@@ -41,28 +41,29 @@ def tokens_of(text: str) -> Tokens:
     return scan(source, Report(source))
 
 
-@pytest.mark.parametrize("text", [SHADOWS, *(path.read_text("utf-8") for path in EXAMPLES)])
-def test_names_mean_what_they_mean_to_the_evaluator(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every variable that the evaluator resolves in this file is resolved to the same place."""
-    source = SourceFile("main.nsg", text)
-    resolved: list[tuple[tree.Name, Span]] = []
+def test_names_mean_what_they_mean_to_the_evaluator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every variable that the evaluator resolves in a file is resolved to the same place."""
+    resolved: list[tuple[Span, Span]] = []
     original = expressions.value_of
 
     def watched(name: tree.Name, binding: Binding, place: Place) -> object:
-        if name.span.source is source and binding.span is not None and "." not in name.text:
-            resolved.append((name, binding.span))
+        if binding.span is not None and "." not in name.text:
+            resolved.append((name.span, binding.span))
         return original(name, binding, place)
 
     monkeypatch.setattr(expressions, "value_of", watched)
-    file = parse(source, Diagnostics())
-    Source(tree=file, root=EXAMPLES[0].parent).scene(Diagnostics())
-    names = Names(file)
-    assert resolved or text is not SHADOWS
-    for name, place in resolved:
-        use = names.at(name.span.start)
-        assert use is not None
-        assert use.symbol is not None, name
-        assert use.symbol.span == place, name
+    for text in (SHADOWS, *(path.read_text("utf-8") for path in EXAMPLES if path.stat().st_size < 1600)):
+        file = parse(SourceFile("main.nsg", text), Diagnostics())
+        resolved.clear()
+        Source(tree=file, root=EXAMPLES[0].parent).scene(Diagnostics())
+        names = Names(file)
+        assert resolved or text is not SHADOWS
+        for name, place in resolved:
+            if name.source is file.span.source:
+                use = names.at(name.start)
+                assert use is not None, name
+                assert use.symbol is not None, name
+                assert use.symbol.span == place, name
 
 
 BLOCKS = [
@@ -95,40 +96,30 @@ def test_blocks_and_calls_are_read_off_tokens() -> None:
         values = frozenset({"m"}) if "let m" in text else frozenset()
         block = cursor_at(tokens_of(text), text.index("|"), values).block
         assert (block.kind, block.head) == (kind, head), text
-    for text, name, index, named, others in CALLS:
+    for text, *expected in CALLS:
         call = cursor_at(tokens_of(text), text.index("|")).call
         assert call is not None, text
-        assert (call.name, call.index, call.named, call.given) == (name, index, named, others), text
-
-
-def test_parentheses_that_call_nothing_are_no_call() -> None:
+        assert [call.name, call.index, call.named, call.given] == expected, text
     for text in ("if (|", "let a = (1 + |", "fn f(|", "for (i in |"):
-        offset = text.index("|")
-        assert cursor_at(tokens_of(text), offset).call is None
+        assert cursor_at(tokens_of(text), text.index("|")).call is None, text
 
 
 TEXTS = st.text(st.sampled_from("ab\té𝄞\n\r\u2028\x0b"), max_size=30)
-SIZES: dict[Encoding, tuple[str, int]] = {
-    "utf-8": ("utf-8", 1),
-    "utf-16": ("utf-16-le", 2),
-    "utf-32": ("utf-32-le", 4),
-}
+SIZES: dict[Encoding, int] = {"utf-8": 1, "utf-16": 2, "utf-32": 4}
 
 
 def slow_position(text: str, offset: int, encoding: Encoding) -> tuple[int, int]:
     """Line and column by splitting what is before."""
-    if text[offset - 1 : offset + 1] == "\r\n":
-        offset -= 1  # inside a newline: the end of its line
     before = re.split(r"\r\n|\n|\r", text[:offset])
-    name, size = SIZES[encoding]
-    return len(before) - 1, len(before[-1].encode(name)) // size
+    name = encoding if encoding == "utf-8" else f"{encoding}-le"
+    return len(before) - 1, len(before[-1].encode(name)) // SIZES[encoding]
 
 
 @given(TEXTS, st.integers(0, 30), st.sampled_from(list(SIZES)))
 def test_positions_are_those_of_the_protocol(text: str, offset: int, encoding: Encoding) -> None:
     offset = min(offset, len(text))
     if text[offset - 1 : offset + 1] == "\r\n":
-        return
+        return  # between the two characters of a newline
     lines = Lines(text, encoding)
     place = lines.position(offset)
     assert (place.line, place.character) == slow_position(text, offset, encoding)
@@ -139,11 +130,6 @@ def test_positions_are_those_of_the_protocol(text: str, offset: int, encoding: E
 def test_every_position_means_an_offset(text: str, line: int, character: int, encoding: Encoding) -> None:
     offset = Lines(text, encoding).offset(types.Position(line, character))
     assert 0 <= offset <= len(text)
-
-
-@pytest.mark.parametrize(("encoding", "units"), [("utf-8", 8), ("utf-16", 5), ("utf-32", 4)])
-def test_width_counts_code_units(encoding: Encoding, units: int) -> None:
-    assert width("aé𝄞b", encoding) == units
 
 
 @given(TEXTS, TEXTS)
