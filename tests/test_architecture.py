@@ -12,6 +12,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from scenelang.language.tables import tables
+from tests.mutants import TARGETS
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "scenelang"
@@ -133,62 +134,58 @@ def test_files_and_folders_stay_small() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def loaded_by(*arguments: str) -> set[str]:
-    """Top-level modules that a fresh process has loaded after ``scenelang ARGUMENTS``."""
-    code = (
-        "import sys\n"
-        "from scenelang.cli.main import main\n"
-        f"sys.argv = {['scenelang', *arguments]!r}\n"
-        "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
-        "print('LOADED', *sorted({name.split('.')[0] for name in sys.modules}))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+def test_mutants_have_files_and_tests() -> None:
+    for pattern, tests in TARGETS.items():
+        assert list(ROOT.glob(pattern)), pattern
+        assert all((ROOT / test).exists() for test in tests), pattern
+
+
+def loaded_after(code: str) -> set[str]:
+    """Top-level modules that a fresh process has loaded after ``code``."""
+    listing = f"{code}\nimport sys\nprint('LOADED', *{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", listing], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return set(done.stdout.rpartition("LOADED")[2].split())
 
 
-def test_check_loads_neither_torch_nor_numpy() -> None:
-    tables()  # made now if the grammar has changed
-    assert not loaded_by("check", str(ROOT / "examples/night.nsg")) & {
-        "torch",
-        "numpy",
-        "lark",
-        "distributed",
-    }
+def loaded_by(*arguments: str) -> set[str]:
+    """Top-level modules that a fresh process has loaded after ``scenelang ARGUMENTS``."""
+    return loaded_after(
+        f"import sys\nfrom scenelang.cli.main import main\nsys.argv = {['scenelang', *arguments]!r}\n"
+        "try:\n    main()\nexcept SystemExit as stop:\n    assert not stop.code, stop.code\n"
+    )
+
+
+HEAVY = {"torch", "numpy", "pydantic", "lark", "rich", "PIL", "pygls"}
+
+
+def test_import_and_loads_load_nothing_heavy() -> None:
+    assert not loaded_after("import scenelang") & HEAVY
+    code = "import scenelang as nsg; nsg.loads('square {}')"
+    assert not loaded_after(code) & (HEAVY - {"pydantic"})
 
 
 def test_check_loads_no_more_for_solids(tmp_path: Path) -> None:
-    """Above all not what pydantic needs to build validators."""
+    """Neither torch nor numpy, and above all not what pydantic needs to build validators."""
+    tables()  # made now if the grammar has changed
     scene = tmp_path / "solids.nsg"
     scene.write_text(
         "camera(eye = [1, 2, 5]); light(color = #fed); ground(color = #cba);"
         " subtract { torus; sphere { twist(1); material volumetric { color(#fed); hue(10deg); } } }"
     )
     flat = loaded_by("check", str(ROOT / "examples/night.nsg"))
+    assert not flat & {"torch", "numpy", "lark", "distributed"}
     assert loaded_by("check", str(scene)) <= flat
 
 
 def test_help_loads_nothing_heavy() -> None:
     scene = str(ROOT / "examples/night.nsg")
-    for line in ("--help", "render --help", "schema --help", "explain E0401", f"fmt --check {scene}"):
-        assert not loaded_by(*line.split()) & {"torch", "numpy", "pydantic", "lark", "rich", "pygls"}, line
+    for line in ("--help", "render --help", "explain E0401", f"fmt --check {scene}"):
+        assert not loaded_by(*line.split()) & HEAVY, line
     assert "pydantic" not in loaded_by("models")
 
 
-def test_compile_loads_no_torch(tmp_path: Path) -> None:
-    arguments = ("compile", str(ROOT / "examples/chain.nsg"), "-o", str(tmp_path / "chain.safetensors"))
-    assert "torch" not in loaded_by(*arguments)
-
-
-def test_a_small_picture_loads_no_torch(tmp_path: Path) -> None:
-    for name in ("hello", "chain"):
-        arguments = ("render", str(ROOT / f"examples/{name}.nsg"), "-o", str(tmp_path / f"{name}.png"))
+def test_a_program_and_a_small_picture_load_no_torch(tmp_path: Path) -> None:
+    for command, output in (("compile", "chain.safetensors"), ("render", "chain.png")):
+        arguments = (command, str(ROOT / "examples/chain.nsg"), "-o", str(tmp_path / output))
         assert "torch" not in loaded_by(*arguments)
-
-
-def test_import_loads_nothing_heavy() -> None:
-    code = (
-        "import scenelang, sys; print(*sorted(m for m in sys.modules if m in ('torch', 'numpy', 'pydantic')))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []

@@ -21,7 +21,7 @@ import pytest
 from scenelang.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = (
+PAGES = [
     "index",
     "tutorial",
     "cookbook",
@@ -29,12 +29,11 @@ PAGES = (
     "language",
     "formatting",
     "data",
-    "elements",
     "drawing",
     "sweep",
     "viewer",
-)
-SLOW = ("animation",)
+]
+MARKED = {"elements": pytest.mark.more, "animation": pytest.mark.slow}  # which learn, and draw films
 _BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 VENV = ".venv/bin/"
 _LONG = {"watch", "train", "lab", "lsp", "play"}  # commands that do not end, or not soon
@@ -74,7 +73,7 @@ def run_shell(text: str, expected: str | None, place: str, monkeypatch: pytest.M
         assert like(expected).fullmatch(printed.strip()), f"{place} prints\n{printed}"
 
 
-@pytest.mark.parametrize("page", [*PAGES, *(pytest.param(page, marks=pytest.mark.slow) for page in SLOW)])
+@pytest.mark.parametrize("page", [*PAGES, *(pytest.param(page, marks=mark) for page, mark in MARKED.items())])
 def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / f"docs/{page}.md").read_text("utf-8")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
@@ -99,7 +98,7 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_pages_have_something_to_run() -> None:
     """The pattern finds the blocks that a simple count finds, and outputs among them."""
-    for page in (*PAGES, *SLOW):
+    for page in (*PAGES, *MARKED):
         text = (ROOT / f"docs/{page}.md").read_text("utf-8")
         counted = len(re.findall(r"^```\w", text, re.MULTILINE))
         found = list(_BLOCK.finditer(text))

@@ -1,7 +1,8 @@
-"""The library for embedders beyond one picture: sizes, Scenes as frames, mistakes as values, notebooks."""
+"""The library for embedders: load, render, frames, mistakes as values, notebooks, and what is refused."""
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import re
 from collections.abc import Callable
@@ -13,6 +14,10 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
+from scenelang.drawing import torch_backend
+from scenelang.drawing.how import Device
+from scenelang.drawing.neural import files
+from scenelang.drawing.neural.draw import draw
 from scenelang.web import notebook
 
 SMALL = (24, 16)
@@ -22,6 +27,36 @@ STAR = nsg.Scene(canvas=SMALL, nodes=nsg.Object("star", nsg.Scale(0.9)))
 
 def moving() -> list[nsg.Scene]:
     return [nsg.loads(MOVING, frame=frame, size=SMALL) for frame in range(6)]
+
+
+def test_values_of_params_and_mistakes(tmp_path: Path) -> None:
+    path, text = tmp_path / "a.nsg", "param k = 0.5 in 0..1; square { scale(0.1 + k); }"
+    path.write_text(text)
+    expected = nsg.Scene(nodes=nsg.Object("square", nsg.Scale(1.0)))
+    assert nsg.load(path, k=0.9) == nsg.load(str(path), k="0.9") == expected
+    assert nsg.load(path, params={"k": 0.9}) == nsg.loads(text, k=0.9) == expected
+    with pytest.raises(nsg.SceneError, match="E0302") as caught:
+        nsg.loads("square { rotate(45); scale(foo); }")
+    assert [d.code for d in caught.value.diagnostics] == ["E0302", "E0201"]
+
+
+@pytest.mark.torch
+def test_public_names() -> None:
+    assert nsg.__all__ == sorted(nsg.__all__)
+    assert set(nsg.__all__) <= set(dir(nsg))
+    for name in nsg.__all__:
+        assert not Path(str(nsg.__file__)).with_name(name).is_dir()  # importing a package would hide it
+        assert getattr(nsg, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'lode'"):
+        nsg.lode  # noqa: B018
+
+
+def test_a_model_that_is_not_named_is_that_of_the_dimension() -> None:
+    for text, name in (("square { twirl(1); }", "shapes2d"), ("sphere;", "solids3d"), ("", "shapes2d")):
+        assert nsg.compile(nsg.loads(text)).model == name
+    assert nsg.compile(nsg.loads('model "textures2d"; square;')).model == "shapes2d"  # its earlier name
+    with pytest.raises(nsg.SceneError, match="E0514"):
+        nsg.compile(nsg.Scene(model="other"))
 
 
 def test_size_is_the_canvas_wherever_it_is_given(tmp_path: Path) -> None:
@@ -65,20 +100,19 @@ def test_scenes_of_several_canvases_are_a_batch() -> None:
     assert np.array_equal(only, drawn[0])
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
+def test_what_scenes_cannot_be(tmp_path: Path) -> None:
+    calls: list[tuple[Callable[[Path], object], str]] = [
         (lambda out: nsg.animate([STAR, STAR], out), "fps says how fast"),
         (lambda out: nsg.animate([STAR, STAR.sized((9, 9))], out, fps=2), "several canvases"),
         (lambda out: nsg.animate([], out), "neither a path nor Scenes"),
         (lambda out: list(nsg.render_frames([1, 2])), "neither a path nor Scenes"),  # type: ignore[list-item]
         (lambda out: list(nsg.render_frames(STAR, params={"k": 1})), "params and root are for files"),
         (lambda out: list(nsg.render_frames([STAR], frames="3..4")), "frame 3"),
-    ],
-)
-def test_what_scenes_cannot_be(call: Callable[[Path], object], words: str, tmp_path: Path) -> None:
-    with pytest.raises((ValueError, nsg.FramesError), match=words):
-        call(tmp_path / "a.gif")
+        (lambda out: nsg.render_many(STAR, out), "several Scenes are drawn by `animate`"),  # type: ignore[arg-type]
+    ]
+    for call, words in calls:
+        with pytest.raises((TypeError, ValueError, nsg.FramesError), match=words):
+            call(tmp_path / "a.gif")
     assert not list(tmp_path.iterdir())
 
 
@@ -159,24 +193,141 @@ def test_mistakes_of_a_file_that_is_drawn_have_their_places(tmp_path: Path) -> N
         nsg.render(file)
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        nsg.compile,
-        nsg.render,
-        lambda x: nsg.render(x, backend="reference"),
-        lambda x: nsg.render_outputs(x, ("alpha",)),
-        nsg.prove,
-        lambda x: nsg.render_many(x, "never"),
-    ],
-)
-def test_what_is_neither_a_scene_nor_a_path(call: Callable[[Any], object]) -> None:
-    with pytest.raises(TypeError, match=r"^list where .* path"):
-        call([STAR])
+def test_what_is_neither_a_scene_nor_a_path() -> None:
+    calls: list[Callable[[Any], object]] = [nsg.compile, nsg.render, nsg.prove]
+    calls += [lambda x: nsg.render(x, backend="reference"), lambda x: nsg.render_many(x, "never")]
+    for call in (*calls, lambda x: nsg.render_outputs(x, ("alpha",))):
+        with pytest.raises(TypeError, match=r"^list where .* path"):
+            call([STAR])
 
 
-def test_a_scene_has_no_values_to_sweep(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="several Scenes are drawn by `animate`"):
-        nsg.render_many(STAR, tmp_path / "out")  # type: ignore[arg-type]
-    nsg.animate([STAR, STAR], tmp_path / "%d.png")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.png", "1.png"]
+CANVAS = "canvas(64, 64);"
+FOUR = """chain {
+  square           { scale(0.8); translate(-0.2, 0); material flat { color(#d33); } }
+  smooth pentagon  { twirl(0.6); bend(0.2); scale(0.5); rotate(30deg); }
+  subtract star    { scale(0.3); translate(0.1, 0.1); }
+  intersect square { rotate(45deg); }
+}"""
+MANY = "for (i in 0..<200) { star { scale(0.1); translate(2 * rand(i) - 1, 2 * rand(i + 500) - 1); } }"
+STEP = 1 / 255
+BOTH = pytest.mark.parametrize("device", ["auto", "cpu"], ids=["numpy", "torch"])
+
+
+def program(text: str) -> nsg.Program:
+    return nsg.compile(nsg.loads(text))
+
+
+def test_an_empty_scene_is_the_background() -> None:
+    image = nsg.render(nsg.loads(CANVAS + "background(#369);"))
+    assert image.shape == (64, 64, 3)
+    assert np.abs(image - np.array([0.2, 0.4, 0.6])).max() < STEP
+    clear = nsg.render(nsg.loads(CANVAS + "background(none);"))
+    assert clear.shape == (64, 64, 4)
+    assert clear[..., 3].max() < STEP
+    image = nsg.render(nsg.loads(CANVAS + "square { material flat { color(#d33); } }"))
+    assert image.dtype == np.float32
+    assert np.abs(image[32, 32] - np.array([0xDD, 0x33, 0x33]) / 255).max() < STEP
+    assert np.abs(image[0, 0] - 1).max() < STEP
+
+
+def test_200_objects() -> None:
+    scene = nsg.loads("canvas(128, 128); background(#000);" + MANY)
+    drawn, exact = nsg.render(scene), nsg.render(scene, backend="reference")
+    assert len(nsg.compile(scene)) == 200
+    assert np.abs(drawn - exact).mean() < 0.01
+
+
+def test_non_square_and_transparent() -> None:
+    scene = nsg.loads("canvas(96, 40); background(none); star { translate(1.2, 0); }")
+    drawn, exact = nsg.render(scene), nsg.render(scene, backend="reference")
+    assert drawn.shape == exact.shape == (40, 96, 4)
+    assert np.abs(drawn[..., 3] - exact[..., 3]).mean() < 0.02
+    assert drawn[..., 3].max() > 0.99
+
+
+@BOTH
+def test_pictures_repeat(device: Device) -> None:
+    compiled, shares = program(FOUR), list[float]()
+    first = nsg.render(nsg.loads(FOUR), device=device, progress=shares.append)
+    assert max(shares) == 1.0
+    nsg.render(program(CANVAS + FOUR))
+    assert np.array_equal(nsg.render(compiled, device=device), first)
+    for threads in (1, 3):
+        image = nsg.render(compiled, device=device, threads=threads)
+        assert np.abs(image - first).max() <= STEP
+        assert np.array_equal(nsg.render(compiled, device=device, threads=threads), image)
+
+
+def test_tiles_do_not_show() -> None:
+    compiled, network = program(FOUR), torch_backend.open_model("shapes2d").network
+    arguments = (network, compiled)
+    whole = draw(*arguments, tile=1 << 20).image
+    for tile in (1, 700, 1 << 12):
+        assert np.abs(draw(*arguments, tile=tile).image - whole).max() <= STEP
+
+
+def test_torch_keeps_its_number_of_threads() -> None:
+    import torch
+
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(3)
+        nsg.render(program(CANVAS + FOUR), device="cpu", threads=2)
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)
+
+
+@BOTH
+def test_other_and_missing_weights(device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    compiled = program(CANVAS)
+    with pytest.raises(nsg.RenderError, match="compile the scene again"):
+        nsg.render(dataclasses.replace(compiled, weights="0" * 64), device=device)
+    with pytest.raises(nsg.RenderError, match="unknown model `other`"):
+        nsg.render(dataclasses.replace(compiled, model="other"), device=device)
+    torch_backend._load.cache_clear()
+    files._load.cache_clear()
+    monkeypatch.setattr("scenelang.compiler.weights.weights_path", lambda name, digest: tmp_path / "none")
+    with pytest.raises(nsg.RenderError, match="cannot read the weights"):
+        nsg.render(compiled, device=device)
+
+
+def test_what_is_refused() -> None:
+    good = program(FOUR)
+    vectors, tokens = good.vectors.copy(), good.tokens.copy()
+    vectors[1, 7], tokens[2] = np.nan, 7
+    with pytest.raises(nsg.ProgramError, match=r"vectors of object 1 .* not finite"):
+        dataclasses.replace(good, vectors=vectors)
+    with pytest.raises(nsg.ProgramError, match="a group that does not end"):
+        dataclasses.replace(good, tokens=tokens)
+    with pytest.raises(nsg.SceneError, match="E0501"):
+        nsg.render(nsg.Scene(nodes=(nsg.Object("circle"),)))
+    with pytest.raises(nsg.SceneError, match="E0501"):
+        nsg.render(nsg.Scene(nodes=(nsg.Object("circle"),)), backend="reference")
+    with pytest.raises(nsg.RenderError, match="the reference draws scenes"):
+        nsg.render(program(CANVAS), backend="reference")
+    with pytest.raises(ValueError, match="unknown backend"):
+        nsg.render(program(CANVAS), backend="magic")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="unknown device"):
+        nsg.render(program(CANVAS), device="tpu")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="0 threads"):
+        nsg.render(program(CANVAS), threads=0)
+
+
+def test_the_reference_draws_what_a_model_does_not() -> None:
+    text = CANVAS + "subtract { square {} intersect { star {} pentagon {} } }"
+    with pytest.raises(nsg.SceneError, match="E0513"):
+        nsg.render(nsg.loads('model "shapes2d-reading";' + text))
+    image = nsg.render(nsg.loads(text + "background(#000);"), backend="reference")
+    assert 0.1 < image.mean() < 0.9
+
+
+def test_images_save_and_show_themselves(tmp_path: Path) -> None:
+    image = nsg.render(nsg.loads(CANVAS + "background(none); square {}"))
+    assert isinstance(image, nsg.Image)
+    image.save(tmp_path / "a.png")
+    image.save(tmp_path / "a.bmp")
+    assert (tmp_path / "a.png").read_bytes() == image._repr_png_()
+    with pytest.raises(ValueError, match="no image format"):
+        image.save(tmp_path / "a.nsg")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.bmp", "a.png"]

@@ -85,10 +85,7 @@ def prepare_inner(block: tree.Block | None, place: Place) -> Body:
 
 
 def _collected(stmt: tree.Stmt, place: Place) -> Action | None:
-    """`prepare_statement`, noting what the statement depends on; one that no frame changes runs once.
-
-    That holds of statements of a file or its groups. Loops and modules run more than once in a frame.
-    """
+    """`prepare_statement`, noting dependencies; what no frame changes, in a file or its groups, runs once."""
     session = place.session
     if not session.replays or place.repeated or place.scope.slots.root is None:
         return prepare_statement(stmt, place)
@@ -120,17 +117,14 @@ def _unbind(scope: Scope) -> list[Action]:
 def misplaced(
     place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
-    """Report a statement in the wrong place, unless nothing is known about the place.
+    """Report a statement in the wrong place; several in one block with the same ``fact`` are one report.
 
-    Several in one block with the same ``fact``, a message with ``{}`` for the name, are one report: it is the
-    block that is of the wrong kind.
+    Args:
+        fact: the message, with ``{}`` for the name.
     """
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
         place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
-
-
-# ---------------------------------------------------------------- definitions
 
 
 def define(name: tree.Name, binding: Binding, place: Place) -> bool:
@@ -215,9 +209,6 @@ def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Pl
     definition.size = slots.size
 
 
-# ---------------------------------------------------------------- control flow
-
-
 def _items(value: Any) -> Any:
     if value.__class__ is Vec:
         return value.items
@@ -281,19 +272,14 @@ def prepare_if(stmt: tree.If, place: Place) -> Action | None:
 
 
 class Replayed(Record, frozen=False):
-    """The action of a statement of a file or a group that runs at most once in a frame.
-
-    Args:
-        varies: whether frames change it, once that was asked.
-        kept: what it put into its block, the places of that, and the steps, objects and parts it counted.
-    """
+    """The action of a statement of a file or a group that runs at most once in a frame."""
 
     action: Callable[[Any, Builder], None]
     needs: Needs
     session: Session
     span: Span
-    varies: bool | None = None
-    kept: tuple[Builder, SpanMap, int, int, int] | None = None
+    varies: bool | None = None  # whether frames change it, once that was asked
+    kept: tuple[Builder, SpanMap, int, int, int] | None = None  # what it added; steps, objects and parts
 
     def __call__(self, env: Any, out: Builder) -> None:
         """Run the statement, or replay what it did."""
@@ -332,12 +318,11 @@ def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
     """Test whether children may stand here, and report it if not."""
     if place.kind in HOLDERS:
         return True
-    if place.kind == "material":
-        help = "a material's block holds texture operations"
-        misplaced(place, span, f"{what} inside a material", name, help)
-    else:
+    within, help = "a material", "a material's block holds texture operations"
+    if place.kind != "material":
         help = "a block of an object or a call holds transforms and a material; use group { … } for children"
-        misplaced(place, span, f"{what} inside an object", name, help)
+        within = "an object"
+    misplaced(place, span, f"{what} inside {within}", name, help)
     return False
 
 
@@ -357,9 +342,6 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
     out.add(node)
     if session.watch is not None:
         session.watch(where.statement, node)
-
-
-# ---------------------------------------------------------------- objects
 
 
 def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -> Action | None:
@@ -401,9 +383,6 @@ def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -
     return action
 
 
-# ---------------------------------------------------------------- groups, booleans, chains
-
-
 def prepare_node(stmt: tree.Node, place: Place) -> Action | None:
     fits = holds_children(place, stmt.keyword, "`{}`", stmt.kind)
     chain = stmt.kind == "chain"
@@ -442,19 +421,19 @@ def _width(stmt: tree.Node | tree.Combined, place: Place) -> Callable[[Env], flo
     if not bound or bound[0] is None:
         return lambda env: None
     get, operand = bound[0].code.run, bound[0].arg.value
-    check = guarded(place, _above_0, operand.span, (operand,))
+
+    def above_0(k: Any) -> float:
+        if number(k) <= 0.0:
+            raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
+        return float(k)
+
+    check = guarded(place, above_0, operand.span, (operand,))
 
     def run(env: Env) -> float | None:
         k = check(get(env))
         return None if k is POISON else blend_width(op, float(k))
 
     return run
-
-
-def _above_0(k: Any) -> float:
-    if number(k) <= 0.0:
-        raise Problem("E0311", f"a blend of width {show(k)} is not above 0", operand=0)
-    return float(k)
 
 
 def _finish(
@@ -468,9 +447,6 @@ def _finish(
     if kind in ("group", "chain"):
         return make(Group if kind == "group" else Chain, {"kind": kind, **fields})
     return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
-
-
-# ---------------------------------------------------------------- chains
 
 
 def _check_first(stmt: tree.Node, place: Place) -> None:
@@ -516,9 +492,6 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         out.op, out.k = "union", None
 
     return action
-
-
-# ---------------------------------------------------------------- modules
 
 
 def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -> Action | None:
@@ -568,11 +541,7 @@ def place_called(
 
 
 def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None:
-    """A statement headed by the name of a geometry or a group.
-
-    Args:
-        called: what a Scene calls it.
-    """
+    """A statement headed by the name of a geometry or a group, which a Scene calls ``called``."""
     alias, _, name = called.partition(".")
     file = next(file for file in place.session.elements.values() if file.name == alias)
     zoo = file.zoo

@@ -1,7 +1,6 @@
 """From the syntax tree to a concrete Scene, and params as values to choose among.
 
-A file is prepared (names resolved, expressions made into closures), then run once; both steps report
-what they find and go on. A Scene comes out only where nothing is wrong.
+A file is prepared (names resolved, expressions made into closures), then run; both steps report and go on.
 """
 
 from __future__ import annotations
@@ -63,15 +62,13 @@ class Source(Record):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Values for params, by name."""
+        """Values for params."""
         return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
 
     def parsed(self, diagnostics: Diagnostics) -> Source:
         """The same with its text and tree; mistakes of the syntax are reported once, here.
 
-        Raises:
-            SceneError: the file is not text.
-            OSError: it cannot be opened.
+        Raises OSError where the file cannot be opened, and SceneError where it is not text.
         """
         if self.tree is not None:
             return self
@@ -86,28 +83,15 @@ class Source(Record):
         return replace(self, text=text, tree=parse(text, diagnostics))
 
     def evaluation(
-        self,
-        diagnostics: Diagnostics,
-        *,
-        frame: int = 0,
-        replays: bool = False,
-        watch: Watch | None = None,
+        self, diagnostics: Diagnostics, *, frame: int = 0, replays: bool = False, watch: Watch | None = None
     ) -> Evaluation:
         """Prepare the scene; arguments as for `Evaluation`, and raises as `parsed`."""
-        return Evaluation(self.parsed(diagnostics), diagnostics, frame=frame, replays=replays, watch=watch)
+        return Evaluation(self.parsed(diagnostics), diagnostics, frame, replays, watch)
 
     def scene(self, diagnostics: Diagnostics, frame: int = 0) -> tuple[Scene | None, SpanMap]:
-        """Evaluate one frame.
+        """Evaluate one frame: the Scene, None if anything is wrong with it, and where its nodes were written.
 
-        Args:
-            diagnostics: where mistakes go, in the order of the text.
-
-        Returns:
-            The Scene, or None if anything is wrong with it, and where its nodes were written.
-
-        Raises:
-            OSError: the file cannot be opened.
-            ValueError: ``size`` is not a canvas.
+        Mistakes are reported in the order of the text; raises OSError for the file, ValueError for ``size``.
         """
         before, start = len(diagnostics.errors), len(diagnostics)
         try:
@@ -124,14 +108,12 @@ def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) ->
 
 
 class Evaluation:
-    """A file prepared once, to be run for any number of frames.
+    """A file prepared once, to be run for any number of frames; the first with a mistake reports it.
 
     Args:
         source: the scene; its text is parsed.
-        diagnostics: where mistakes go; each is reported for the first frame that has it.
         frame: the first frame that is run, from 0.
-        replays: run what no frame changes once.
-        watch: shown every name's value and every node; see `Session`.
+        replays, watch: see `Session`.
 
     Attributes:
         wanted: all files that it imports, also those that are not there.
@@ -140,13 +122,7 @@ class Evaluation:
     """
 
     def __init__(
-        self,
-        source: Source,
-        diagnostics: Diagnostics,
-        *,
-        frame: int = 0,
-        replays: bool = False,
-        watch: Watch | None = None,
+        self, source: Source, diagnostics: Diagnostics, frame: int, replays: bool, watch: Watch | None
     ) -> None:
         assert source.tree is not None
         self.file = file = source.tree
@@ -154,18 +130,11 @@ class Evaluation:
         self.animates = any(isinstance(s, nodes.Call) and s.name.text == "animate" for s in file.statements)
         self._errors = len(diagnostics.errors)
         self._steps = self._objects = 0
-        self._session = session = Session(
-            Reporter(diagnostics),
-            EXPRESSIONS,
-            STATEMENTS,
-            frame,
-            source.fps,
-            replays=replays and self.animates,
-            watch=watch,
-        )
+        session = Session(Reporter(diagnostics), EXPRESSIONS, STATEMENTS, frame, source.fps, watch=watch)
+        session.replays = replays and self.animates
+        self._session = session
         path = None if source.path is None else Path(source.path).resolve()
-        folder = path.parent if path is not None else None
-        folder = folder if source.root is None else Path(source.root).resolve()
+        folder = (path and path.parent) if source.root is None else Path(source.root).resolve()
         loader = Loader(folder, [path] if path is not None else [], texts=source.texts or {})
         params = source.params
         self.inputs = given = params if isinstance(params, Defines) else Defines(params or {})
@@ -203,10 +172,7 @@ class Evaluation:
                 self.diagnostics.add("W0303", message, span, help=help)
 
     def run(self, frame: int) -> tuple[Scene | None, SpanMap]:
-        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame.
-
-        What is found in another frame than the first has the frame's number.
-        """
+        """Evaluate a frame; the Scene is None if anything was wrong so far, in any frame."""
         session, before = self._session, len(self.diagnostics)
         if not self.animates and frame != 0:
             self.diagnostics.add("E0337", f"frame {frame} of a scene without animate(…)", None)
@@ -329,13 +295,7 @@ def loads(
 def opened(
     given: Scene | str | os.PathLike[str], diagnostics: Diagnostics, size: tuple[int, int] | None = None
 ) -> tuple[Scene, SpanMap | None]:
-    """A Scene as it is, or that of a file, and where its nodes were written.
-
-    Raises:
-        SceneError: the file has errors.
-        TypeError: neither a Scene nor a path.
-        ValueError, OSError: as `load`.
-    """
+    """A Scene as it is, or a file's, and where its nodes were written; raises TypeError, and as `load`."""
     if isinstance(given, Scene):
         return given if size is None else given.sized(size), None
     if not isinstance(given, str | os.PathLike):
@@ -360,36 +320,22 @@ class ParamError(ValueError):
 
 
 class Axis(Record):
-    """One number, or one choice, that is searched.
+    """One number, or one choice, that is searched."""
 
-    Args:
-        label: what reports call it: ``k``, or ``ink.2`` of a vector.
-        low, high: of a continuous one, in base units.
-        choices: values there are, else; none where it is continuous.
-        wraps: whether both ends mean the same, as those of a full turn do.
-    """
-
-    label: str
-    low: float = 0.0
+    label: str  # what reports call it: ``k``, or ``ink.2`` of a vector
+    low: float = 0.0  # in base units
     high: float = 1.0
-    choices: tuple[Any, ...] = ()
-    wraps: bool = False
+    choices: tuple[Any, ...] = ()  # none where it is continuous
+    wraps: bool = False  # whether both ends mean the same, as those of a full turn do
 
 
 class Knob(Record):
-    """A param that is searched.
-
-    Args:
-        stmt: its statement.
-        value: its default.
-        axes: one, or one for each number of a vector.
-        inner: whether the value is a vector of the axes' numbers.
-    """
+    """A param that is searched."""
 
     stmt: nodes.Param
-    value: Any
-    axes: tuple[Axis, ...]
-    inner: bool
+    value: Any  # its default
+    axes: tuple[Axis, ...]  # one, or one for each number of a vector
+    inner: bool  # whether the value is a vector of the axes' numbers
 
     @property
     def name(self) -> str:
@@ -441,10 +387,8 @@ def check_width(name: str, low: float, high: float) -> None:
 
 def _axis(label: str, allowed: RangeValue) -> Axis:
     check_width(label, allowed.start, allowed.stop)
-    if allowed.step is not None and math.isinf((allowed.stop - allowed.start) / allowed.step):
-        raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
     if allowed.step is not None:
-        if allowed.count() > MOST_CHOICES:
+        if math.isinf((allowed.stop - allowed.start) / allowed.step) or allowed.count() > MOST_CHOICES:
             raise ParamError(f"param `{label}` has more than {MOST_CHOICES:,} steps")
         return Axis(label, choices=_few(label, tuple(allowed)))
     low, high = allowed.start, allowed.stop
@@ -456,17 +400,15 @@ def _axis(label: str, allowed: RangeValue) -> Axis:
 
 def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
     if not 0 < len(choices) <= MOST_CHOICES:
-        raise ParamError(
-            f"param `{name}` has {len(choices):,} choices, where 1 to {MOST_CHOICES:,} can be tried"
-        )
+        found = f"{len(choices):,} choices, where 1 to {MOST_CHOICES:,} can be tried"
+        raise ParamError(f"param `{name}` has {found}")
     return choices
 
 
 def is_colour(expr: nodes.Expr) -> bool:
     """Test whether an expression is written as a colour."""
-    return isinstance(expr, nodes.Color) or (
-        isinstance(expr, nodes.CallExpr) and expr.name.text in ("rgb", "hsv")
-    )
+    called = expr.name.text if isinstance(expr, nodes.CallExpr) else ""
+    return isinstance(expr, nodes.Color) or called in ("rgb", "hsv")
 
 
 def value_at(axis: Axis, u: float, like: Any) -> Any:
@@ -479,15 +421,8 @@ def value_at(axis: Axis, u: float, like: Any) -> Any:
     return like.__class__(x) if like.__class__ in (Angle, Time) else x
 
 
-# ---------------------------------------------------------------- values as text
-
-
 def written(knob: Knob, value: Any, digits: int = _DIGITS) -> str:
-    """A value as its statement would have it: in the default's unit, with digits enough for its range.
-
-    Args:
-        digits: decimal places, of the range's width.
-    """
+    """A value as its statement would have it, in the default's unit; ``digits`` are of the range's width."""
     if not knob.inner:
         return _literal(value, knob.axes[0], knob.stmt.default, digits)
     if is_colour(knob.stmt.default):

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from scenelang.language import foreign, limits, tree, values, words
 from scenelang.language.advice import VALUES, member_advice, report_problem, unknown, unknown_member
 from scenelang.language.builder import FileContext, Place
-from scenelang.language.diagnostics import Fix, Label, Span, did_you_mean, instead, listing
+from scenelang.language.diagnostics import Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
 from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX_DEPTH, MAX_NESTING
 from scenelang.language.reporter import Reporter
@@ -212,9 +212,6 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
 
     parts = [part for part in (expr.start, expr.stop, expr.step) if part is not None]
     return computed(place, make, expr.span, parts)
-
-
-# ---------------------------------------------------------------- parts of values
 
 
 def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
@@ -491,7 +488,6 @@ def bind(
 
     Args:
         required: how many of ``params``, from the left, have to be given.
-        args: arguments as written; positional ones fill the parameters in order.
         definition: what is called, unless the language has it.
         spread: one positional argument may be a vector of all.
         help: advice for a wrong number of arguments; by default the signature.
@@ -501,19 +497,10 @@ def bind(
     shown = help or f"it is called {words.signature(called, params, required)}"
     here = (Label(definition.name.span, "defined here"),) if definition else ()
 
-    def fail(
-        way: str,
-        message: str,
-        span: Span,
-        help: str | None = None,
-        fix: Fix | None = None,
-        code: str = "E0308",
-        labels: tuple[Label, ...] = here,
-    ) -> None:
-        outer = definition.name.span if definition else span
-        report.error_once(
-            (code, way, outer.source, outer), code, message, span, help=help, fix=fix, labels=labels
-        )
+    def fail(way: str, message: str, span: Span, help: str | None = None, **more: Any) -> None:
+        outer, code = definition.name.span if definition else span, more.pop("code", "E0308")
+        key = (code, way, outer.source, outer)
+        report.error_once(key, code, message, span, help=help, **{"labels": here, **more})
 
     good, position = True, 0
     for given in args:
@@ -536,7 +523,7 @@ def bind(
                 hint = f"its block has the colour: {called}(…) {{ material flat {{ color(#d33); }} }}"
             hint = hint or (f"its arguments are {listing(params)}" if params else "it takes no arguments")
             message = f"`{called}` has no argument `{word.text}`"
-            fail(word.text, message, word.span, hint, fix, "E0206")
+            fail(word.text, message, word.span, hint, fix=fix, code="E0206")
             continue
         earlier = bound[index]
         if earlier is None:
@@ -644,7 +631,7 @@ def _doubted(hsv: Callable[..., Any], span: Span, place: Place) -> Callable[...,
 def entering(name: tree.Name, args: Sequence[Given], definition: Definition, place: Place) -> Run | None:
     """Function that counts a call and makes its slots; None if the arguments do not fit.
 
-    When the call is over, the caller takes 1 from the session's depth and puts its calls back.
+    The caller puts the session's depth and calls back.
     """
     params = definition.node.params
     session, span = place.session, name.span

@@ -19,8 +19,6 @@ SHAPES: Final = "std/shapes"
 MESHES: Final = "std/meshes"
 _FOLDER: Final = Path(__file__).resolve().parent / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
-
-
 _SUFFIXES: Final = (".nsg", ".safetensors")
 _FILES: Final = {f"std/{path.stem}": path for path in _FOLDER.iterdir() if path.suffix in _SUFFIXES}
 
@@ -89,20 +87,13 @@ class Calls(NamedTuple):
 
 
 class SpanMap(Record, frozen=False):
-    """Spans of a Scene's nodes, transforms and materials, by identity.
+    """Spans of a Scene's nodes, transforms and materials, for the very objects that the evaluator made."""
 
-    It answers for the very objects that the evaluator made; for any other it answers None. Nodes that one
-    statement made many times share one place.
-    """
-
+    # by `id`; each entry holds its node, so that no other can come by that `id`
     _known: dict[int, tuple[object, Written, Calls | None]] = field(default_factory=dict)
-    """By `id`; each entry holds its node, so that no other can come by that `id`."""
 
     def record(self, node: object, written: Written, calls: Calls | None = None) -> None:
-        """Remember where ``node`` was written and through which calls it came about.
-
-        What the library makes counts as written where it is called.
-        """
+        """Remember where ``node`` was written (what the library makes: where it is called) and its calls."""
         if calls is not None and holds(written.name.source):
             site = calls.outside() or written.name
             written = Written(site, site)

@@ -160,23 +160,14 @@ _NO_VECTOR: Final = {
 
 
 class Spec(Record):
-    """How the arguments of a statement become a node, or values in order where it has none.
-
-    Args:
-        word: its name, its arguments and their kinds.
-        help: advice for a wrong number of arguments; None prints the signature.
-        spread: whether one vector may stand for all arguments.
-        node: class of the node; None for the size and the background of the picture.
-        rows: field, reader, default and number of each argument.
-        stated: whether it is a setting.
-    """
+    """How the arguments of a statement become a node, or values in order where it has none."""
 
     word: words.Word
-    help: str | None
-    spread: bool
-    node: type[Frozen] | None
-    rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]
-    stated: bool
+    help: str | None  # advice for a wrong number of arguments; None prints the signature
+    spread: bool  # whether one vector may stand for all arguments
+    node: type[Frozen] | None  # None for the size and the background of the picture
+    rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]  # field, reader, default, number
+    stated: bool  # whether it is a setting
 
     @staticmethod
     def of(word: words.Word) -> Spec:
@@ -223,11 +214,7 @@ EVEN_SCALE: Final = replace(GEOMETRY["scale"], word=words.Word("scale", "scale(s
 
 
 def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
-    """Arguments in full: the items of one vector, or the values as they are.
-
-    Raises:
-        Problem: a vector of a length that does not fit, or one number alone.
-    """
+    """Arguments in full: the items of one vector, or the values as they are; raises Problem."""
     first, params, required = values[0], word.params, word.required
     if len(values) > 1 and (values[1] is not LEFT_OUT or values[-1] is not LEFT_OUT):
         return values
@@ -388,9 +375,7 @@ def prepare_use(stmt: tree.MaterialUse, place: Place) -> Action | None:
 
 def prepare_material(expr: tree.MaterialExpr, place: Place) -> Code:
     make_material = _prepare(expr, place)
-    if make_material is None:
-        return POISONED
-    return Code(lambda env: MaterialValue(make_material(env)))
+    return POISONED if make_material is None else Code(lambda env: MaterialValue(make_material(env)))
 
 
 def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Callable[[Env], Material] | None:

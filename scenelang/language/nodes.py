@@ -384,15 +384,15 @@ class _Warp(Frozen):
     kind: str
     k: Rate
 
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
-
 
 class Twirl(_Warp):
     """A turn that grows with the distance from the origin."""
 
     kind: Literal["twirl"] = "twirl"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
 
 
 class Bend(_Warp):
@@ -400,11 +400,19 @@ class Bend(_Warp):
 
     kind: Literal["bend"] = "bend"
 
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
+
 
 class Twist(_Warp):
     """A turn of (x, z) that grows along y; for 3D models."""
 
     kind: Literal["twist"] = "twist"
+
+    if TYPE_CHECKING:
+
+        def __init__(self, k: float) -> None: ...
 
 
 class Displace(Frozen):

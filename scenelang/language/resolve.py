@@ -1,9 +1,4 @@
-"""Definitions and their uses, found without running anything.
-
-The walk follows the evaluator's rules of sight: functions and modules are known in their whole block,
-everything else from its line on, and an inner block may bind a name anew. One file is looked at by itself;
-what an imported file brings is asked of the `Library` when somebody wants to know.
-"""
+"""Definitions of a file and their uses, found without running anything by the evaluator's rules of sight."""
 
 from __future__ import annotations
 
@@ -41,21 +36,15 @@ _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.f
 
 
 class Symbol(Record, frozen=False):
-    """A definition.
-
-    Args:
-        node: its statement or formal parameter.
-        since: the offset from which on it is in sight.
-        owner: the fn or module that it is a parameter of.
-    """
+    """A definition."""
 
     name: str
     kind: Kind
     span: Span
     node: tree.Stmt | tree.Parameter
     scope: Scope
-    since: int
-    owner: Symbol | None = None
+    since: int  # the offset from which on it is in sight
+    owner: Symbol | None = None  # the fn or module that it is a parameter of
     params: list[Symbol] = field(default_factory=list)
 
     @property
@@ -85,22 +74,15 @@ class Scope(Record, frozen=False):
 
 
 class Use(Record, frozen=False):
-    """A place where a name stands.
-
-    Args:
-        start, end: the place.
-        symbol: its definition in this file, or that of the import a member belongs to.
-        callee: for an argument, the use of what is called.
-        defines: whether this is the definition itself.
-    """
+    """A place where a name stands."""
 
     start: int
     end: int
     text: str
     role: Role
-    symbol: Symbol | None = None
-    callee: Use | None = None
-    defines: bool = False
+    symbol: Symbol | None = None  # its definition in this file, or that of the import a member belongs to
+    callee: Use | None = None  # for an argument, the use of what is called
+    defines: bool = False  # whether this is the definition itself
 
 
 class Names:
@@ -151,8 +133,6 @@ class Names:
         """Definitions that files that import this one see."""
         return [symbol for symbol in self.top.symbols.values() if symbol.is_exported]
 
-    # ------------------------------------------------------------ definitions
-
     def _define(
         self,
         name: tree.Name,
@@ -190,8 +170,6 @@ class Names:
                 formal = self._define(param.name, "argument", param, around, param.span.end, symbol)
                 symbol.params.append(formal)
             self._walk(definition.body, around, "group")
-
-    # ------------------------------------------------------------ statements and expressions
 
     def _walk(self, node: Any, scope: Scope, kind: str) -> None:
         """Note the names in a statement or an expression, in a block of some kind."""
@@ -275,9 +253,8 @@ class Names:
             role = "operation"
         elif name in TRANSFORMS:
             role = "transform"
-        head = (
-            self._add(stmt.name.span, name, role) if role else self._reference(stmt.name, scope, "geometry")
-        )
+        span = stmt.name.span
+        head = self._add(span, name, role) if role else self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)
         if stmt.body is not None:
             value = head is not None and head.symbol is not None and head.symbol.kind in ("let", "argument")

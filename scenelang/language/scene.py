@@ -61,14 +61,7 @@ from scenelang.language.words import BLEND, STAGE
 
 
 def objects_of(zoo: Zoo, file: str, name: str) -> tuple[Object, ...]:
-    """The parts of a group in their places and looks, in order of painting.
-
-    Args:
-        file: what a Scene calls the file.
-
-    Raises:
-        KeyError: there is no such group.
-    """
+    """The parts of a group of a file in their places and looks, in order of painting; raises KeyError."""
     if name not in zoo.groups:
         raise KeyError(f"`{file}` has no group `{name}`; it has {listing(zoo.groups) or 'none'}")
     return tuple(
@@ -355,8 +348,6 @@ def same_nodes(a: Scene, b: Scene) -> bool:
     )
 
 
-# ---------------------------------------------------------------- JSON
-
 Key = str | int
 _HEADINGS: Final = ("model", "geometry", "op", "name", "kind")
 """Keys that tell what a node is, the most telling first."""
@@ -494,10 +485,7 @@ def _laid_out(value: Any, margin: str) -> str:
 def load_json(
     source: SourceFile, diagnostics: Diagnostics, root: Path | None = None
 ) -> tuple[Scene | None, SpanMap]:
-    """A Scene from JSON text, or None after reports, and where its nodes are written there.
-
-    Its files of elements are read from the folder ``root``, if there is one.
-    """
+    """A Scene from JSON text, None after reports, and where its nodes are written there; as `from_json`."""
     spans = SpanMap()
     try:
         scene = _read(source)

@@ -1,7 +1,6 @@
 """One evaluation: limits, names, files that it may read, and what it shares.
 
-Names are resolved while a file is prepared, before it runs. A running file, function or module has one
-list of slots; slot 0 of a function's or module's list is the list it was defined in.
+A running file, function or module has one list of slots; slot 0 of a call's is the list it was defined in.
 """
 
 from __future__ import annotations
@@ -32,15 +31,10 @@ UNBOUND: Final = object()
 
 
 class Needs(Record, frozen=False):
-    """Dependencies of a statement, or of the body of a function or module.
+    """Dependencies of a statement, or of the body of a function or module."""
 
-    Args:
-        frame: it reads ``t``, ``u`` or ``frame`` itself.
-        on: the needs of the names in it.
-    """
-
-    frame: bool = False
-    on: list[Needs] = field(default_factory=list)
+    frame: bool = False  # it reads ``t``, ``u`` or ``frame`` itself
+    on: list[Needs] = field(default_factory=list)  # the needs of the names in it
 
     def varies(self) -> bool:
         """Test whether it may differ from frame to frame; ask when everything is prepared."""
@@ -55,17 +49,11 @@ class Needs(Record, frozen=False):
 
 
 class Slots(Record, frozen=False):
-    """The slots of a file, or of one call of a function or module.
+    """The slots of a file, or of one call of a function or module."""
 
-    Args:
-        parent: those of where it was defined; None for a file.
-        root: a file's live slots, which exist while it is prepared; None for a call.
-        owner: the name of the function or module that is called.
-    """
-
-    parent: Slots | None = None
-    root: Env | None = None
-    owner: Span | None = None
+    parent: Slots | None = None  # those of where it was defined; None for a file
+    root: Env | None = None  # a file's live slots, which exist while it is prepared; None for a call
+    owner: Span | None = None  # the name of the function or module that is called
     size: int = 1
 
     def add(self) -> int:
@@ -77,45 +65,30 @@ class Slots(Record, frozen=False):
 
 
 class Definition(Record, frozen=False):
-    """A fn or module: what calls refer to; ``run`` is set once its body is prepared.
-
-    Args:
-        outer: the slots of where it was defined.
-        run: of a fn ``run(env) -> value``; of a module its block's actions.
-        defaults: how to get each parameter's default.
-        size: number of slots of a call.
-        weight: evaluation steps of one call.
-        needs: what its body depends on besides its arguments.
-    """
+    """A fn or module: what calls refer to; ``run`` is set once its body is prepared."""
 
     node: tree.Fn | tree.Module
-    outer: Slots
-    run: Any = None
-    defaults: tuple[Any, ...] = ()
-    size: int = 1
-    weight: int = 1
-    needs: Needs = field(default_factory=Needs)
+    outer: Slots  # those of where it was defined
+    run: Any = None  # of a fn ``run(env) -> value``; of a module its block's actions
+    defaults: tuple[Any, ...] = ()  # how to get each parameter's default
+    size: int = 1  # number of slots of a call
+    weight: int = 1  # evaluation steps of one call
+    needs: Needs = field(default_factory=Needs)  # what its body depends on besides its arguments
 
 
 class Binding(Record, frozen=False):
     """Meaning of a name.
 
-    Args:
-        span: where; None for the language's own names.
-        slots: what holds its slot.
-        value: a `Definition`, an imported file, what a Scene calls an element, or the value of a ``let`` that
-            never changes.
-        known: whether ``value`` is that of such a ``let``.
-        needs: what the value of a ``let`` depends on.
+    Its value: a `Definition`, an imported file, a Scene's name of an element, or that of a constant ``let``.
     """
 
     kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
-    span: Span | None = None
-    slots: Slots | None = None
+    span: Span | None = None  # None for the language's own names
+    slots: Slots | None = None  # what holds its slot
     slot: int = 0
     value: Any = None
-    known: bool = False
-    needs: Needs | None = None
+    known: bool = False  # whether ``value`` is that of a ``let``
+    needs: Needs | None = None  # what the value of a ``let`` depends on
 
     def labels(self, words: str = "defined here") -> tuple[Label, ...]:
         """A label for its definition, if that has a place."""
@@ -128,8 +101,7 @@ class Scope(Record, frozen=False):
     slots: Slots
     parent: Scope | None = None
     names: dict[str, Binding] = field(default_factory=dict)
-    later: dict[str, Span] = field(default_factory=dict)
-    """Names that a later line of this block defines."""
+    later: dict[str, Span] = field(default_factory=dict)  # names that a later line of this block defines
 
     def outwards(self) -> Iterator[Scope]:
         """This block, and those around it."""
@@ -170,45 +142,24 @@ Watch = Callable[[Span, Any], None]
 
 
 class Settings(Record, frozen=False):
-    """Settings of the top level, and the place of each.
+    """Settings of the top level, and the place of each."""
 
-    Args:
-        canvas: width and height in pixels.
-        background: colour as written, or None for transparency.
-        stage: camera, light and ground, where they are stated.
-        given: the place of each setting, by its word.
-        model: name of the model that the file names.
-    """
-
-    canvas: tuple[int, int] = (256, 256)
-    background: tuple[float, float, float] | Unsaid | None = "default"
-    stage: dict[str, Any] = field(default_factory=dict)
+    canvas: tuple[int, int] = (256, 256)  # width and height in pixels
+    background: tuple[float, float, float] | Unsaid | None = "default"  # as written; None for transparency
+    stage: dict[str, Any] = field(default_factory=dict)  # camera, light and ground, where they are stated
     animation: Animation | None = None
     model: str | None = None
-    given: dict[str, Span] = field(default_factory=dict)
+    given: dict[str, Span] = field(default_factory=dict)  # the place of each setting, by its word
 
 
 class Session(Record, frozen=False):
-    """The state of one evaluation over all its files.
-
-    Args:
-        expressions, statements: how each class of the syntax tree is prepared.
-        frame: the one that is run, from 0.
-        fps: frames a second, instead of those that ``animate`` names.
-        replays: run what no frame changes once; the evaluation is for several frames.
-        roots: the live slots of every file.
-        needs: collects what the statement being prepared depends on.
-        elements: files of elements that were imported, by their places.
-        zeros: where an angle was a 0 without a unit that frames may change.
-        still: it has been said that there is no animation for time to run in.
-        watch: called with the place of each name and its value, and of each statement and its node.
-    """
+    """The state of one evaluation over all its files."""
 
     report: Reporter
-    expressions: Mapping[type, Callable[..., Any]]
+    expressions: Mapping[type, Callable[..., Any]]  # how each class of the syntax tree is prepared
     statements: Mapping[type, Callable[..., Any]]
-    frame: int = 0
-    fps: float | None = None
+    frame: int = 0  # the one that is run, from 0
+    fps: float | None = None  # frames a second, instead of those that ``animate`` names
     spans: SpanMap = field(default_factory=SpanMap)
     steps: int = 0
     objects: int = 0
@@ -217,13 +168,13 @@ class Session(Record, frozen=False):
     node_depth: int = 0
     animated: list[Any] = field(default_factory=lambda: [UNBOUND] * 4)
     settings: Settings = field(default_factory=Settings)
-    replays: bool = False
-    roots: list[list[Any]] = field(default_factory=list)
-    needs: Needs = field(default_factory=Needs)
-    elements: dict[Path, Elements] = field(default_factory=dict)
-    zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)
-    still: bool = False
-    watch: Watch | None = None
+    replays: bool = False  # run what no frame changes once; the evaluation is for several frames
+    roots: list[list[Any]] = field(default_factory=list)  # the live slots of every file
+    needs: Needs = field(default_factory=Needs)  # of the statement being prepared
+    elements: dict[Path, Elements] = field(default_factory=dict)  # files that were imported, by place
+    zeros: dict[tuple[SourceFile, Span], Span] = field(default_factory=dict)  # angles of 0 that may change
+    still: bool = False  # it has been said that there is no animation for time to run in
+    watch: Watch | None = None  # shown each name's value and each statement's node
 
     def restart(self, frame: int) -> None:
         """Forget what the last run left, to run what is prepared for another frame."""
@@ -260,17 +211,11 @@ class Session(Record, frozen=False):
 
 
 class Defines(Record, frozen=False):
-    """Values for params from outside, and the params that files have.
+    """Values for params from outside, and the params that files have."""
 
-    Args:
-        values: text as after ``-D NAME=``, or a Python value.
-        known: where each param stands, by its name seen from the first file.
-        lost: words that recovery skipped: a param may have been among them.
-    """
-
-    values: Mapping[str, Any]
-    known: dict[str, Span] = field(default_factory=dict)
-    lost: set[str] = field(default_factory=set)
+    values: Mapping[str, Any]  # text as after ``-D NAME=``, or a Python value
+    known: dict[str, Span] = field(default_factory=dict)  # each param's place, by its name in the first file
+    lost: set[str] = field(default_factory=set)  # words that recovery skipped: perhaps params
 
     def report_unused(self, diagnostics: Diagnostics) -> None:
         """Report values that no param takes."""
@@ -303,21 +248,12 @@ class Unreadable(Exception):
 
 
 def read_source(path: Path, name: str) -> SourceFile:
-    """The text of a file.
-
-    Raises:
-        Unreadable: too large, or not UTF-8.
-        OSError: as the system says, or that it is not a regular file.
-    """
+    """The text of a file; raises OSError, also for no regular file, and as `decode_source`."""
     return decode_source(read_regular(path, MAX_BYTES), name)
 
 
 def decode_source(data: bytes, name: str) -> SourceFile:
-    """The text that a file's bytes are.
-
-    Raises:
-        Unreadable: more than `MAX_BYTES`, or not UTF-8.
-    """
+    """The text that a file's bytes are; raises `Unreadable` for too many, or no UTF-8."""
     if len(data) > MAX_BYTES:
         raise Unreadable("E0324", f"a file of more than {MAX_BYTES // 1_000_000} MB")
     try:
@@ -327,28 +263,18 @@ def decode_source(data: bytes, name: str) -> SourceFile:
 
 
 class Loader(Record, frozen=False):
-    """Finds imported files inside the import root.
+    """Finds imported files inside the import root."""
 
-    Args:
-        root: the folder that imports cannot leave, resolved; None where there is none.
-        texts: what to read instead of some files, by their resolved paths: an editor's unsaved buffers, or
-            fixes that are not written yet.
-    """
-
-    root: Path | None
+    root: Path | None  # the folder that imports cannot leave, resolved
     chain: list[Path] = field(default_factory=list)
-    sites: list[Span] = field(default_factory=list)
-    """Places of the imports of that chain."""
+    sites: list[Span] = field(default_factory=list)  # places of the imports of that chain
     parsed: dict[Path, tree.File] = field(default_factory=dict)
-    prepared: dict[Path, Any] = field(default_factory=dict)
-    """The `FileContext` of each file that has been prepared, under its last name."""
-    repeated: int = 0
-    """Characters of files that were prepared again, as params of theirs have another name each time."""
+    prepared: dict[Path, Any] = field(default_factory=dict)  # each file's `FileContext`, under its last name
+    repeated: int = 0  # characters of files prepared again, as their params have another name each time
     zoos: dict[Path, Zoo] = field(default_factory=dict)
-    wanted: dict[Path, None] = field(default_factory=dict)
-    """All files that were asked for inside the root, there or not, as written and resolved."""
+    wanted: dict[Path, None] = field(default_factory=dict)  # files asked for, there or not
     count: int = 0
-    texts: Mapping[Path, str] = field(default_factory=dict)
+    texts: Mapping[Path, str] = field(default_factory=dict)  # instead of files, by their resolved paths
 
     def load(
         self, stmt: tree.Import, importer: Path | None, session: Session

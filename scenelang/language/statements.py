@@ -1,8 +1,4 @@
-"""Statements of the top level, params, and statements headed by a name.
-
-The two tables say which function prepares which class. The functions call each other by way of them: the
-`Session` hands them down, so that none imports what it may hold.
-"""
+"""Statements of the top level, params, statements headed by a name, and the tables of what prepares what."""
 
 from __future__ import annotations
 
@@ -154,10 +150,8 @@ def _stage(spec: Spec, values: list[Any]) -> Any:
     node = spec.build(values)
     for at, (name, *_) in enumerate(spec.rows):
         value = getattr(node, name)
-        if (
-            values[at] is not LEFT_OUT
-            and max(map(abs, value if value.__class__ is tuple else (value,))) > MOST
-        ):
+        numbers = value if value.__class__ is tuple else (value,)
+        if values[at] is not LEFT_OUT and max(map(abs, numbers)) > MOST:
             raise Problem("E0311", f"`{name}` is not within {MOST:,.0f} of 0", operand=at)
     if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
         at = [*Camera.model_fields].index(fault[0])
@@ -333,11 +327,7 @@ def _range_meant(value: Any, allowed: Any, range: tree.Expr) -> tuple[str | None
 
 
 def within(value: Any, allowed: Any) -> bool:
-    """Test whether a value, or each number of a vector, is in a range or among choices.
-
-    Raises:
-        Problem: a value and a range that do not compare.
-    """
+    """Test whether a value, or each number of a vector, is in a range or among choices; raises Problem."""
     if allowed.__class__ is Vec:
         return any(equal(value, choice) for choice in allowed.items)
     if value.__class__ is Vec:
@@ -581,11 +571,8 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
         return {*names, "material"}
     known = {*words.GEOMETRIES, *names}
     if stmt.body is None:
-        return (
-            known
-            if stmt.args is None
-            else known | {*(words.TRANSFORMS if kind != "file" else words.SETTINGS)}
-        )
+        calls = words.TRANSFORMS if kind != "file" else words.SETTINGS
+        return known if stmt.args is None else known | {*calls}
     before = stmt.span.source.text[max(0, stmt.span.start - 1000) : stmt.span.start].rstrip()
     otherwise = before.endswith("}")
     if not stmt.args:

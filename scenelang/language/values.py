@@ -1,9 +1,7 @@
 """Values of expressions: their kinds, operators, functions and constants.
 
-Numbers are Python floats, booleans and strings Python's own, ``none`` is None. A colour is a vector of
-three numbers. `POISON` stands for a value whose mistake has been reported; whatever meets it stays quiet.
-
-Everything here raises `Problem` and nothing else; results are finite.
+Numbers, booleans and strings are Python's, ``none`` is None, a colour is a vector. What meets `POISON`, a
+value whose mistake has been reported, stays quiet. Only `Problem` is raised; results are finite.
 """
 
 from __future__ import annotations
@@ -30,12 +28,9 @@ class Problem(Exception):
     Args:
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, for which the help comes
-            with the fix; a ``colour`` of a string.
+        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, a ``colour`` of a string.
         notes: words for further operands, by their numbers.
-        found: the kind that is odd about a value, whatever was going to be done with it. Problems that found
-            the same may have one cause.
-        expected: the kind that was expected.
+        found: the kind that is odd about a value; problems that found the same may have one cause.
     """
 
     def __init__(
@@ -84,11 +79,7 @@ class Time(_Quantity):
 
 
 class Vec:
-    """A vector of values.
-
-    Raises:
-        Problem: more than `MAX_VECTOR` numbers, or nested deeper than `MAX_VECTOR_DEPTH`.
-    """
+    """A vector of values; raises Problem beyond `MAX_VECTOR` numbers or `MAX_VECTOR_DEPTH` levels."""
 
     __slots__ = ("count", "depth", "items")
 
@@ -112,21 +103,13 @@ class Vec:
 
 
 class RangeValue(Record):
-    """Numbers, angles or times from ``start`` towards ``stop``, made one at a time.
-
-    Args:
-        start: first value, in base units.
-        stop: bound, in base units.
-        exclusive: whether ``stop`` itself is left out.
-        step: distance of neighbours, not 0; None where none was written, which steps by 1.
-        unit: ``number``, ``angle`` or ``time``.
-    """
+    """Numbers, angles or times from ``start`` towards ``stop``, in base units, made one at a time."""
 
     start: float
     stop: float
-    exclusive: bool
-    step: float | None
-    unit: str
+    exclusive: bool  # whether ``stop`` itself is left out
+    step: float | None  # not 0; None where none was written, which steps by 1
+    unit: str  # ``number``, ``angle`` or ``time``
 
     def count(self) -> int:
         """Number of values; 0 when descending."""
@@ -268,12 +251,9 @@ COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
 
 
 def same_unit(a: float, ua: str, b: float, ub: str) -> str:
-    """The common unit of two scalars for sums and comparisons.
+    """The common unit of two scalars for sums and comparisons; raises Problem where there is none.
 
     A bare number beside a time is seconds; 0 goes with any angle.
-
-    Raises:
-        Problem: a number other than 0 with an angle, or a time with an angle.
     """
     if ua == ub:
         return ua
@@ -383,9 +363,7 @@ def equal(a: Any, b: Any) -> bool:
     if ca is not cb:
         raise _unfit(f"cannot compare {describe(a)} with {describe(b)}", a, b, 1, shared=False)
     if ca is Vec:
-        return len(a.items) == len(b.items) and all(
-            equal(x, y) for x, y in zip(a.items, b.items, strict=True)
-        )
+        return len(a.items) == len(b.items) and all(map(equal, a.items, b.items))
     return bool(a == b)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -47,46 +46,39 @@ def test_an_element_is_drawn_as_the_shape_it_is(folder: Path) -> None:
     assert abs(ours - np.asarray(nsg.render(scene.sized((64, 64))))).max() < 1.5 / 255
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
+def test_elements_obey_booleans_warps_and_media(folder: Path) -> None:
+    wrong = []
+    for body in (
         "chain { sphere { scale(0.8); } subtract @ }",
         "chain { sphere { scale(0.8); } smooth(k = 0.3) @ }",
         "chain { sphere { scale(0.8); } intersect @ }",
         "@ sphere { scale(0.5); material volumetric { color(#48c); } }",
         "group { @ twist(0.6); bend(0.3); twirl(0.4); }",
-    ],
-)
-def test_elements_obey_booleans_warps_and_media(folder: Path, body: str) -> None:
-    pictures = [
-        nsg.render(good(folder, "canvas(96, 96);" + IMPORT + body.replace("@", text)))
-        for text in (RING, PURE)
-    ]
-    assert psnr(*pictures) > 42
+    ):
+        texts = ("canvas(64, 64);" + IMPORT + body.replace("@", text) for text in (RING, PURE))
+        near = psnr(*(nsg.render(good(folder, text)) for text in texts))
+        wrong += [(body, near)] if near <= 42 else []
+    assert wrong == []
 
 
-TILE = "zoo.tile { scale(0.8, 0.5); rotate(20deg); material flat { color(#c36); } }"
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
+@pytest.mark.torch
+def test_flat_elements_obey_booleans_and_warps(folder: Path) -> None:
+    head = f'model "shapes2d"; canvas(96, 96); {IMPORT} background(#9c9);'
+    tile, wrong = "{ scale(0.8, 0.5); rotate(20deg); material flat { color(#c36); } }", []
+    for body in (
         "@ star { scale(0.4); translate(0.5, 0.3); }",
         "chain { pentagon { material flat { color(#36c); } } subtract @ }",
         "chain { pentagon { scale(0.6); translate(0.5, 0); } smooth @ }",
         "chain { pentagon { } intersect @ }",
         "group { @ bend(0.6); twirl(0.8); scale(0.7); }",
-    ],
-)
-@pytest.mark.torch
-@pytest.mark.parametrize("device", ["auto", "cpu"])
-def test_flat_elements_obey_booleans_and_warps(folder: Path, body: str, device: Any) -> None:
-    head = f'model "shapes2d"; canvas(128, 128); {IMPORT} background(#9c9);'
-    pictures = [
-        nsg.render(good(folder, head + body.replace("@", text)), device=device)
-        for text in (TILE, TILE.replace("zoo.tile", "square"))
-    ]
-    assert psnr(*pictures) > 45
+    ):
+        own, pure = (
+            good(folder, head + body.replace("@", f"{name} {tile}")) for name in ("zoo.tile", "square")
+        )
+        for device in ("auto", "cpu"):
+            near = psnr(nsg.render(own, device=device), nsg.render(pure, device=device))
+            wrong += [(body, device, near)] if near <= 45 else []
+    assert wrong == []
 
 
 @pytest.mark.torch
@@ -119,25 +111,21 @@ def test_the_smallest_model_that_draws_elements_is_chosen(folder: Path) -> None:
     model = find_model(scene, Diagnostics())
     assert model is not None
     assert model.name == "solids3d"
-    found = Diagnostics()
     with pytest.raises(nsg.SceneError, match=r"does not draw `zoo\.ring`, an element of space"):
-        compile_scene(scene, model="shapes2d", diagnostics=found)
+        compile_scene(scene, model="shapes2d")
+    with pytest.raises(nsg.RenderError, match=r"the exact shape of `zoo\.ring` is not known"):
+        nsg.render(scene, backend="reference")
     flat = good(folder, f'model "solids3d"; {IMPORT} zoo.ball {{ }}')
     with pytest.raises(nsg.SceneError, match=r"does not draw `zoo\.ball`, an element of the plane"):
         compile_scene(flat)
 
 
-def test_the_exact_picture_is_not_known(folder: Path) -> None:
-    with pytest.raises(nsg.RenderError, match=r"the exact shape of `zoo\.ring` is not known"):
-        nsg.render(good(folder, IMPORT + RING), backend="reference")
-
-
-@pytest.mark.parametrize(("op", "inside"), [("subtract", False), ("intersect", False), ("union", True)])
-def test_an_eye_in_what_an_element_cuts_is_not_said_to_be_inside(folder: Path, op: str, inside: bool) -> None:
-    scene = good(folder, f"{IMPORT} chain {{ sphere {{ scale(9); }} {op} zoo.ring {{ }} }}")
-    found = Diagnostics()
-    check_compiles(scene, None, found)
-    assert [d.code for d in found.errors] == ["E0408"] * inside
+def test_an_eye_in_what_an_element_cuts_is_not_said_to_be_inside(folder: Path) -> None:
+    for op, codes in (("subtract", []), ("intersect", []), ("union", ["E0408"])):
+        scene = good(folder, f"{IMPORT} chain {{ sphere {{ scale(9); }} {op} zoo.ring {{ }} }}")
+        found = Diagnostics()
+        check_compiles(scene, None, found)
+        assert [d.code for d in found.errors] == codes, op
 
 
 def test_meshes_that_ship_are_at_hand_everywhere(tmp_path: Path) -> None:
@@ -172,23 +160,21 @@ def test_json_has_the_file_and_its_digest(folder: Path) -> None:
         compile_scene(nsg.Scene.from_json(scene.to_json()))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
+def test_json_of_other_files(folder: Path) -> None:
+    (folder / "loop").symlink_to("loop")
+    text = good(folder, IMPORT + RING).to_json()
+    for change, words in (
         ({"path": "../zoo.safetensors"}, "outside the import root"),
         ({"path": "/etc/passwd"}, "outside the import root"),
         ({"path": "none"}, "no such file"),
         ({"path": "loop"}, "loop|too many levels"),
         ({"path": 'a"; sphere { } //'}, "not a possible name"),
         ({"digest": "0" * 64}, "not the file that the scene was made with"),
-    ],
-)
-def test_json_of_other_files(folder: Path, change: dict[str, Any], words: str) -> None:
-    data = json.loads(good(folder, IMPORT + RING).to_json())
-    (folder / "loop").symlink_to("loop")
-    data["elements"][0] |= change
-    with pytest.raises(nsg.SceneError, match=words):
-        nsg.Scene.from_json(json.dumps(data), root=folder)
+    ):
+        data = json.loads(text)
+        data["elements"][0] |= change
+        with pytest.raises(nsg.SceneError, match=words):
+            nsg.Scene.from_json(json.dumps(data), root=folder)
 
 
 def test_programs_carry_their_elements(folder: Path) -> None:
@@ -200,12 +186,9 @@ def test_programs_carry_their_elements(folder: Path) -> None:
     back = parse_program(data)
     assert (back.elements, back.digest(), program_bytes(back)) == (program.elements, program.digest(), data)
     assert np.array_equal(nsg.render(back), nsg.render(program))
-
-
-def test_a_program_without_elements_is_of_the_old_format(folder: Path) -> None:
-    data = program_bytes(compile_scene(good(folder, f"{IMPORT} torus {{ }}")))
-    assert b'\\"format\\":1' in data
-    assert b"forms" not in data
+    old = program_bytes(compile_scene(good(folder, f"{IMPORT} torus {{ }}")))
+    assert b'\\"format\\":1' in old
+    assert b"forms" not in old
 
 
 def test_data_of_an_earlier_version_takes_the_meshes_that_ship_now() -> None:
@@ -250,20 +233,13 @@ def garage(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def rows(scene: nsg.Scene) -> np.ndarray:
-    return np.asarray(compile_scene(scene).vectors)
-
-
-@pytest.mark.parametrize(
-    ("call", "block"),
-    [("zoo.car();", ""), ("zoo.car() { rotate(30deg, axis = Y); }", "rotate(30deg, axis = Y);")],
-)
-def test_a_call_is_the_parts_in_their_places_and_looks(garage: Path, call: str, block: str) -> None:
-    made, written = good(garage, IMPORT + call), good(garage, IMPORT + CAR.replace("@", block))
-    np.testing.assert_allclose(rows(made), rows(written), atol=3e-3)  # colours in 8 bits there
-    ours, theirs = compile_scene(made), compile_scene(written)
-    assert ours.brought() == theirs.brought()
-    assert [p and p.element.name for p in ours.paints()] == ["hide", None, None]
+def test_a_call_is_the_parts_in_their_places_and_looks(garage: Path) -> None:
+    for block in ("", "rotate(30deg, axis = Y);"):
+        ours = compile_scene(good(garage, f"{IMPORT} zoo.car() {{ {block} }}"))
+        theirs = compile_scene(good(garage, IMPORT + CAR.replace("@", block)))
+        np.testing.assert_allclose(ours.vectors, theirs.vectors, atol=3e-3)  # colours in 8 bits there
+        assert ours.brought() == theirs.brought()
+        assert [p and p.element.name for p in ours.paints()] == ["hide", None, None]
 
 
 def test_a_group_of_one_part_is_that_object(garage: Path) -> None:
@@ -298,13 +274,10 @@ def test_text_json_and_python_hold_the_parts(garage: Path, monkeypatch: pytest.M
         zoo.group("cow")
 
 
-def test_objects_of_groups_are_counted(garage: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_groups_are_counted_and_checked_without_numpy(garage: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenelang.language.session.MAX_OBJECTS", 8)
     assert load(garage, IMPORT + "for (i in 0..<2) { zoo.car(); }")[0] is not None
     assert [code for code, _ in load(garage, IMPORT + "for (i in 0..<3) { zoo.car(); }")[1]] == ["E0320"]
-
-
-def test_checking_groups_needs_no_numpy(garage: Path) -> None:
     good(garage, IMPORT + "zoo.car();")
     assert not loaded_by("check", str(garage / "scene.nsg")) & {"torch", "numpy"}
 
@@ -324,9 +297,8 @@ def worn(garage: Path, text: str, **files: str) -> list[nsg.Material | None]:
 FLIP, TURN = nsg.Flip(), nsg.Hue.degrees(36)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
+def test_materials_of_elements(garage: Path) -> None:
+    for text, expected in (
         ("square { material zoo.bark; }", nsg.Material("zoo.bark")),
         ("square { material zoo.bark { flip(); hue(0.1turn); } }", nsg.Material("zoo.bark", (FLIP, TURN))),
         ("square { material flat zoo.bark { flip(); } }", nsg.Material("zoo.bark", FLIP, "flat")),
@@ -344,46 +316,21 @@ FLIP, TURN = nsg.Flip(), nsg.Hue.degrees(36)
             "let flat = 1; for (m in [material flat zoo.bark]) { square { m; } }",
             nsg.Material("zoo.bark", (), "flat"),
         ),
-    ],
-)
-def test_materials_of_elements(garage: Path, text: str, expected: nsg.Material) -> None:
-    assert worn(garage, text) == [expected]
-    assert format_text(format_text(text)) == format_text(text)
-
-
-def test_materials_come_through_other_files(garage: Path) -> None:
-    library = f"{IMPORT} let bark = material zoo.bark {{ flip(); }}; module tile() {{ square {{ bark; }} }}"
-    text = 'import "lib.nsg" as lib; square { lib.bark { hue(0.1turn); } } lib.tile();'
-    found = worn(garage, text, lib=library)
-    assert found == [nsg.Material("zoo.bark", (FLIP, TURN)), nsg.Material("zoo.bark", FLIP)]
-
-
-def test_equal_materials_are_equal_values(garage: Path) -> None:
-    text = "let a = material zoo.bark == material flat zoo.bark; square { scale(a ? 1 : 0.5); }"
-    scene, _ = load(garage, IMPORT + text)
-    assert scene is not None
-    assert scene.nodes[0].transforms == (nsg.Scale(0.5),)
-
-
-def test_misspelt_materials_are_mended(garage: Path) -> None:
-    (garage / "scene.nsg").write_text(IMPORT + "square { material zoo.brak; }")
-    (found,) = check(garage / "scene.nsg")
-    assert found.fix is not None
-    assert [edit.replacement for edit in found.fix.edits] == ["bark"]
-
-
-def test_json_says_how_a_texture_is_lit(garage: Path) -> None:
-    scene, _ = load(garage, IMPORT + "torus { material volumetric zoo.bark; }")
-    assert scene is not None
+    ):
+        assert worn(garage, text) == [expected], text
+        assert format_text(format_text(text)) == format_text(text)
+    scene = good(garage, IMPORT + "torus { material volumetric zoo.bark; }")
     (node,) = json.loads(scene.to_json())["nodes"]
     assert (node["material"]["name"], node["material"]["shading"]) == ("zoo.bark", "volumetric")
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.validate(json.loads(scene.to_json()), scene_schema())
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "message", "help"),
-    [
+def test_mistakes(garage: Path) -> None:
+    (garage / "text.safetensors").write_text("let size = 1;")
+    (garage / "lib.nsg").write_text("let bark = material flat;")
+    wrong = []
+    for text, code, message, help in (
         ("zoo.rng { }", "E0212", "`zoo` has no `rng`", "did you mean `ring`?"),
         ("zoo.cat();", "E0212", "`zoo` has no `cat`", "did you mean `car`?"),
         ("zoo.car(2);", "E0308", "group `zoo.car` takes no arguments", "scale(0.5)"),
@@ -415,14 +362,20 @@ def test_json_says_how_a_texture_is_lit(garage: Path) -> None:
             "`lib.bark` is a value, not a material's name",
             "",
         ),
-    ],
-)
-def test_mistakes(garage: Path, text: str, code: str, message: str, help: str) -> None:
-    (garage / "text.safetensors").write_text("let size = 1;")
-    (garage / "lib.nsg").write_text("let bark = material flat;")
-    (garage / "scene.nsg").write_text(IMPORT + text)
-    found = Diagnostics()
-    Source(garage / "scene.nsg").scene(found)
-    assert [d.code for d in found] == [code]
-    assert message in found.items[0].message
-    assert help in (found.items[0].help or "")
+    ):
+        (garage / "scene.nsg").write_text(IMPORT + text)
+        found = Diagnostics()
+        Source(garage / "scene.nsg").scene(found)
+        first = found.items[0] if len(found) == 1 else None
+        if (
+            first is None
+            or first.code != code
+            or message not in first.message
+            or help not in (first.help or "")
+        ):
+            wrong.append((text, *found))
+    assert wrong == []
+    (garage / "scene.nsg").write_text(IMPORT + "square { material zoo.brak; }")
+    (one,) = check(garage / "scene.nsg")
+    assert one.fix is not None
+    assert [edit.replacement for edit in one.fix.edits] == ["bark"]

@@ -35,7 +35,7 @@ from scenelang.web.arrays import stage_of
 from scenelang.web.export import view_of
 from scenelang.web.form import Form, Scope, Writer, form_of
 from tests.compiler.random_scenes import blob_scene, full_scene, random_scene
-from tests.language.test_groups import IMPORT, folder
+from tests.language.test_elements import IMPORT, folder
 from tests.web.test_view import carried
 
 pytestmark = pytest.mark.browser
