@@ -13,8 +13,7 @@ from scenelang.assets.records import deep_stack
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.language.evaluation import loads
 from scenelang.language.reports import SceneError
-from scenelang.language.scene import Scene
-from scenelang.language.scene_json import to_readable_json
+from scenelang.language.scene import Scene, to_readable_json
 from scenelang.language.words import OPERATIONS, TRANSFORMS
 
 
