@@ -18,15 +18,12 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from fuzz.tensors import mutate
-from lab.training.checkpoint import load_tensors
 from scenelang.assets.tensors import TensorError, read_tensors
 from scenelang.compiler import manifest as manifests
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.weights import ModelError, codes_of, open_weights, weights_path
 from scenelang.drawing.neural.files import framed_arrays
 from scenelang.drawing.neural.load import load_network
-from tests.cli.conftest import Folder
-from tests.lab.conftest import run
 
 SHAPES = load_manifest("shapes2d")
 DATA = weights_path("shapes2d").read_bytes()
@@ -205,26 +202,6 @@ def test_what_is_taken_is_what_safetensors_takes() -> None:
         for key, array in found.items():
             np.testing.assert_array_equal(array, known[key])
     assert 40 < count < 360
-
-
-def test_commands_say_so(folder: Folder) -> None:
-    Path("bad.safetensors").write_bytes(HARM["deep brackets"])
-    result = run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.startswith("Error: ")
-
-
-def test_checkpoints(tmp_path: Path) -> None:
-    """Their tensors are compared with the training's later; here nothing may break."""
-    path = tmp_path / "checkpoint.safetensors"
-
-    def read(data: bytes) -> None:
-        path.write_bytes(data)
-        load_tensors(path)
-
-    fine = {name for name in HARM if name.startswith(("codes", "no codes"))}
-    assert {name for _, name in taken({"checkpoint": read}, HARM)} == fine
 
 
 MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))
