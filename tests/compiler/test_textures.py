@@ -200,18 +200,6 @@ def test_passes_keep_the_exact_picture(geometries: tuple[str, str]) -> None:
         np.testing.assert_allclose(picture, drawn["lower"], atol=2e-6, err_msg=name)
 
 
-def test_an_error_says_that_a_scene_is_flat_or_solid() -> None:
-    ball = nsg.Object("sphere", (), nsg.Material("zoo.bark"))
-    found = Diagnostics()
-    hide = nsg.Object("square", (), nsg.Material("zoo.hide"))
-    with pytest.raises(nsg.SceneError):
-        compile_scene(nsg.Scene(elements=ZOO, nodes=[ball, hide]), diagnostics=found)
-    (only,) = found
-    assert only.code == "E0501"
-    assert only.message == "geometry `square` belongs to flat scenes, and this one is solid"
-    assert only.help == "a scene is flat or solid; model `solids3d` has `sphere`, `torus`"
-
-
 def test_models_of_the_paper_draw_no_textures() -> None:
     with pytest.raises(nsg.SceneError, match=r"does not draw `zoo\.bark`, a texture"):
         compiled(nsg.Material("zoo.bark"), model="shapes2d-reading")
