@@ -83,11 +83,7 @@ class Manifest:
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
-        """Read a manifest.
-
-        Raises:
-            ValueError: it is not JSON, a field is missing or unknown, or holds what it cannot.
-        """
+        """Read a manifest; raises ValueError for other JSON, and for missing, unknown or wrong fields."""
         text = text.encode("utf-8") if isinstance(text, str) else text
         if len(text) > _MOST_BYTES:
             raise ValueError(f"a manifest of more than {_MOST_BYTES:,} bytes")
@@ -195,12 +191,7 @@ def available() -> list[str]:
 
 
 def load_manifest(name: str) -> Manifest:
-    """The manifest of a shipped model; earlier names of models work too.
-
-    Raises:
-        KeyError: there is no such model.
-        ValueError: it is damaged, or that of another model: its name leads to its files.
-    """
+    """The manifest of a model, by its name or an earlier one; raises KeyError, or ValueError if damaged."""
     name = ALIASES.get(name, name)
     if name not in available():
         raise KeyError(name)
