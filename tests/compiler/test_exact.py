@@ -70,15 +70,6 @@ SIZES = [(i, o) for i in range(PLANE_LAYOUT.inner + 1) for o in range(PLANE_LAYO
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
-def test_vector_is_the_product_of_matrices(inner: int, outer: int) -> None:
-    levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
-    g = leaf_vector(CODE)
-    for matrix in matrices(levels):
-        g = matrix @ g
-    np.testing.assert_allclose(lift_many([levels], [CODE])[0], g, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize(("inner", "outer"), SIZES)
 def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int) -> None:
     rng = np.random.default_rng(100 + inner * 10 + outer)
     levels = random_levels(rng, inner, outer)
@@ -96,14 +87,14 @@ def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int
     assert frames.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
 
 
-@pytest.mark.parametrize("objects", [[0, 1, 2], [2], [2, 2, 2, 1]], ids=str)
-def test_objects_of_different_chains_are_carried_together(objects: list[int]) -> None:
+def test_objects_of_different_chains_are_carried_together() -> None:
     """Steps that only few, or most, of them have."""
     levels = [random_levels(np.random.default_rng(i), *size) for i, size in enumerate(SIZES[:3])]
-    p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
-    found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
-    for i, at in enumerate(objects):
-        np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
+    for objects in ([0, 1, 2], [2], [2, 2, 2, 1]):
+        p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
+        found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
+        for i, at in enumerate(objects):
+            np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
@@ -173,17 +164,19 @@ def test_parts_come_out_as_they_went_in_and_share_no_place(layout: Layout) -> No
     assert np.count_nonzero(packed[0]) == sum(value[0].size for value in parts) == used
 
 
-def test_a_layout_of_space_lifts_as_its_matrices_do() -> None:
-    """Frames of three rows of four numbers: the same code, another layout."""
-    layout = SOLID_LAYOUT
-    levels = random_levels(np.random.default_rng(3), 2, 2)
-    g = leaf_vector(CODE, layout)
-    for matrix in matrices(levels, layout):
-        g = matrix @ g
-    np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
-    for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
-        map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
-        np.testing.assert_allclose(g[slot].reshape(3, 4) @ map_, np.eye(4)[:3], atol=1e-12)
+def test_vectors_are_products_of_matrices() -> None:
+    for layout, inner, outer in ((SOLID_LAYOUT, 2, 2), *((PLANE_LAYOUT, *size) for size in SIZES)):
+        levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
+        g = leaf_vector(CODE, layout)
+        for matrix in matrices(levels, layout):
+            g = matrix @ g
+        np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
+        d = layout.dimension
+        for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
+            map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
+            keep = [*range(d), 3]
+            found = g[slot].reshape(d, d + 1) @ map_[np.ix_(keep, keep)]
+            np.testing.assert_allclose(found, np.eye(d + 1)[:d], atol=1e-12)
 
 
 def encoders(geometry: int = 8, material: int = 4) -> Encoders:

@@ -74,58 +74,49 @@ def test_rotations_are_counter_clockwise_seen_from_the_tip_of_the_axis() -> None
     assert [down.rows[i] for i in (0, 1, 4, 5)] == pytest.approx([0, 1, -1, 0])
 
 
-@pytest.mark.parametrize(
-    ("transform", "code"),
-    [
-        (schema.Translate(x=0, y=0, z=1), "E0505"),
-        (schema.Rotate(angle=1, axis=(1, 0, 0)), "E0505"),
-        (schema.Shear(axes="xz", k=1), "E0505"),
-        (schema.Shear(axes="zy", k=1), "E0505"),
-        (matrix((1, 0, 1, 0), (0, 1, 0, 0), (0, 0, 1, 0)), "E0505"),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 1, 1, 0)), "E0505"),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 1)), "E0505"),
-        (schema.Scale(x=1e-15, y=1, z=1), "E0312"),
-        (schema.Scale(x=1e-40, y=1e-40, z=1), "E0312"),
-        (matrix((1, 2, 0, 0), (2, 4 + 1e-11, 0, 0), (0, 0, 1, 0)), "E0312"),
-        (schema.Twist(k=1), "E0505"),
-        (schema.Displace(amount=1, frequency=1), "E0505"),
-    ],
-)
-def test_what_a_plane_refuses(transform, code: str) -> None:
-    steps, codes = lowered(transform)
-    assert (steps, codes) == ([], [code])
+REFUSED = [
+    (schema.Translate(x=0, y=0, z=1), "E0505"),
+    (schema.Rotate(angle=1, axis=(1, 0, 0)), "E0505"),
+    (schema.Shear(axes="xz", k=1), "E0505"),
+    (schema.Shear(axes="zy", k=1), "E0505"),
+    (matrix((1, 0, 1, 0), (0, 1, 0, 0), (0, 0, 1, 0)), "E0505"),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 1, 1, 0)), "E0505"),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 1)), "E0505"),
+    (schema.Scale(x=1e-15, y=1, z=1), "E0312"),
+    (schema.Scale(x=1e-40, y=1e-40, z=1), "E0312"),
+    (matrix((1, 2, 0, 0), (2, 4 + 1e-11, 0, 0), (0, 0, 1, 0)), "E0312"),
+    (schema.Twist(k=1), "E0505"),
+    (schema.Displace(amount=1, frequency=1), "E0505"),
+]
+FLAT = [
+    (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),
+    (schema.Scale(x=3, y=2, z=-3), ["W0508"]),
+    (schema.Scale(x=3, y=2, z=1), []),
+    (schema.Scale.uniform(3), []),
+    (schema.Shear(axes="xz", k=0), []),
+    (schema.Rotate(angle=0, axis=(1, 0, 0)), []),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)), []),
+]
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "words"),
-    [
+def test_what_a_plane_refuses() -> None:
+    for transform, code in REFUSED:
+        assert lowered(transform) == ([], [code]), transform
+    for transform, codes in FLAT:
+        assert lowered(transform)[1] == codes, transform
+
+
+def test_what_is_said_of_singular_ones() -> None:
+    for x, y, words in (
         (1e-31, 1e-31, "singular in float32: it stretches by 1e-31 to 1e-31"),
         (1e31, 1e31, "singular in float32: it stretches by 1e+31 to 1e+31"),
         (1e-15, 1.0, "it flattens everything to a line or a point"),
-    ],
-)
-def test_what_is_said_of_singular_ones(x: float, y: float, words: str) -> None:
-    found = Diagnostics()
-    scene = schema.Scene(nodes=(schema.Object(geometry="star", transforms=(schema.Scale(x=x, y=y, z=1),)),))
-    lower(scene, SHAPES, None, found)
-    (only,) = found
-    assert words in only.message
-
-
-@pytest.mark.parametrize(
-    ("transform", "codes"),
-    [
-        (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),
-        (schema.Scale(x=3, y=2, z=-3), ["W0508"]),
-        (schema.Scale(x=3, y=2, z=1), []),
-        (schema.Scale.uniform(3), []),
-        (schema.Shear(axes="xz", k=0), []),
-        (schema.Rotate(angle=0, axis=(1, 0, 0)), []),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)), []),
-    ],
-)
-def test_what_stays_in_the_plane(transform, codes: list[str]) -> None:
-    assert lowered(transform)[1] == codes
+    ):
+        star = schema.Object(geometry="star", transforms=(schema.Scale(x=x, y=y, z=1),))
+        found = Diagnostics()
+        lower(schema.Scene(nodes=(star,)), SHAPES, None, found)
+        (only,) = found
+        assert words in only.message
 
 
 def test_names_that_the_model_lacks() -> None:
@@ -259,9 +250,8 @@ def test_the_normal_form_gives_the_same_colours(
     assert coloured(found, rgb) == pytest.approx(coloured(steps, rgb), abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("steps", "found"),
-    [
+def test_what_joins() -> None:
+    for ops, joined in (
         ([("color", 0.5, 0.5, 1.0), ("color", 0.5, 4.0, 1.0)], (("color", 0.25, 2.0, 1.0),)),
         ([("color", 2.0, 1.0, 1.0), ("color", 0.5, 1.0, 1.0)], None),  # clamped between
         ([("grayscale", 0.5), ("grayscale", 0.5)], (("grayscale", 0.75),)),
@@ -272,10 +262,8 @@ def test_the_normal_form_gives_the_same_colours(
             [("color", 0.5, 1.0, 1.0), ("hue", 0.5), ("hue", 0.5), ("color", 1.0, 0.5, 1.0)],
             (("color", 0.5, 0.5, 1.0),),
         ),
-    ],
-)
-def test_what_joins(steps: list[ColourStep], found: tuple[ColourStep, ...] | None) -> None:
-    assert normal(steps) == (tuple(steps) if found is None else found)
+    ):
+        assert normal(ops) == (tuple(ops) if joined is None else joined)
 
 
 def test_a_texture_folds_to_one_move_and_stays_a_texture() -> None:

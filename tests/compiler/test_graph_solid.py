@@ -177,20 +177,17 @@ def test_balls_of_straight_leaves_are_tight() -> None:
     assert SOLID.bound("sphere", steps, 0.1) == pytest.approx((1, 2, 3, 0.7))
 
 
-@pytest.mark.parametrize(
-    ("eye", "right", "up"),
-    [
+def test_axes_of_the_camera() -> None:
+    for eye, right, up in (
         ((0, 0, 6), (1, 0, 0), (0, 1, 0)),
         ((6, 0, 0), (0, 0, -1), (0, 1, 0)),
         ((0, 5, 0), (1, 0, 0), (0, 0, -1)),
         ((0, -5, 0), (-1, 0, 0), (0, 0, -1)),
         ((3e-16, 5, 0), (1, 0, 0), (0, 0, -1)),
-    ],
-)
-def test_axes_of_the_camera(eye, right, up) -> None:
-    forward, *found = Camera(eye=eye).axes()
-    np.testing.assert_allclose(found, (right, up), atol=1e-12)
-    np.testing.assert_allclose(np.cross(found[0], forward), found[1], atol=1e-12)
+    ):
+        forward, *found = Camera(eye=eye).axes()
+        np.testing.assert_allclose(found, (right, up), atol=1e-12)
+        np.testing.assert_allclose(np.cross(found[0], forward), found[1], atol=1e-12)
 
 
 def test_axes_are_orthonormal_wherever_the_camera_stands() -> None:
@@ -200,9 +197,8 @@ def test_axes_are_orthonormal_wherever_the_camera_stands() -> None:
         assert axes[2, 1] > 0  # up is up
 
 
-@pytest.mark.parametrize(
-    ("value", "fault"),
-    [
+def test_faults() -> None:
+    for value, fault in (
         (Camera(), None),
         (Camera(eye=(1, 2, 3), target=(1, 2, 3)), "the eye is the target"),
         (Camera(fov_rad=0.0), "a field of view of 0° is not between 0° and 180°"),
@@ -210,10 +206,8 @@ def test_axes_are_orthonormal_wherever_the_camera_stands() -> None:
         (Camera(fov_rad=math.nan), "a field of view of nan° is not between 0° and 180°"),
         (Light(power=0.0), None),
         (Light(power=-2.0), "a power of -2 is negative"),
-    ],
-)
-def test_faults(value, fault) -> None:
-    assert value.fault() == fault
+    ):
+        assert value.fault() == fault
 
 
 def test_colours_are_decoded_from_srgb() -> None:
