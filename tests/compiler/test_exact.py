@@ -232,9 +232,3 @@ def test_a_colour_acts_on_the_material() -> None:
     matrices = lifting.matrices("color", rgb)
     np.testing.assert_allclose(found[0], matrices[0] @ lifting.material_codes[1])
     np.testing.assert_allclose(found[1], matrices[1] @ lifting.material_codes[0])
-
-
-def test_a_merged_warp_has_no_encoder() -> None:
-    lifting = read_lifting(tensors(encoders()))
-    with pytest.raises(ValueError, match="no encoder"):
-        lift_geometry(lifting, [[Warp(0.1, (0.2, 0.0))]], [0])
