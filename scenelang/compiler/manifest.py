@@ -21,22 +21,9 @@ USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {
-    "objects",
-    "smooth",
-    "twirl",
-    "bend",
-    "twist",
-    "scale",
-    "thin",
-    "blend",
-    "displace",
-    "frequency",
-    "thickness",
-    "width",
-    "texels",
-}
-
-
+    "objects", "smooth", "twirl", "bend", "twist", "scale", "thin", "blend", "displace", "frequency",
+    "thickness", "width", "texels",
+}  # fmt: skip
 _DRAWN: Final = {
     "framed": ("element of the plane", "texture"),
     "solid": ("element of space", "texture", "colouring of space"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -128,21 +129,6 @@ def test_a_group_deformed_and_scaled_too_often() -> None:
     assert len(compiled(deep)[0]) == 1
 
 
-def program_of(**changes) -> Program:
-    parts = {
-        "vectors": np.zeros((2, 64), np.float32),
-        "tokens": np.array([0, 2], np.int8),
-        "bounds": np.tile(np.array([-1, -1, 1, 1], np.float32), (2, 1)),
-        "canvas": (8, 8),
-        "background": None,
-        "model": "shapes2d",
-        "weights": "0" * 64,
-        "objects": ("star", "star"),
-        "places": (None, None),
-    }
-    return Program(**{**parts, **changes})
-
-
 HARMED = {
     "vectors": (
         np.zeros((2, 63), np.float32),
@@ -157,7 +143,13 @@ HARMED = {
     ),
     "bounds": (np.array([[1, 1, -1, -1]] * 2, np.float32), np.full((2, 4), np.nan, np.float32)),
     "canvas": ((0, 8), (8193, 8), (8.0, 8), (8,)),
-    "background": ((1.0, 2.0), (1.0, 1.0, float("nan"))),
+    "background": (
+        (1.0, 2.0),
+        (1.0, 1.0, float("nan")),
+        (0, 0, 10**400),
+        (-1e308, 0, 0),
+        (0.5, 1.0000001, 0),
+    ),
     "model": ("",),
     "weights": ("xyz",),
     "objects": (("star",),),
@@ -166,16 +158,16 @@ HARMED = {
 
 
 def test_what_is_no_program() -> None:
-    program_of()
+    program = compiled("star { scale(0.5); } pentagon { scale(0.2); }")[0]
     for name, values in HARMED.items():
         for value in values:
             with pytest.raises(ProgramError):
-                program_of(**{name: value})
+                replace(program, **{name: value})
 
 
 def test_programs_cannot_be_changed() -> None:
-    vectors = np.zeros((2, 64), np.float32)
-    program = program_of(vectors=vectors)
+    vectors = np.zeros((1, 64), np.float32)
+    program = replace(compiled("star { }")[0], vectors=vectors)
     vectors[:] = 5
     assert not program.vectors.any()
     with pytest.raises(ValueError, match="read-only"):

@@ -66,11 +66,9 @@ def test_damaged_files() -> None:
 
 def test_elements_are_checked_and_in_the_digest() -> None:
     program = compiled()
-    fields = {name: getattr(program, name) for name in Program.__dataclass_fields__}
     with pytest.raises(ProgramError, match="not of dimension 3"):
-        Program(**{**fields, "elements": (element(ball, d=2, levels=2),)})
-    other = Program(**{**fields, "elements": (element(ball, levels=2),)})
-    assert other.digest() != program.digest()
+        replace(program, elements=(element(ball, d=2, levels=2),))
+    assert replace(program, elements=(element(ball, levels=2),)).digest() != program.digest()
 
 
 BARK, STONE = noise(5, 7), noise(3, 3, name="stone", seed=1)
@@ -80,17 +78,15 @@ STEPS = (("color", 0.5, 1.0, 0.25), ("hue", 0.125), ("grayscale", 0.75))
 def painted(*palette: Paint, worn: list[int], **fields: Any) -> Program:
     objects = [nsg.Object("square"), nsg.Object("star", nsg.Scale(0.5))]
     plain = compile_scene(nsg.Scene(nodes=objects, model="shapes2d"))
-    given = {name: getattr(plain, name) for name in Program.__dataclass_fields__}
-    given |= {"elements": (BARK, STONE), "palette": palette, "worn": np.array(worn, np.int32)}
-    return Program(**given | fields)
+    given = {"elements": (BARK, STONE), "worn": np.array(worn, np.int32), **fields}
+    return replace(plain, palette=palette, **given)
 
 
-def painted_program() -> Program:
-    return painted(Paint(STONE, STEPS), Paint(BARK), worn=[0, 1])
+PAINTED = painted(Paint(STONE, STEPS), Paint(BARK), worn=[0, 1])
 
 
 def test_paints_come_back() -> None:
-    made = painted_program()
+    made = PAINTED
     found = parse_program(program_bytes(made))
     assert found.paints() == made.paints() == [Paint(STONE, STEPS), Paint(BARK)]
     assert found.digest() == made.digest()
@@ -111,7 +107,7 @@ def test_the_digest_is_that_of_what_is_worn() -> None:
 
 
 def test_damaged_paints() -> None:
-    refused(program_bytes(painted_program()), [
+    refused(program_bytes(PAINTED), [
         (lambda h, t: h.update(format=2), "other tensors than a program of format 2"),
         (lambda h, t: t.pop("worn"), "other tensors than a program of format 3"),
         (lambda h, t: t.pop("steps"), "other tensors than a program of format 3"),
