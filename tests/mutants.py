@@ -49,8 +49,7 @@ DRAWING = (
 )  # fmt: skip
 COMPILING = (
     "tests/compiler", "tests/compiler/test_program_compile.py", "tests/compiler/test_flatten.py",
-    "tests/compiler/test_check_trained.py", "tests/compiler/test_drop_hidden.py",
-    "tests/compiler/test_prove.py",
+    "tests/compiler/test_checks.py", "tests/compiler/test_prove.py",
     "tests/output/test_clip.py", "tests/conformance",
 )  # fmt: skip
 SOLIDS = (
@@ -73,7 +72,6 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/drawing/neural/meetings.py": TREES,
     "scenelang/compiler/lifting.py": (
         "tests/compiler/test_exact.py",
-        "tests/compiler/test_learned.py",
         "tests/compiler/test_program_compile.py",
     ),
     "scenelang/compiler/[cgprs][ahetw]*s.py": COMPILING,

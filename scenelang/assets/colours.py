@@ -44,12 +44,10 @@ def _widths(element: Element) -> Grid:
 def packed(
     name: str, colours: Grid, near: npt.NDArray[np.bool_], about: dict[str, str | float], steps: int = 40
 ) -> Element:
-    """The element of colours, 0 to 1.
+    """The element of colours, 0 to 1; ``near`` (n, n, n) is true where a node counts.
 
-    Args:
-        near: (n, n, n), true where a node counts. A node of a coarser grid counts where any around it does;
-            in the coarsest grid all count.
-        steps: steps of luma from 0 to 1; nodes that count are off by half a step at most.
+    A node of a coarser grid counts where any around it does; in the coarsest grid all count. There are
+    ``steps`` of luma from 0 to 1; nodes that count are off by half a step at most.
     """
     element = Element(name, "colours", (len(near), steps), "bzip2", b"", about)
     true, widths, grid = _turned(_LUMA, colours), _widths(element), None

@@ -117,11 +117,7 @@ class Element:
         return 3 * nodes if self.material else nodes
 
     def inflated(self) -> bytes:
-        """The decompressed bytes of all nodes, of a form with nodes.
-
-        Raises:
-            TensorError: they are damaged, fewer or more.
-        """
+        """The unpacked bytes of all nodes; raises `TensorError` where they are damaged, fewer or more."""
         inflate = bz2.BZ2Decompressor() if self.coding == "bzip2" else zlib.decompressobj()
         try:
             result = inflate.decompress(self.data, self.held + 1)

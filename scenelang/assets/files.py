@@ -29,12 +29,9 @@ class NotWritten(OSError):
 
 
 def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
-    """The bytes of a file, or of a pipe that a shell has opened; at most one more than ``most_bytes``.
+    """The bytes of a file or a shell's pipe, at most one more than ``most_bytes``; raises OSError.
 
     Opening never waits: a named pipe without a writer, a terminal or ``/dev/zero`` is refused unread.
-
-    Raises:
-        OSError: as the system says, or that it is not a regular file.
     """
     name = os.fspath(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -55,12 +52,7 @@ def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
 
 
 def read_json(data: bytes, *, most_depth: int = _JSON_DEPTH) -> Any:
-    """The value of JSON text from a stranger.
-
-    Raises:
-        ValueError: it is not JSON, nests deeper than ``most_depth``, or says something twice, in which case
-            two readers could take different meanings from it.
-    """
+    """The value of JSON text from a stranger; raises ValueError, also for a key twice or too deep nesting."""
     import json  # not at the top: a command's help needs none
 
     text = data.decode("utf-8")
@@ -122,13 +114,7 @@ def write_whole(target: str | os.PathLike[str], data: bytes, *, flush: bool = Tr
 
 
 def write_output(target: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file that a user named, as `write_whole` does, but follow a link.
-
-    Where ``target`` is a device or a pipe, such as ``/dev/stdout``, the bytes are written into it.
-
-    Raises:
-        NotWritten: nothing is left behind and an old ``target`` stays as it was.
-    """
+    """Write a file that a user named, through a link, device or pipe; otherwise as `write_whole`."""
     place = output_place(target)
     with _naming(target):
         mode = _mode(os.stat, target)
@@ -164,10 +150,7 @@ def open_own(path: Path) -> int:
 
 
 def lock(handle: int, path: Path) -> bool | None:
-    """Lock the open file at ``path``; the lock ends with the process, however that ends.
-
-    False where another process has it or has put another file there; None where files have no locks.
-    """
+    """Lock the open file at ``path`` while the process lives: False if another has it, None without locks."""
     if sys.platform == "win32":
         return None
     import fcntl

@@ -120,13 +120,9 @@ def pixels(element: Element) -> bytes:
 
 
 def texels(element: Element) -> npt.NDArray[np.float32]:
-    """Colours of a material as they are in its file, sRGB-encoded, in [0, 1].
+    """Colours of a material, sRGB in [0, 1]: (h, w, 3) from the top, or (n, n, n, 3) by x, y and z.
 
-    Returns:
-        (h, w, 3) of a picture, the first row at the top; (n, n, n, 3) of colours of space, by x, y and z.
-
-    Raises:
-        TensorError: the element is damaged.
+    Raises `TensorError` for a damaged one.
     """
     import numpy as np
 

@@ -79,11 +79,10 @@ _before = (0, False)  # the interpreter's recursion limit, and whether it collec
 
 @contextmanager
 def deep_stack() -> Iterator[None]:
-    """Allow deep recursion of Python code, and pause the collector of reference cycles meanwhile.
+    """Allow deep recursion, which costs no C stack, and pause the collector of reference cycles meanwhile.
 
-    Recursion of Python code costs no C stack from Python 3.11 on. Evaluation, passes and layouts make many
-    lasting objects and no cycles: looking for some takes as long as the work itself, or several times that.
-    Both switches are the interpreter's, one for all threads: the last user puts them back.
+    The work makes many lasting objects and no cycles. Both switches are those of the interpreter, one for all
+    threads: the last user puts them back.
     """
     global _users, _before
     with _lock:

@@ -1,8 +1,4 @@
-"""Files of tensors, read as a stranger's: safetensors with a JSON header of ours.
-
-A file is checked before anything is read from it: no key occurs twice, each tensor has a type, a shape and
-bytes that agree, and the tensors fill the file without a gap.
-"""
+"""Files of tensors, safetensors with a JSON header of ours, checked as a stranger's before they are read."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
 """Files of elements, which scenes import, checked without numpy as a stranger's.
 
-Such a zoo is a file of tensors (`scenelang.assets.tensors`), one tensor of bytes for each element. The
-header's ``elements`` describe geometries, whose tensors have their names. Files of format 2 also have
-``materials``, with tensors named ``material.NAME``, so that a geometry and a material may share a name, and
-``groups``. `scenelang.assets.element` defines the forms of elements and groups.
+A file has a tensor of bytes for each element, named as the header's ``elements`` and, as ``material.NAME``,
+its ``materials``; ``groups`` come with these, in format 2.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""The algebra of chains of moves: what merges, what commutes, the normal form that follows from it, and the
-levels of a model's exact lifting that a chain is sorted into.
-"""
+"""Chains of moves: what merges and commutes, the normal form, and the levels of a model's lifting."""
 
 from __future__ import annotations
 
@@ -117,13 +115,10 @@ def slots(turns: Sequence[Turn], dimension: int) -> list[tuple[float, float, flo
 
 
 def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space = PLANE) -> Levels:
-    """Sort a chain, normalised, nearest the leaf first, into the levels that a manifest's ``limits`` allow.
+    """Sort a normal chain, nearest the leaf first, into the levels of ``limits``; raises `LevelsError`.
 
     A single run of turns fills ``inner`` first and then ``outer``, with no middle map between. Turns that
     the normal form brought before the first map go back behind it where ``inner`` has no room.
-
-    Raises:
-        LevelsError: the chain does not fit.
     """
     most_inner, most_outer = limits.get("inner_warps", 0), limits.get("outer_warps", 0)
 

@@ -1,7 +1,4 @@
-"""The compiler's checks of a scene or of its frames, before anything is lifted; imports no numpy.
-
-`check`, `check_text` and `fix_text` are for callers in Python.
-"""
+"""Checks of a scene or of its frames before anything is lifted, also for callers in Python; no numpy."""
 
 from __future__ import annotations
 
@@ -36,10 +33,7 @@ def check_compiles(
     after: After | None = None,
     memory: Memory | None = None,
 ) -> Manifest | None:
-    """Run the compiler's checks; the manifest of the model that draws the scene, None where there is none.
-
-    ``spans`` is None if it did not come from text; ``after`` and ``memory`` are as for `check_scene`.
-    """
+    """Run the compiler's checks; the manifest of the scene's model, None where there is none."""
     manifest = find_model(scene, diagnostics, spans=spans)
     if manifest is not None:
         check_scene(scene, spans, diagnostics, manifest, after, memory=memory)

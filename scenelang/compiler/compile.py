@@ -73,10 +73,7 @@ def compile_scene(
 def find_model(
     scene: Scene, diagnostics: Diagnostics, *, model: str | None = None, spans: Spans | None = None
 ) -> Manifest | None:
-    """The manifest of the model asked for, else of the one the scene names, else of the usual one.
-
-    Where no model has that name, ``diagnostics`` receives E0514.
-    """
+    """The manifest of the model asked for, named by the scene or usual; reports E0514 where there is none."""
     name = model or scene.model or USUAL[scene_dimension(scene)]
     try:
         return load_manifest(name)

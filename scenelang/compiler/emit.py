@@ -22,11 +22,7 @@ Bound = tuple[float, float, float, float]
 
 
 def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
-    """The Program of a stream that all passes have left without errors.
-
-    Raises:
-        ProgramError: the model's lifting is not one of this version.
-    """
+    """The Program of a stream without errors; raises `ProgramError` for a lifting that is not known."""
     if manifest.lifting != "exact" and codes.lifting is None:
         raise ProgramError(f"model `{manifest.name}` needs the lifting `{manifest.lifting}`")
     rows = graph.rows()

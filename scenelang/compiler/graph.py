@@ -91,10 +91,7 @@ def colour_steps(ops: Iterable[MaterialOp]) -> tuple[ColourStep, ...]:
 
 
 def normal(steps: Iterable[ColourStep]) -> tuple[ColourStep, ...]:
-    """Join neighbouring operations of a kind where nothing is clamped between them.
-
-    A product with shares, or a mix with the luma by a share, stays in [0, 1]; a hue has a period of 1.
-    """
+    """Join neighbouring operations of a kind where nothing is clamped between them, as in [0, 1]."""
     result: list[ColourStep] = []
     for step in steps:
         joined: ColourStep | None = step
@@ -190,10 +187,7 @@ class Leaf(Record):
 
 
 class Link(Record):
-    """A child of a fold with the operator that joins it to what came before; the first is a union.
-
-    ``k`` is the width of its blend as it was written, in world units, 0 where none was.
-    """
+    """A child of a fold, joined to what came before, the first as a union; ``k`` as written, 0 for none."""
 
     op: Combine
     node: Node
@@ -206,10 +200,9 @@ class Link(Record):
 
 
 class Fold(Record):
-    """Children folded from the left; without links the empty set, at distance +infinity.
+    """Children folded from the left, with moves nearest the leaf first; without links the empty set.
 
-    ``kind`` is the word it was written with: ``scene``, ``group``, ``chain`` or a boolean. ``moves`` apply to
-    all children, nearest the leaf first.
+    ``kind`` is the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
     """
 
     kind: str
@@ -285,10 +278,7 @@ class Graph(Record):
         return result
 
     def window(self) -> Box:
-        """The part of the world that decides the picture.
-
-        In space, what lies below the ground is neither seen nor lit; all else may at least throw a shadow.
-        """
+        """The part of the world that decides the picture; below the ground nothing is seen or lit."""
         if (stage := self.stage) is not None:
             floor = -inf if stage.ground is None else stage.ground.y
             seen = stage.camera.eye[1] > floor and stage.light.position[1] > floor
@@ -340,10 +330,7 @@ def links_within(fold: Fold) -> Iterator[Link]:
 
 
 def map_leaves(graph: Graph, change: Callable[[Leaf], Leaf], name: str) -> Graph:
-    """The graph with ``change`` applied to every leaf; it gives the leaf itself where that stays.
-
-    ``change`` depends on the leaf and the graph's space alone; its result is noted under its ``name``.
-    """
+    """The graph with ``change``, which depends on leaf and space alone, of each leaf, noted as ``name``."""
 
     def leaf(node: Leaf) -> Node:
         return change(node) if node.notes is None else node.noted(name, change)
@@ -446,14 +433,9 @@ class InternalError(RuntimeError):
 
 
 def verify(graph: Graph, stage: str, holds: Collection[Invariant] = (), sound: Sound | None = None) -> Graph:
-    """Check a graph after ``stage``, the name of a pass or ``lower``, and give it back.
+    """Check a graph after ``stage``, a pass or ``lower``; raises `InternalError`, else gives it back.
 
-    Args:
-        holds: what this stage and those before it established.
-        sound: leaves that were checked after an earlier stage; receives those of this graph.
-
-    Raises:
-        InternalError: an invariant is broken.
+    ``holds`` is established by now; ``sound`` has leaves checked before and receives those of this graph.
     """
     fault = _fault(graph, frozenset(holds), {} if sound is None else sound)
     if fault is not None:

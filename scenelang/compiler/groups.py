@@ -100,11 +100,7 @@ def read_groups(tokens: npt.NDArray[np.int8]) -> Groups:
 
 
 def widths_of(operators: Index, blends: npt.NDArray[np.floating]) -> Floats:
-    """Widths (N,) of the blends of operators, world units; 0 where they have none.
-
-    Args:
-        blends: (N,) numbers of vectors, 0 for the usual ones: `BLEND` of a `smooth`, none of a cut.
-    """
+    """World widths (N,) of blends, of operators and numbers of vectors (N,), 0 for the usual ones."""
     given = np.asarray(blends, np.float64).clip(0.0)
     usual = np.where(operators == SMOOTH, BLEND, 0.0)
     return np.where((operators != UNION) & (given > 0), given, usual)
@@ -135,10 +131,7 @@ def anchored(groups: Groups) -> Mask:
 
 
 def felt(groups: Groups, widths: Floats) -> Felt:
-    """Find how far rows matter; `widths` are those of their blends (N,), as `widths_of` their operators.
-
-    The width of a row that begins a group is the group's.
-    """
+    """Find how far rows matter, of the widths (N,) of their blends; that of a group is its first row's."""
     if not groups.deepest:
         return _felt_flat(groups.tokens, widths)
     count = len(groups.tokens)

@@ -111,11 +111,7 @@ LAYOUTS: Final = {2: PLANE_LAYOUT, 3: SOLID_LAYOUT}
 
 
 def inverse_frame(rows: Rows, dimension: int) -> list[float]:
-    """The inverse of an affine map as d rows of d + 1 numbers: the coordinates before it.
-
-    Raises:
-        ZeroDivisionError: the map is singular.
-    """
+    """The inverse of an affine map, d rows of d + 1 numbers; raises ZeroDivisionError if singular."""
     if dimension == 2:  # in closed form, as chains of the plane are lifted by the ten thousand
         a, b, _, c, d, e, _, f = rows[:8]
         inverse_det = 1.0 / (a * e - b * d)
@@ -131,11 +127,7 @@ def inverse_frame(rows: Rows, dimension: int) -> list[float]:
 def lift_many(
     levels: Sequence[Levels], codes: Sequence[Sequence[float]], layout: Layout = PLANE_LAYOUT
 ) -> np.ndarray:
-    """Vectors (N, 64) in float64 of ways to leaves: the products of their matrices and the leaf, at once.
-
-    Raises:
-        ZeroDivisionError: an affine map is singular.
-    """
+    """Vectors (N, 64) in float64 of ways to leaves; raises ZeroDivisionError for a singular map."""
     out, d = np.zeros((len(levels), WIDTH)), layout.dimension
     for row, level, code in zip(out, levels, codes, strict=True):
         numbers = [*code, 1.0, *inverse_frame(level.affine, d)]
@@ -207,12 +199,7 @@ class Lifting:
 
 
 def read_lifting(tensors: Mapping[str, npt.NDArray[Any]], prefix: str = "lifting.") -> Lifting:
-    """The lifting in a weights file.
-
-    Raises:
-        KeyError: something is missing.
-        ValueError: shapes do not fit each other, or numbers are not finite.
-    """
+    """The lifting in a weights file; raises KeyError for what is missing, ValueError for what is wrong."""
 
     def array(name: str) -> Doubles:
         return np.asarray(tensors[prefix + name], np.float64)

@@ -43,10 +43,7 @@ from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, di
 
 
 def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
-    """The step of a transform, or the reason why there is none.
-
-    In the plane nothing may leave it, and scales along z drop out.
-    """
+    """The step of a transform, or the reason why there is none; in the plane scales along z drop out."""
     if isinstance(transform, schema.Flip):
         return Affine(scaling(-1.0, 1.0))
     if isinstance(transform, schema.Twirl):
@@ -117,10 +114,7 @@ def lower(
     diagnostics: Diagnostics,
     memory: Memory | None = None,
 ) -> Graph:
-    """The graph of a scene for one model.
-
-    A name or a transform that the model does not have is reported (E03xx, E05xx) and left out, so that
-    everything else is checked too.
+    """The graph of a scene for one model; what the model does not have is reported and left out.
 
     Args:
         spans: where nodes were written; None for a scene that did not come from text.

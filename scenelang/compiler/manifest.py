@@ -21,22 +21,9 @@ USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 _LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
 """Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
 _RANGES: Final = {
-    "objects",
-    "smooth",
-    "twirl",
-    "bend",
-    "twist",
-    "scale",
-    "thin",
-    "blend",
-    "displace",
-    "frequency",
-    "thickness",
-    "width",
-    "texels",
-}
-
-
+    "objects", "smooth", "twirl", "bend", "twist", "scale", "thin", "blend", "displace", "frequency",
+    "thickness", "width", "texels",
+}  # fmt: skip
 _DRAWN: Final = {
     "framed": ("element of the plane", "texture"),
     "solid": ("element of space", "texture", "colouring of space"),
@@ -83,11 +70,7 @@ class Manifest:
 
     @staticmethod
     def from_json(text: str | bytes) -> Manifest:
-        """Read a manifest.
-
-        Raises:
-            ValueError: it is not JSON, a field is missing or unknown, or holds what it cannot.
-        """
+        """Read a manifest; raises ValueError for other JSON, and for missing, unknown or wrong fields."""
         text = text.encode("utf-8") if isinstance(text, str) else text
         if len(text) > _MOST_BYTES:
             raise ValueError(f"a manifest of more than {_MOST_BYTES:,} bytes")
@@ -195,12 +178,7 @@ def available() -> list[str]:
 
 
 def load_manifest(name: str) -> Manifest:
-    """The manifest of a shipped model; earlier names of models work too.
-
-    Raises:
-        KeyError: there is no such model.
-        ValueError: it is damaged, or that of another model: its name leads to its files.
-    """
+    """The manifest of a model, by its name or an earlier one; raises KeyError, or ValueError if damaged."""
     name = ALIASES.get(name, name)
     if name not in available():
         raise KeyError(name)

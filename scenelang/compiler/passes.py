@@ -1,8 +1,4 @@
-"""The order of the passes, `PASSES`, and those that report mistakes and leave the graph unchanged.
-
-Sharing equal subgraphs is left out on purpose: every row of a stream is lifted in one vectorised call,
-which costs less than finding the equal ones would.
-"""
+"""The order of the passes, `PASSES`, and those that report mistakes and leave the graph unchanged."""
 
 from __future__ import annotations
 
@@ -53,10 +49,7 @@ from scenelang.language.scene import Scene
 
 
 def check_levels(graph: Graph, context: Context) -> Graph:
-    """Report objects whose deformations or affine maps the model cannot hold; the graph is unchanged.
-
-    Before: the normal form of `fold_warps`.
-    """
+    """Report objects whose chains in normal form the model cannot hold; the graph is unchanged."""
     check = partial(_check, space=graph.space, context=context)
     for leaf in leaves(graph.root):
         leaf.noted("check_levels", check)
@@ -190,10 +183,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
 
 
 def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
-    """Warn at the `smooth` whose colours lie furthest apart for its size.
+    """Warn of the `smooth` with the largest product of its colours' difference and its scale.
 
-    An error of a blend's distances, as a share of the objects' scale, is an error of its colour by that share
-    of the difference of the colours: the product of both estimates it.
+    An error of distances, as a share of the scale, is one of the colour by that share of the difference.
     """
     low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
     worst: tuple[float, float, float, Leaf] | None = None

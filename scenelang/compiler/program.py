@@ -48,11 +48,7 @@ class Paint(NamedTuple):
 
 
 def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:
-    """Tensors of a table of paints.
-
-    ``paints`` I32 (K, 2) has the index of each one's element and the number of its steps, ``steps``
-    F32 (S, 4) the steps of all paints in order: an index in `STEPS` and up to three numbers.
-    """
+    """Tensors of paints: `paints` I32 (K, 2), element and number of steps; `steps` F32 (S, 4), in order."""
     kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
     table = [(index[paint.element], len(paint.steps)) for paint in paints]
     steps = [
@@ -387,11 +383,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
 
 
 def parse_program(data: bytes) -> Program:
-    """The Program that a file's bytes hold; everything in them is checked but the weights' digest.
-
-    Raises:
-        ProgramError: they hold none.
-    """
+    """The Program in a file's bytes, checked but for the weights' digest; raises `ProgramError`."""
     try:
         file = read_tensors(data, MOST_BYTES, (1, 2, 3, 4))
         elements = _read_elements(file)

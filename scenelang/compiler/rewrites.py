@@ -133,10 +133,7 @@ def drop_unseen(graph: Graph, context: Context) -> Graph:
 
 
 def begun(links: Sequence[Link | None]) -> tuple[Link, ...]:
-    """The links that are left; behind a dropped first one, cuts are dropped up to the next union.
-
-    A dropped link, None, had no effect, or was the first.
-    """
+    """The links that are not dropped; behind a dropped first one, cuts go too, up to the next union."""
     result: list[Link] = []
     for index, link in enumerate(links):
         if link is None:

@@ -114,10 +114,9 @@ class Ground(Record):
 
 
 class Stage(Record):
-    """All of a 3D scene that is not an object.
+    """All of a 3D scene that is not an object; the ground fades into the sky's ``horizon``.
 
-    The ground fades into the sky's ``horizon``; a plain background is ``horizon`` and ``zenith``. Where it is
-    ``transparent`` the sky is not drawn and the picture has alpha.
+    Where it is ``transparent`` the sky is not drawn and the picture has alpha.
     """
 
     camera: Camera = Camera()
@@ -138,11 +137,7 @@ def stage_data(stage: Stage) -> dict[str, Any]:
 
 
 def read_stage(data: object) -> Stage:
-    """Read a stage from JSON data; the inverse of `stage_data`.
-
-    Raises:
-        ValueError: the data is not a stage.
-    """
+    """Read a stage from JSON data, the inverse of `stage_data`; raises ValueError for other data."""
     if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
         raise ValueError("fields missing or unknown")
     parts: dict[str, Any] = {name: _read(name, data[name]) for name in data}
@@ -289,10 +284,7 @@ class Space:
         return min(smallest, middle), largest
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
-        """The turn before the map ``rows`` that has the effect of ``turn`` after it, if there is one.
-
-        The module's docstring has the proof.
-        """
+        """The turn before the map ``rows`` with the effect of ``turn`` after it; see the module."""
         # P is the plane of x and j, k the axis a; entry (r, c) of the map is rows[4 r + c].
         j, k = (2, 1) if isinstance(turn, Twist) else (1, 2)
         a, b, c, d, along = rows[0], rows[j], rows[4 * j], rows[5 * j], rows[5 * k]
@@ -358,10 +350,7 @@ class Space:
         return centre, radius, pending
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
-        """Radius of a disc or ball about a leaf's origin within it, and the map from the world to the leaf.
-
-        Turns before the first affine map leave it in place. None where none is known.
-        """
+        """Radius of a disc or ball within a leaf, and the map from the world to the leaf; None if unknown."""
         maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
@@ -480,10 +469,7 @@ def stretches(a: float, b: float, c: float, d: float) -> tuple[float, float]:
 
 
 def _similarity(rows: Rows) -> tuple[float, float] | None:
-    """``(s, sign)`` where the map of the plane is a similarity about the origin, else None.
-
-    ``s`` is its scale; ``sign`` is 1 for a rotation, -1 for a reflection.
-    """
+    """The scale of a similarity of the plane about the origin and 1, -1 where it mirrors; else None."""
     a, b, c, d = rows[0], rows[1], rows[4], rows[5]
     s = sqrt(abs(a * d - b * c))
     near = ALIKE * s

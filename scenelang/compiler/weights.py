@@ -64,11 +64,7 @@ def weights_path(name: str, digest: str = "") -> Path:
 
 
 def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:
-    """The bytes of a shipped model's weights file, or of the one at ``path``; of one too large, the first.
-
-    Raises:
-        ModelError: it cannot be read.
-    """
+    """The bytes of a model's weights file or of ``path``; raises `ModelError` where it cannot be read."""
     try:
         return read_regular(path or weights_path(name, digest), MOST_BYTES)
     except OSError as error:
@@ -84,11 +80,7 @@ class Weights(NamedTuple):
 
 
 def open_weights(data: bytes) -> Weights:
-    """Read a weights file.
-
-    Raises:
-        ModelError: it is damaged, foreign or hostile, or holds numbers that are not finite.
-    """
+    """Read a weights file; raises `ModelError` for a damaged or hostile one, or numbers not finite."""
     try:
         result = read_tensors(data, MOST_BYTES)
         return Weights(result.header, result.arrays())
@@ -107,12 +99,7 @@ def check_shapes(arrays: Mapping[str, npt.NDArray[Any]], shapes: Mapping[str, tu
 
 
 def read_facts(name: str) -> dict[str, Any]:
-    """Facts about a shipped model's weights: SHA-256, bytes, parameters and the header of their training.
-
-    Raises:
-        OSError: the file cannot be read.
-        ModelError: it is damaged.
-    """
+    """SHA-256, bytes, parameters and header of a model's shipped weights; raises OSError or `ModelError`."""
     data = read_regular(weights_path(name), MOST_BYTES)
     header, arrays = open_weights(data)
     parameters = sum(array.size for array in arrays.values())
@@ -122,22 +109,12 @@ def read_facts(name: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=8)
 def load_codes(name: str, digest: str = "") -> Codes:
-    """Read the codes of a shipped model, of its current weights or of those `replaced`.
-
-    Raises:
-        KeyError: there is no such model.
-        FileNotFoundError: it has no weights.
-        ModelError: its weights are damaged.
-    """
+    """Codes of a model's current weights or of those `replaced`; raises KeyError, OSError or `ModelError`."""
     return codes_of(load_manifest(name), read_regular(weights_path(name, digest), MOST_BYTES))
 
 
 def codes_of(manifest: Manifest, data: bytes) -> Codes:
-    """The codes of a weights file.
-
-    Raises:
-        ModelError: it is damaged, or not of this model.
-    """
+    """The codes of a weights file; raises `ModelError` where it is damaged, or not of this model."""
     from scenelang.compiler.lifting import LAYOUTS, WIDTH
 
     tensors = open_weights(data).arrays

@@ -5,14 +5,11 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 SOON_S = 300
 """No command here needs a twentieth of it on an idle machine."""
-READY = "import sys, scenelang.cli.start as s; print('ready', flush=True); s.main()"
 
 
 def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -20,19 +17,6 @@ def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "scenelang", *arguments]
     options = {"stdout": subprocess.PIPE, "stdin": subprocess.DEVNULL, **options}
     return subprocess.run(command, stderr=subprocess.PIPE, text=True, timeout=SOON_S, check=False, **options)
-
-
-@contextmanager
-def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A process whose command has just begun; its standard output is the rest of its words."""
-    command = [sys.executable, "-c", READY, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 def one_line(done: subprocess.CompletedProcess[str], code: int = 2) -> str:

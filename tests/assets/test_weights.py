@@ -18,15 +18,12 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from fuzz.tensors import mutate
-from lab.training.checkpoint import load_tensors
 from scenelang.assets.tensors import TensorError, read_tensors
 from scenelang.compiler import manifest as manifests
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.weights import ModelError, codes_of, open_weights, weights_path
 from scenelang.drawing.neural.files import framed_arrays
 from scenelang.drawing.neural.load import load_network
-from tests.cli.conftest import Folder
-from tests.lab.conftest import run
 
 SHAPES = load_manifest("shapes2d")
 DATA = weights_path("shapes2d").read_bytes()
@@ -207,61 +204,47 @@ def test_what_is_taken_is_what_safetensors_takes() -> None:
     assert 40 < count < 360
 
 
-def test_commands_say_so(folder: Folder) -> None:
-    Path("bad.safetensors").write_bytes(HARM["deep brackets"])
-    result = run("eval", "shapes2d", "--scenes", "1", "--weights", "bad.safetensors", "-o", "out")
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.startswith("Error: ")
-
-
-def test_checkpoints(tmp_path: Path) -> None:
-    """Their tensors are compared with the training's later; here nothing may break."""
-    path = tmp_path / "checkpoint.safetensors"
-
-    def read(data: bytes) -> None:
-        path.write_bytes(data)
-        load_tensors(path)
-
-    fine = {name for name in HARM if name.startswith(("codes", "no codes"))}
-    assert {name for _, name in taken({"checkpoint": read}, HARM)} == fine
-
-
 MANIFEST = json.loads((manifests.ROOT / "shapes2d" / "manifest.json").read_text("utf-8"))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"format": 2}, {"unknown": 1}, {"name": None}, {"name": 3}, {"name": 'a"b'}, {"dimension": 4},
-        {"dimension": True}, {"dimension": "2"}, {"geometries": "star"}, {"geometries": ["../star"]},
-        {"geometries": ["star", "star"]}, {"geometries": [1]}, {"materials": []}, {"renderer": "../../x"},
-        {"lifting": "a/b"}, {"limits": {"canvas": 1e300}},
-        {"limits": {"canvas": -1}}, {"limits": {"canvas": 1 << 60}}, {"limits": [1]},
-        {"trained": {"twirl": [2]}},
-        {"trained": {"twirl": [2, 1]}}, {"trained": {"twirl": ["a", "b"]}},
-        {"trained": {"twirl": [0, 1e308]}},
-        {"trained": 3}, {"measured": []}, {"name": "../x"}, {"name": ".."}, {"name": "a/b"},
-        {"name": "a" * 101},
-        {"set": "../../x"}, {"set": "C:x"}, {"set": "a\\b"}, {"set": ""}, {"limits": {"depth": 3}},
-        {"limits": {"canvas": 8193}}, {"limits": {"inner_warps": 3}}, {"limits": {"canvas": True}},
-        {"trained": {"shear": [0, 1]}}, {"measured": {"sets": {"shapes2d": {"flip": 10**400}}}},
-        {"measured": {"sets": {"shapes2d": {"flip": "0"}}}}, {"summary": "x" * (1 << 20)},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_manifests(change: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r".") as caught:
-        Manifest.from_json(json.dumps({**MANIFEST, **change}))
-    assert len(str(caught.value)) < 300
+CHANGES: dict[str, tuple[Any, ...]] = {
+    "format": (2,),
+    "unknown": (1,),
+    "name": (None, 3, [-1, 1], 'a"b', "../x", "..", "a/b", "a" * 101),
+    "summary": ("two\nlines", "x" * (1 << 20)),
+    "dimension": (4, True, "2", 2.0),
+    "geometries": ("star", ["../star"], ["star", "star"], [1], ["square", False]),
+    "materials": ([],),
+    "renderer": (None, "../../x"),
+    "lifting": ("a/b",),
+    "limits": (
+        [1], -1e308, {"depth": 3}, {"inner_warps": 3}, {"inner_warps": [1, 2]}, {"inner_warps": True},
+        *({"canvas": value} for value in (1e300, -1, 1 << 60, 8193, True, {})),
+    ),
+    "trained": (
+        3, -1, {"shear": [0, 1]},
+        *({"twirl": value} for value in (1e308, [2], [2, 1], ["a", "b"], [0, 1e308], [1, 10**400])),
+    ),
+    "measured": (
+        [], "union", {"stability": {"twirl": 5}},
+        *({"sets": {"shapes2d": {"flip": value}}} for value in (10**400, "0")),
+    ),
+    "set": ("../../x", "C:x", "a\\b", ""),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "null", "{", "[" * 100_000, '{"format": 1, "format": 1}', '{"format": NaN}']
-)
-def test_no_manifests(text: str) -> None:
-    with pytest.raises(ValueError, match=r"."):
-        Manifest.from_json(text)
+def test_manifests() -> None:
+    texts = [json.dumps({**MANIFEST, key: value}) for key, values in CHANGES.items() for value in values]
+    texts += [
+        json.dumps({k: v for k, v in MANIFEST.items() if k != key})
+        for key in MANIFEST.keys() - {"layout", "any_blend"}
+    ]
+    texts += ["", "[]", "null", "{", "[" * 100_000, '{"format": 1, "format": 1}', '{"format": NaN}']
+    Manifest.from_json(json.dumps(MANIFEST))
+    for text in texts:
+        with pytest.raises(ValueError, match=r".") as caught:
+            Manifest.from_json(text)
+        assert len(str(caught.value)) < 300, text[:1000]
 
 
 def test_a_manifest_cannot_point_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

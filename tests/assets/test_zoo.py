@@ -1,21 +1,28 @@
-"""Files of elements: what comes back, and what is refused."""
+"""Files of elements, materials and groups: what comes back, and what is refused."""
 
 from __future__ import annotations
 
+import io
 import json
 import zlib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from safetensors.numpy import save
 
-from scenelang.assets.element import Element
+from scenelang.assets import element as elements
+from scenelang.assets.element import FORMS, Element, Part
+from scenelang.assets.picture import frame_of, painted, size_of, texels
 from scenelang.assets.tensors import TensorError
 from scenelang.assets.zoo import entry_of, load_zoo, read_zoo, zoo_bytes
-from tests.assets.shapes import ball, element, torus
+from scenelang.drawing.exact.outline import Picture, fit_picture
+from tests.assets.scenes import changed
+from tests.assets.shapes import ball, element, noise, torus
 
 
 def test_elements_come_back(tmp_path: Path) -> None:
@@ -41,49 +48,47 @@ def written(entry: dict[str, Any] | None = None, name: str = "ring", **header: A
     return save({"ring": np.frombuffer(made.data, np.uint8)}, metadata={"scenelang": text})
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"", "header"),
-        (written(elements=None), "not a file of elements"),
-        (written(elements=[]), "not a file of elements"),
-        (written(extra=1), "not a file of elements"),
-        (written(name="other"), "other elements than it holds"),
-        (written({"form": "octree"}), "form that this version does not know"),
-        (written({"dimension": 4}), "sizes out of range"),
-        (written({"levels": True}), "sizes out of range"),
-        (written({"cells": 2.5}), "sizes out of range"),
-        (written({"cells": 8, "levels": 6}), "sizes out of range"),
-        (written({"levels": 3}), "does not hold"),
-        (written({"levels": 1}), "does not hold"),
-        (written({"about": {"license": "x" * 3000}}), "says of itself"),
-        (written({"about": {"license": "\x1b[2J"}}), "says of itself"),
-        (written({"about": {"x": [1]}}), "says of itself"),
-        (written({"new": 1}), "missing or unknown fields"),
-    ],
-)
-def test_damaged_files(data: bytes, words: str) -> None:
-    with pytest.raises(TensorError, match=words):
-        read_zoo(data)
+def refused(cases: list[tuple[bytes, str]]) -> None:
+    for data, words in cases:
+        with pytest.raises(TensorError, match=words):
+            read_zoo(data)
 
 
-def packed_as(data: bytes) -> bytes:
-    return zoo_bytes([Element("ring", "pyramid", (3, 4, 2), "deflate", data)])
+def test_damaged_files() -> None:
+    refused(
+        [
+            (b"", "header"),
+            (written(elements=None), "not a file of elements"),
+            (written(elements=[]), "not a file of elements"),
+            (written(extra=1), "not a file of elements"),
+            (written(name="other"), "other elements than it holds"),
+            (written({"form": "octree"}), "form that this version does not know"),
+            (written({"dimension": 4}), "sizes out of range"),
+            (written({"levels": True}), "sizes out of range"),
+            (written({"cells": 2.5}), "sizes out of range"),
+            (written({"cells": 8, "levels": 6}), "sizes out of range"),
+            (written({"levels": 3}), "does not hold"),
+            (written({"levels": 1}), "does not hold"),
+            (written({"about": {"license": "x" * 3000}}), "says of itself"),
+            (written({"about": {"license": "\x1b[2J"}}), "says of itself"),
+            (written({"about": {"x": [1]}}), "says of itself"),
+            (written({"new": 1}), "missing or unknown fields"),
+        ]
+    )
 
 
-RING = element(torus, levels=2).data
-
-
-@pytest.mark.parametrize("data", [b"", b"x" * 50, RING[:-3], RING + b"x", zlib.compress(b"\0" * 10)])
-def test_damaged_bytes(data: bytes) -> None:
-    with pytest.raises(TensorError, match="element `ring`"):
-        read_zoo(packed_as(data))
-
-
-def test_bytes_that_would_inflate_to_more_are_left_deflated() -> None:
-    bomb = zlib.compress(b"\0" * (1 << 26), 9)  # 64 MB in 65 KB
-    with pytest.raises(TensorError, match="does not hold 854 bytes"):
-        read_zoo(packed_as(bomb))
+def test_damaged_bytes() -> None:
+    ring, bomb = element(torus, levels=2).data, zlib.compress(b"\0" * (1 << 26), 9)  # 64 MB in 65 KB
+    cases = dict.fromkeys(
+        (b"", b"x" * 50, ring[:-3], ring + b"x", zlib.compress(b"\0" * 10)), "element `ring`"
+    )
+    cases[bomb] = "does not hold 854 bytes"
+    refused(
+        [
+            (zoo_bytes([Element("ring", "pyramid", (3, 4, 2), "deflate", data)]), words)
+            for data, words in cases.items()
+        ]
+    )
 
 
 def test_many_elements_hold_no_more_than_one_file_may() -> None:
@@ -92,3 +97,191 @@ def test_many_elements_hold_no_more_than_one_file_may() -> None:
     listed = [replace(large, name=f"a{at}") for at in range(17)]
     with pytest.raises(TensorError, match="more than 134,217,728 bytes"):
         read_zoo(zoo_bytes(listed))
+
+
+HELD = [
+    element(torus, "ring", levels=2),
+    element(ball, "disc", levels=2, d=2),
+    noise(3, 3, 3, name="hide"),
+    noise(3, 3, name="bark"),
+]
+TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+CAR = (
+    Part("ring", (0.0, 0.5, 0), 0.5, material="hide"),
+    Part("ring", (0.25, -0.5, 0.0), 0.25, TURNED, (1.0, 0.5, 0.0)),
+)
+
+
+def test_groups_come_back() -> None:
+    known = {"car": CAR, "spot": (Part("disc", (0.0, 0.0), 1.0, material="bark"),)}
+    data = zoo_bytes(HELD, known)
+    assert read_zoo(data).groups == known
+    assert zoo_bytes(read_zoo(data).elements, read_zoo(data).groups) == data
+
+
+def test_elements_without_groups_are_in_files_of_the_old_format() -> None:
+    assert b"groups" not in zoo_bytes(HELD[:2])
+    assert read_zoo(zoo_bytes(HELD[:1], {"car": CAR[1:]})).groups == {"car": (CAR[1],)}
+
+
+BAD_PARTS: dict[str, list[dict[str, Any]]] = {
+    "not a geometry": [{"geometry": "rng"}, {"geometry": "hide"}, {"geometry": ["ring"]}],
+    "not a geometry of its dimension": [{"geometry": "disc"}],
+    "a material that the file does not hold": [{"material": "hid"}, {"material": ["hide"]}],
+    "out of range": [
+        *({"place": value} for value in ((0, 0), (0, 0, 1e300), (0, 0, 1e5), (0, 0, "0"), 3)),
+        *({"size": value} for value in (0, -1, True)),
+        *({"turn": value} for value in (TURNED[:2], (*TURNED[:2], TURNED[1]), "abc")),
+        {"turn": (TURNED[0], TURNED[1], (0, 0, -1e300))},
+        {"turn": ((0, [1], 0), *TURNED[1:])},
+        {"color": (0, 0)},
+        {"color": (0, 0, 1.5)},
+    ],
+}
+
+
+def test_groups_of_strangers() -> None:
+    for words, changes in BAD_PARTS.items():
+        for change in changes:
+            data = zoo_bytes(HELD, {"car": (CAR[0], CAR[1]._replace(**change))})
+            with pytest.raises(TensorError, match=f"group `car`.*{words}"):
+                read_zoo(data)
+    for name, group, words in (
+        ("no name", CAR, "has the name"),
+        ("car", (), "1 to 256 parts"),
+        ("car", CAR * 129, "1 to 256 parts"),
+    ):
+        with pytest.raises(TensorError, match=words):
+            read_zoo(zoo_bytes(HELD, {name: group}))
+
+
+def test_fields_are_those_of_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    for damaged in ("wheel", [CAR], [{"geometry": "ring"}], [{**CAR[0]._asdict(), "name": 1}]):
+        monkeypatch.setattr("scenelang.assets.zoo.group_entry", lambda group, damaged=damaged: damaged)
+        with pytest.raises(TensorError, match="group `car`"):
+            read_zoo(zoo_bytes(HELD, {"car": CAR}))
+
+
+def test_volumes_are_determinants() -> None:
+    for d in (2, 3):
+        rows = np.random.default_rng(d).normal(size=(d, d))
+        assert elements._volume(tuple(map(tuple, rows))) == pytest.approx(np.linalg.det(rows))
+
+
+BARK = noise(5, 7)
+
+
+def test_colours_come_back() -> None:
+    for shape in ((1, 1), (5, 7)):
+        colours = np.random.default_rng(1).integers(0, 256, (*shape, 3), np.uint8)
+        (found,) = read_zoo(zoo_bytes([painted("bark", colours)])).elements
+        np.testing.assert_array_equal(texels(found), colours.astype(np.float32) / 255)
+        assert found.held == colours.size
+
+
+def still(colours: np.ndarray) -> Element:
+    """A picture as AV1."""
+    return fit_picture(Picture(colours), "bark", max_error=0.05)[0]
+
+
+def test_another_coding_is_not_tried() -> None:
+    ramp = np.linspace(0, 255, 16 * 24 * 3).reshape(16, 24, 3).astype(np.uint8)
+    made = [painted("bark", ramp), still(ramp)]
+    assert [element.coding for element in made] == [*FORMS["picture"].codings]
+    for one, other in zip(made, made[::-1], strict=True):
+        assert abs(texels(one) * 255 - ramp).max() < 20
+        assert read_zoo(zoo_bytes([one])).materials == {"bark": one}
+        with pytest.raises(TensorError, match="`bark` is damaged"):
+            texels(replace(one, coding=other.coding))
+
+
+def test_a_geometry_and_a_material_share_a_name() -> None:
+    made = [element(torus, "cow", levels=2), noise(3, 3, name="cow"), noise(2, 2, 2, name="hide")]
+    zoo = read_zoo(zoo_bytes(made))
+    assert (list(zoo.geometries), list(zoo.materials)) == (["cow"], ["cow", "hide"])
+    assert {e.digest for e in zoo.elements} == {e.digest for e in made}
+    assert [e.kind for e in zoo.elements] == ["element of space", "texture", "colouring of space"]
+    assert zoo_bytes(zoo.elements) == zoo_bytes(made[::-1])
+
+
+def test_the_digest_is_that_of_the_colours() -> None:
+    assert replace(BARK, name="other", about={}).digest == BARK.digest
+    assert len({BARK.digest, noise(5, 7, seed=1).digest, replace(BARK, sizes=(7, 5)).digest}) == 3
+
+
+def other(**entry: Any) -> bytes:
+    def change(header: dict[str, Any], _: object) -> None:
+        header["materials"]["bark"] |= entry
+        header |= {key: value for key, value in entry.items() if key in header}
+
+    return changed(zoo_bytes([BARK]), change)
+
+
+def test_damaged_entries() -> None:
+    refused(
+        [
+            (other(height=6), "a picture of 7 x 5"),
+            (other(height=2049), "sizes out of range"),
+            (other(width=0), "sizes out of range"),
+            (other(coding="exr"), "a coding that this version does not know"),
+            (other(coding=["webp"]), "a coding that this version does not know"),
+            (other(coding="av1"), "damaged"),
+            (other(form="colours"), "missing or unknown fields"),
+            (other(elements={"bark": {}}), "other elements than it holds"),
+            (other(format=1), "not a file of elements"),
+        ]
+    )
+
+
+def test_a_material_is_not_listed_as_a_geometry() -> None:
+    made = element(torus, "bark", levels=2)
+
+    def swap(header: dict[str, Any], tensors: dict[str, Any]) -> None:
+        header["elements"], header["materials"] = header["materials"], header["elements"]
+        tensors["bark"], tensors["material.bark"] = tensors["material.bark"], tensors["bark"]
+
+    with pytest.raises(TensorError, match="a material among its geometries"):
+        read_zoo(changed(zoo_bytes([made, BARK]), swap))
+
+
+def saved(kind: str, size: tuple[int, int], **options: Any) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", size).save(file, kind, **options)
+    return file.getvalue()
+
+
+STILL = still(np.random.default_rng(1).integers(0, 256, (5, 7, 3), np.uint8))
+
+
+def test_damaged_pictures() -> None:
+    cases = [
+        ("webp", BARK.data[:-30], "damaged"),
+        ("webp", b"", "damaged"),
+        ("webp", saved("WEBP", (8, 5)), "a picture of 8 x 5"),
+        ("webp", saved("WEBP", (10000, 10000), quality=0, method=0), "damaged"),
+        ("webp", saved("GIF", (7, 5)), "damaged"),
+        (
+            "webp",
+            saved("WEBP", (7, 5), save_all=True, append_images=[Image.new("RGB", (7, 5), "red")]),
+            "more than one frame",
+        ),
+        ("av1", STILL.data[:-9], "not a sequence header and a frame"),
+        ("av1", b"", "not a sequence header and a frame"),
+        ("av1", STILL.data * 2, "more than one frame"),
+        ("av1", STILL.data[:3] + b"\0" + STILL.data[4:], "damaged"),
+        ("av1", frame_of(saved("AVIF", (7, 5), subsampling="4:2:0")), "not a still picture"),
+        ("av1", frame_of(saved("AVIF", (300, 100), subsampling="4:4:4")), "a picture of 300 x 100"),
+    ]
+    refused([(zoo_bytes([replace(BARK, coding=coding, data=data)]), words) for coding, data, words in cases])
+
+
+def test_the_frame_says_its_size_before_it_takes_memory() -> None:
+    """A container of 7 by 5 texels with a frame of a thousand times as many never reaches the decoder."""
+    large = frame_of(saved("AVIF", (300, 100), subsampling="4:4:4"))
+    assert (size_of(large), size_of(STILL.data)) == ((100, 300), (5, 7))
+    for at in range(min(len(STILL.data), 40)):  # whatever is changed, it is refused or as large as it says
+        for bit in range(8):
+            data = bytearray(STILL.data)
+            data[at] ^= 1 << bit
+            with suppress(TensorError):
+                assert texels(replace(STILL, data=bytes(data))).shape == (5, 7, 3)

@@ -42,50 +42,31 @@ MANIFEST = load_manifest("shapes2d")
 
 @dataclass(slots=True)
 class Tally:
-    """What a pass did to the scenes.
+    """Effects of a pass on the scenes."""
 
-    Args:
-        changed: scenes whose graph it changed.
-        objects, matrices, folds: that it took away from all of them.
-        differing: samples that are covered before and not after, or the other way round.
-        largest: difference of a colour at a covered sample.
-    """
-
-    changed: int = 0
-    objects: int = 0
+    changed: int = 0  # scenes
+    objects: int = 0  # taken away, as matrices and folds
     matrices: int = 0
     folds: int = 0
-    differing: int = 0
-    largest: float = 0.0
+    differing: int = 0  # samples that are covered before and not after, or the other way round
+    largest: float = 0.0  # difference of a colour at a covered sample
 
 
 @dataclass(slots=True)
 class Proof:
-    """What was found.
-
-    Args:
-        scenes: that were looked at.
-        bare: that showed too little, drawn again.
-        samples: looked at in each graph.
-        covered: samples of the first graph that show an object.
-        aside: samples within `EDGE` of an outline.
-        objects, matrices: of all scenes as written.
-        words: how many rows and groups of all streams join by each word.
-        groups: of all streams.
-        passes: by name, in order.
-        failures: seed and pass where a picture changed.
-    """
+    """Counts over all scenes, of objects and matrices as written, and results by pass."""
 
     scenes: int = 0
-    bare: int = 0
+    bare: int = 0  # scenes that showed too little, drawn again
     samples: int = 0
     covered: int = 0
-    aside: int = 0
+    aside: int = 0  # samples within `EDGE` of an outline
     objects: int = 0
     matrices: int = 0
     words: dict[str, int] = field(default_factory=lambda: dict.fromkeys(TOKENS, 0))
     groups: int = 0
     passes: dict[str, Tally] = field(default_factory=lambda: {step.name: Tally() for step in PASSES})
+    # seed and pass where a picture changed
     failures: list[str] = field(default_factory=list)
 
 

@@ -1,4 +1,4 @@
-"""Lifted vectors against products of their matrices and against points carried back step by step."""
+"""Lifted vectors against products of matrices, points carried back, and the trained networks."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from lab.designs.students import Encoders, LiftingConfig
 from lab.matrices import affine_matrix, leaf_vector, warp_matrix
+from scenelang.compiler import steps
 from scenelang.compiler.chain import Levels
 from scenelang.compiler.lifting import (
+    GEOMETRY_INPUTS,
     OTHERS,
     PLANE_LAYOUT,
     SOLID_LAYOUT,
@@ -16,7 +19,10 @@ from scenelang.compiler.lifting import (
     Layout,
     Parts,
     lift_colours,
+    lift_geometry,
     lift_many,
+    lift_material,
+    read_lifting,
 )
 from scenelang.compiler.steps import Affine, Rows, Step, Warp
 from scenelang.drawing.arrays import NUMPY
@@ -64,15 +70,6 @@ SIZES = [(i, o) for i in range(PLANE_LAYOUT.inner + 1) for o in range(PLANE_LAYO
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
-def test_vector_is_the_product_of_matrices(inner: int, outer: int) -> None:
-    levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
-    g = leaf_vector(CODE)
-    for matrix in matrices(levels):
-        g = matrix @ g
-    np.testing.assert_allclose(lift_many([levels], [CODE])[0], g, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize(("inner", "outer"), SIZES)
 def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int) -> None:
     rng = np.random.default_rng(100 + inner * 10 + outer)
     levels = random_levels(rng, inner, outer)
@@ -90,14 +87,14 @@ def test_vector_carries_points_back_as_the_reference_does(inner: int, outer: int
     assert frames.scale == pytest.approx(distance_scale(steps_of(levels)), rel=1e-9)
 
 
-@pytest.mark.parametrize("objects", [[0, 1, 2], [2], [2, 2, 2, 1]], ids=str)
-def test_objects_of_different_chains_are_carried_together(objects: list[int]) -> None:
+def test_objects_of_different_chains_are_carried_together() -> None:
     """Steps that only few, or most, of them have."""
     levels = [random_levels(np.random.default_rng(i), *size) for i, size in enumerate(SIZES[:3])]
-    p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
-    found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
-    for i, at in enumerate(objects):
-        np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
+    for objects in ([0, 1, 2], [2], [2, 2, 2, 1]):
+        p = np.random.default_rng(1).uniform(-1, 1, (2, 4, len(objects))).astype(np.float32)
+        found = Frames(lift_many(levels, [CODE] * 3)).local(NUMPY, np.array(objects), p)
+        for i, at in enumerate(objects):
+            np.testing.assert_allclose(found[..., i], carry_back(steps_of(levels[at]), p[..., i]), atol=1e-3)
 
 
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
@@ -146,21 +143,6 @@ def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:
     assert not (within & outside).any()
 
 
-def test_lengths_of_chains_do_not_matter() -> None:
-    """A hundred affine matrices one after the other leave what their product leaves."""
-    rng = np.random.default_rng(5)
-    g, total = leaf_vector(CODE), np.eye(4)
-    for _ in range(100):
-        angle, (u, v) = rng.uniform(-3, 3), rng.uniform(-0.1, 0.1, 2)
-        step = np.eye(4)
-        step[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-        step[:2, 3] = u, v
-        total = step @ total
-        g = matrices(Levels(affine=tuple(step[:3].ravel().tolist())))[-1] @ g
-    whole = lift_many([Levels(affine=tuple(total[:3].ravel().tolist()))], [CODE])[0]
-    np.testing.assert_allclose(g, whole, atol=1e-12)
-
-
 def test_material_vector_multiplies_the_albedo() -> None:
     parts = PLANE_LAYOUT.unpack(lift_colours([(0.2, 0.4, 0.6)], [np.arange(12.0)])[0])
     assert parts.rgb.tolist() == [0.2, 0.4, 0.6]
@@ -182,14 +164,71 @@ def test_parts_come_out_as_they_went_in_and_share_no_place(layout: Layout) -> No
     assert np.count_nonzero(packed[0]) == sum(value[0].size for value in parts) == used
 
 
-def test_a_layout_of_space_lifts_as_its_matrices_do() -> None:
-    """Frames of three rows of four numbers: the same code, another layout."""
-    layout = SOLID_LAYOUT
-    levels = random_levels(np.random.default_rng(3), 2, 2)
-    g = leaf_vector(CODE, layout)
-    for matrix in matrices(levels, layout):
-        g = matrix @ g
-    np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
-    for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
-        map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
-        np.testing.assert_allclose(g[slot].reshape(3, 4) @ map_, np.eye(4)[:3], atol=1e-12)
+def test_vectors_are_products_of_matrices() -> None:
+    for layout, inner, outer in ((SOLID_LAYOUT, 2, 2), *((PLANE_LAYOUT, *size) for size in SIZES)):
+        levels = random_levels(np.random.default_rng(inner * 10 + outer), inner, outer)
+        g = leaf_vector(CODE, layout)
+        for matrix in matrices(levels, layout):
+            g = matrix @ g
+        np.testing.assert_allclose(lift_many([levels], [CODE], layout)[0], g, rtol=1e-12, atol=1e-12)
+        d = layout.dimension
+        for rows, slot in ((levels.affine, layout.places.frame), (levels.middle, layout.places.middle)):
+            map_ = np.vstack([np.reshape(rows, (3, 4)), [0, 0, 0, 1]])
+            keep = [*range(d), 3]
+            found = g[slot].reshape(d, d + 1) @ map_[np.ix_(keep, keep)]
+            np.testing.assert_allclose(found, np.eye(d + 1)[:d], atol=1e-12)
+
+
+def encoders(geometry: int = 8, material: int = 4) -> Encoders:
+    torch.manual_seed(2)
+    network = Encoders(LiftingConfig(geometry, material, 16), 3, 2).double()
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.normal_(std=0.4)
+    return network
+
+
+def tensors(network: Encoders) -> dict[str, np.ndarray]:
+    return {f"lifting.{k}": v.detach().numpy() for k, v in network.state_dict().items()}
+
+
+def test_without_torch_it_gives_the_same() -> None:
+    network = encoders()
+    lifting = read_lifting(tensors(network))
+    rng = np.random.default_rng(0)
+    for kind, inputs in GEOMETRY_INPUTS.items():
+        numbers = rng.normal(size=(5, inputs))
+        with torch.no_grad():
+            expected = network.geometry[kind](torch.from_numpy(numbers)).numpy()
+        np.testing.assert_allclose(lifting.matrices(kind, numbers), expected, atol=1e-12)
+
+
+def test_a_chain_is_a_product_nearest_the_leaf_first() -> None:
+    lifting = read_lifting(tensors(encoders()))
+    move, turn = steps.translation(0.2, -0.3), steps.rotation(0.7)
+    chains = [
+        [Warp(0.5, (0.0, 0.0)), Affine(move), Affine(turn)],
+        [Affine(turn)],
+        [],
+        [Warp(0.0, (0.3, 0.0))],
+    ]
+    found = lift_geometry(lifting, chains, [0, 1, 2, 1])
+
+    def full(rows: steps.Rows) -> list[float]:
+        return [*rows, 0.0, 0.0, 0.0, 1.0]
+
+    (twirl,), (bend,) = lifting.matrices("twirl", [[0.5]]), lifting.matrices("bend", [[0.3]])
+    (first,), (second,) = lifting.matrices("affine", [full(move)]), lifting.matrices("affine", [full(turn)])
+    np.testing.assert_allclose(found[0], second @ first @ twirl @ lifting.codes[0])
+    np.testing.assert_allclose(found[1], second @ lifting.codes[1])
+    np.testing.assert_allclose(found[2], lifting.codes[2])
+    np.testing.assert_allclose(found[3], bend @ lifting.codes[1])
+
+
+def test_a_colour_acts_on_the_material() -> None:
+    lifting = read_lifting(tensors(encoders()))
+    rgb = [[0.1, 0.5, 0.9], [1.0, 1.0, 1.0]]
+    found = lift_material(lifting, rgb, [1, 0])
+    matrices = lifting.matrices("color", rgb)
+    np.testing.assert_allclose(found[0], matrices[0] @ lifting.material_codes[1])
+    np.testing.assert_allclose(found[1], matrices[1] @ lifting.material_codes[0])

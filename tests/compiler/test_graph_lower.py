@@ -1,13 +1,18 @@
-"""Scene to Graph: what each transform and material becomes, and what a 2D model refuses."""
+"""Scene to Graph: what transforms and materials become, looks, and what a 2D model refuses."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from scenelang.compiler import steps as affine
 from scenelang.compiler.graph import (
+    ColourStep,
     Fold,
     InternalError,
     Invariant,
@@ -17,6 +22,7 @@ from scenelang.compiler.graph import (
     Move,
     colour_steps,
     coloured,
+    normal,
     verify,
 )
 from scenelang.compiler.lower import Memory, lower
@@ -25,6 +31,7 @@ from scenelang.compiler.steps import Affine, Warp, scaling
 from scenelang.editors.dumps import dump
 from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics
+from tests.assets.shapes import noise
 
 SHAPES = load_manifest("shapes2d")
 
@@ -67,69 +74,49 @@ def test_rotations_are_counter_clockwise_seen_from_the_tip_of_the_axis() -> None
     assert [down.rows[i] for i in (0, 1, 4, 5)] == pytest.approx([0, 1, -1, 0])
 
 
-@pytest.mark.parametrize(
-    ("transform", "code"),
-    [
-        (schema.Translate(x=0, y=0, z=1), "E0505"),
-        (schema.Rotate(angle=1, axis=(1, 0, 0)), "E0505"),
-        (schema.Shear(axes="xz", k=1), "E0505"),
-        (schema.Shear(axes="zy", k=1), "E0505"),
-        (matrix((1, 0, 1, 0), (0, 1, 0, 0), (0, 0, 1, 0)), "E0505"),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 1, 1, 0)), "E0505"),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 1)), "E0505"),
-        (schema.Scale(x=1e-15, y=1, z=1), "E0312"),
-        (schema.Scale(x=1e-40, y=1e-40, z=1), "E0312"),
-        (matrix((1, 2, 0, 0), (2, 4 + 1e-11, 0, 0), (0, 0, 1, 0)), "E0312"),
-        (schema.Twist(k=1), "E0505"),
-        (schema.Displace(amount=1, frequency=1), "E0505"),
-    ],
-)
-def test_what_a_plane_refuses(transform, code: str) -> None:
-    steps, codes = lowered(transform)
-    assert (steps, codes) == ([], [code])
+REFUSED = [
+    (schema.Translate(x=0, y=0, z=1), "E0505"),
+    (schema.Rotate(angle=1, axis=(1, 0, 0)), "E0505"),
+    (schema.Shear(axes="xz", k=1), "E0505"),
+    (schema.Shear(axes="zy", k=1), "E0505"),
+    (matrix((1, 0, 1, 0), (0, 1, 0, 0), (0, 0, 1, 0)), "E0505"),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 1, 1, 0)), "E0505"),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 1)), "E0505"),
+    (schema.Scale(x=1e-15, y=1, z=1), "E0312"),
+    (schema.Scale(x=1e-40, y=1e-40, z=1), "E0312"),
+    (matrix((1, 2, 0, 0), (2, 4 + 1e-11, 0, 0), (0, 0, 1, 0)), "E0312"),
+    (schema.Twist(k=1), "E0505"),
+    (schema.Displace(amount=1, frequency=1), "E0505"),
+]
+FLAT = [
+    (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),
+    (schema.Scale(x=3, y=2, z=-3), ["W0508"]),
+    (schema.Scale(x=3, y=2, z=1), []),
+    (schema.Scale.uniform(3), []),
+    (schema.Shear(axes="xz", k=0), []),
+    (schema.Rotate(angle=0, axis=(1, 0, 0)), []),
+    (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)), []),
+]
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "words"),
-    [
+def test_what_a_plane_refuses() -> None:
+    for transform, code in REFUSED:
+        assert lowered(transform) == ([], [code]), transform
+    for transform, codes in FLAT:
+        assert lowered(transform)[1] == codes, transform
+
+
+def test_what_is_said_of_singular_ones() -> None:
+    for x, y, words in (
         (1e-31, 1e-31, "singular in float32: it stretches by 1e-31 to 1e-31"),
         (1e31, 1e31, "singular in float32: it stretches by 1e+31 to 1e+31"),
         (1e-15, 1.0, "it flattens everything to a line or a point"),
-    ],
-)
-def test_what_is_said_of_singular_ones(x: float, y: float, words: str) -> None:
-    found = Diagnostics()
-    scene = schema.Scene(nodes=(schema.Object(geometry="star", transforms=(schema.Scale(x=x, y=y, z=1),)),))
-    lower(scene, SHAPES, None, found)
-    (only,) = found
-    assert words in only.message
-
-
-@pytest.mark.parametrize(
-    ("transform", "codes"),
-    [
-        (schema.Scale(x=1, y=1, z=1e-20), ["W0508"]),
-        (schema.Scale(x=3, y=2, z=-3), ["W0508"]),
-        (schema.Scale(x=3, y=2, z=1), []),
-        (schema.Scale.uniform(3), []),
-        (schema.Shear(axes="xz", k=0), []),
-        (schema.Rotate(angle=0, axis=(1, 0, 0)), []),
-        (matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -3, 0)), []),
-    ],
-)
-def test_what_stays_in_the_plane(transform, codes: list[str]) -> None:
-    assert lowered(transform)[1] == codes
-
-
-def test_space_has_room_for_all_of_them() -> None:
-    solids = replace(SHAPES, dimension=3)
-    for transform in (
-        schema.Translate(x=0, y=0, z=1),
-        schema.Rotate(angle=1, axis=(1, 0, 0)),
-        schema.Shear(axes="xz", k=1),
     ):
-        assert lowered(transform, manifest=solids)[1] == []
-    assert lowered(schema.Scale(x=1, y=1, z=1e-20), manifest=solids)[1] == ["E0312"]
+        star = schema.Object(geometry="star", transforms=(schema.Scale(x=x, y=y, z=1),))
+        found = Diagnostics()
+        lower(schema.Scene(nodes=(star,)), SHAPES, None, found)
+        (only,) = found
+        assert words in only.message
 
 
 def test_names_that_the_model_lacks() -> None:
@@ -148,14 +135,6 @@ def test_sizes_and_backgrounds_that_a_model_does_not_draw() -> None:
     assert lowered(manifest=fixed, canvas=(64, 64))[1] == []
     assert lowered(manifest=fixed, canvas=(64, 32))[1] == ["E0509"]
     assert lowered(manifest=fixed, canvas=(64, 64), background=None)[1] == ["E0510"]
-
-
-def test_too_many_objects() -> None:
-    diagnostics = Diagnostics()
-    node = schema.Object(geometry="star")
-    scene = schema.Scene.model_construct(nodes=(node,) * 100_001, canvas=(8, 8), background=None)
-    lower(scene, SHAPES, None, diagnostics)
-    assert [d.code for d in diagnostics] == ["E0320"]
 
 
 def test_materials_are_inherited_from_the_innermost() -> None:
@@ -250,3 +229,48 @@ def test_objects_that_stay_keep_their_leaves() -> None:
     for other in (leaves(memory, blue), leaves(memory, blue, replace(SHAPES, name="other"))):
         assert not any(a is b for a, b in zip(again, other, strict=True))
         again = other
+
+
+_share = st.floats(0, 1).map(lambda v: round(v, 3))
+_wild = st.one_of(_share, st.sampled_from([0.0, 1.0, -0.5, 1.5, 3.0]))
+_step = st.one_of(
+    st.tuples(st.just("color"), _wild, _wild, _wild),
+    st.tuples(st.just("grayscale"), _wild),
+    st.tuples(st.just("hue"), st.floats(-2, 2).map(lambda v: round(v, 3))),
+)
+
+
+@given(st.lists(_step, max_size=8), st.tuples(_share, _share, _share))
+def test_the_normal_form_gives_the_same_colours(
+    steps: list[ColourStep], rgb: tuple[float, float, float]
+) -> None:
+    found = normal(steps)
+    assert len(found) <= len(steps)
+    assert normal(found) == found
+    assert coloured(found, rgb) == pytest.approx(coloured(steps, rgb), abs=1e-6)
+
+
+def test_what_joins() -> None:
+    for ops, joined in (
+        ([("color", 0.5, 0.5, 1.0), ("color", 0.5, 4.0, 1.0)], (("color", 0.25, 2.0, 1.0),)),
+        ([("color", 2.0, 1.0, 1.0), ("color", 0.5, 1.0, 1.0)], None),  # clamped between
+        ([("grayscale", 0.5), ("grayscale", 0.5)], (("grayscale", 0.75),)),
+        ([("grayscale", 3.0), ("grayscale", 0.5)], None),
+        ([("hue", 0.75), ("hue", 0.5)], (("hue", 0.25),)),
+        ([("hue", -1.0), ("grayscale", 0.0), ("color", 1.0, 1.0, 1.0)], ()),
+        (
+            [("color", 0.5, 1.0, 1.0), ("hue", 0.5), ("hue", 0.5), ("color", 1.0, 0.5, 1.0)],
+            (("color", 0.5, 0.5, 1.0),),
+        ),
+    ):
+        assert normal(ops) == (tuple(ops) if joined is None else joined)
+
+
+def test_a_texture_folds_to_one_move_and_stays_a_texture() -> None:
+    moves = (Affine(affine.rotation(0.3)), Affine(affine.translation(0.2, 0.1)))
+    look = Look("flat", (("hue", 0.5), ("hue", 0.25)), element=noise(2, 2), texture=moves)
+    folded = look.folded()
+    assert (folded.element, folded.colours) == (look.element, (("hue", 0.75),))
+    assert folded.texture == (Affine(affine.compose(moves[1].rows, moves[0].rows)),)
+    assert folded.folded() is folded
+    np.testing.assert_allclose(folded.moved, look.moved)

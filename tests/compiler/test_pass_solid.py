@@ -93,7 +93,7 @@ def stages_of(scene: schema.Scene, rng: random.Random) -> tuple[list[Graph], boo
 
 def test_random_trees_keep_their_picture() -> None:
     accepted = covered = shorter = 0
-    for seed in range(120):
+    for seed in range(40):
         rng = random.Random(seed)
         scene = schema.Scene(nodes=[random_node(rng, 3) for _ in range(rng.randrange(1, 4))])
         (first, *others), fits = stages_of(scene, rng)
@@ -114,15 +114,15 @@ def test_random_trees_keep_their_picture() -> None:
             for a, b in ((found.rgb, wanted.rgb), (found.medium, wanted.medium)):
                 a, b = (np.broadcast_to(v, (*v.shape[:-1], p.shape[1])) for v in map(np.atleast_1d, (a, b)))
                 assert np.allclose(a[..., inside], b[..., inside], atol=1e-6)
-    assert accepted > 40
-    assert covered > 1000
+    assert accepted > 20
+    assert covered > 500
     assert shorter > 0
 
 
 def test_eyes_inside_are_reported() -> None:
     """Where the exact field says so."""
     seen = {"opaque": 0, "clear": 0}
-    for seed in range(120):
+    for seed in range(40):
         rng = random.Random(seed)
         scene = schema.Scene(nodes=[random_leaf(rng, 0.3) for _ in range(2)])
         chain = schema.Chain(
@@ -138,13 +138,13 @@ def test_eyes_inside_are_reported() -> None:
         check_eye(replace(graph, stage=Stage(Camera(eye))), context)
         assert [d.code for d in context.diagnostics] == ["E0408"] * opaque
         seen["opaque" if opaque else "clear"] += 1
-    assert min(seen.values()) > 7
+    assert min(seen.values()) > 3
 
 
 def test_what_is_left_out_is_seen_nowhere() -> None:
     """Not even by its shadow: cameras and lights anywhere, above and below the ground."""
     fewer = 0
-    for seed in range(60):
+    for seed in range(40):
         rng = random.Random(seed)
 
         def place(size: float, rng: random.Random = rng) -> tuple[float, float, float]:
@@ -166,7 +166,7 @@ def test_what_is_left_out_is_seen_nowhere() -> None:
             continue
         fewer += 1
         assert np.allclose(solid_image(left.root, stage, (12, 12), per_side=1), wanted, atol=2e-3)
-    assert fewer > 5
+    assert fewer > 3
 
 
 def test_what_is_below_the_ground_is_left_out() -> None:

@@ -1,9 +1,12 @@
-"""Scene to Program: rows, tokens, bounds, source map, determinism, warnings and what is imported."""
+"""Scene to Program, and Programs in files: rows, bounds, round trips, files that mean harm."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import json
+import random
+import struct
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +14,14 @@ import pytest
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.lifting import PLANE_LAYOUT
 from scenelang.compiler.passes import OPTIONAL
-from scenelang.compiler.program import Place, Program, ProgramError
+from scenelang.compiler.program import (
+    Place,
+    Program,
+    ProgramError,
+    load_program,
+    parse_program,
+    program_bytes,
+)
 from scenelang.compiler.weights import load_codes
 from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics, SourceFile
@@ -119,85 +129,166 @@ def test_a_group_deformed_and_scaled_too_often() -> None:
     assert len(compiled(deep)[0]) == 1
 
 
-def test_transforms_that_compose_to_a_singular_one() -> None:
-    with pytest.raises(SceneError) as caught:
-        compiled("group { group { square { scale(1, 1e-7); } scale(1, 1e-7); } }")
-    assert [d.code for d in caught.value.diagnostics if d.severity == "error"] == ["E0406"]
+HARMED = {
+    "vectors": (
+        np.zeros((2, 63), np.float32),
+        np.zeros((2, 64), np.float64),
+        np.full((2, 64), np.nan, np.float32),
+        np.full((2, 64), np.inf, np.float32),
+        [[0.0] * 64] * 2,
+    ),
+    "tokens": (
+        *(np.array(tokens, np.int8) for tokens in ([0, 7], [0, -1], [1, 1])),
+        np.array([0, 1], np.int64),
+    ),
+    "bounds": (np.array([[1, 1, -1, -1]] * 2, np.float32), np.full((2, 4), np.nan, np.float32)),
+    "canvas": ((0, 8), (8193, 8), (8.0, 8), (8,)),
+    "background": (
+        (1.0, 2.0),
+        (1.0, 1.0, float("nan")),
+        (0, 0, 10**400),
+        (-1e308, 0, 0),
+        (0.5, 1.0000001, 0),
+    ),
+    "model": ("",),
+    "weights": ("xyz",),
+    "objects": (("star",),),
+    "places": ((None,),),
+}
 
 
-def test_models() -> None:
-    scene = schema.Scene(nodes=(schema.Object("star"),))
-    assert compile_scene(scene, model="shapes2d").model == "shapes2d"
-    with pytest.raises(SceneError) as caught:
-        compile_scene(scene, model="nosuch")
-    assert caught.value.diagnostics[0].code == "E0514"
-
-
-def test_compiling_loads_no_torch_and_checking_no_numpy() -> None:
-    code = (
-        "import sys, scenelang as nsg\n"
-        "from scenelang.compiler.passes import check_scene\n"
-        "from scenelang.compiler.manifest import load_manifest\n"
-        "scene = nsg.Scene(nodes=(nsg.Object('star'),))\n"
-        "check_scene(scene, None, nsg.Diagnostics(), load_manifest('shapes2d'))\n"
-        "assert not {'numpy', 'torch'} & set(sys.modules)\n"
-        "nsg.compile(scene)\n"
-        "assert 'torch' not in sys.modules\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def program_of(**changes) -> Program:
-    parts = {
-        "vectors": np.zeros((2, 64), np.float32),
-        "tokens": np.array([0, 2], np.int8),
-        "bounds": np.tile(np.array([-1, -1, 1, 1], np.float32), (2, 1)),
-        "canvas": (8, 8),
-        "background": None,
-        "model": "shapes2d",
-        "weights": "0" * 64,
-        "objects": ("star", "star"),
-        "places": (None, None),
-    }
-    return Program(**{**parts, **changes})
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"vectors": np.zeros((2, 63), np.float32)},
-        {"vectors": np.zeros((2, 64), np.float64)},
-        {"vectors": np.full((2, 64), np.nan, np.float32)},
-        {"vectors": np.full((2, 64), np.inf, np.float32)},
-        {"vectors": [[0.0] * 64] * 2},
-        {"tokens": np.array([0, 7], np.int8)},
-        {"tokens": np.array([0, -1], np.int8)},
-        {"tokens": np.array([1, 1], np.int8)},
-        {"tokens": np.array([0, 1], np.int64)},
-        {"bounds": np.array([[1, 1, -1, -1]] * 2, np.float32)},
-        {"bounds": np.full((2, 4), np.nan, np.float32)},
-        {"canvas": (0, 8)},
-        {"canvas": (8193, 8)},
-        {"canvas": (8.0, 8)},
-        {"canvas": (8,)},
-        {"background": (1.0, 2.0)},
-        {"background": (1.0, 1.0, float("nan"))},
-        {"model": ""},
-        {"weights": "xyz"},
-        {"objects": ("star",)},
-        {"places": (None,)},
-    ],
-)
-def test_what_is_no_program(changes) -> None:
-    program_of()
-    with pytest.raises(ProgramError):
-        program_of(**changes)
+def test_what_is_no_program() -> None:
+    program = compiled("star { scale(0.5); } pentagon { scale(0.2); }")[0]
+    for name, values in HARMED.items():
+        for value in values:
+            with pytest.raises(ProgramError):
+                replace(program, **{name: value})
 
 
 def test_programs_cannot_be_changed() -> None:
-    vectors = np.zeros((2, 64), np.float32)
-    program = program_of(vectors=vectors)
+    vectors = np.zeros((1, 64), np.float32)
+    program = replace(compiled("star { }")[0], vectors=vectors)
     vectors[:] = 5
     assert not program.vectors.any()
     with pytest.raises(ValueError, match="read-only"):
         program.vectors[:] = 1
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return compiled(CHAIN)[0]
+
+
+def parts(data: bytes) -> tuple[dict, bytes]:
+    (length,) = struct.unpack("<Q", data[:8])
+    return json.loads(data[8 : 8 + length]), data[8 + length :]
+
+
+def joined(outer, body: bytes) -> bytes:
+    text = outer if isinstance(outer, bytes) else json.dumps(outer).encode()
+    return struct.pack("<Q", len(text)) + text + body
+
+
+def test_round_trip(chain, tmp_path: Path) -> None:
+    for program in (chain, compiled("")[0], compiled("background(none); canvas(17, 5); star { }")[0]):
+        path = tmp_path / "p.safetensors"
+        program.save(path)
+        again = load_program(path)
+        for name in ("vectors", "tokens", "bounds"):
+            assert np.array_equal(getattr(again, name), getattr(program, name))
+        for name in ("canvas", "background", "model", "weights", "objects", "places"):
+            assert getattr(again, name) == getattr(program, name)
+        assert again.digest() == program.digest()
+        assert program_bytes(again) == path.read_bytes() == program_bytes(program)
+
+
+def test_other_weights(chain, tmp_path: Path) -> None:
+    outer, body = parts(program_bytes(chain))
+    header = json.loads(outer["__metadata__"]["scenelang"])
+    path = tmp_path / "p"
+    for change, words in (
+        ({"model": "x"}, "unknown model"),
+        ({"weights": "a" * 64}, "compile the scene again"),
+    ):
+        outer["__metadata__"]["scenelang"] = json.dumps({**header, **change})
+        path.write_bytes(joined(outer, body))
+        with pytest.raises(ProgramError, match=words):
+            load_program(path)
+    assert load_program(path, weights="a" * 64).weights == "a" * 64
+
+
+HEADERS = {
+    "format": (2,),
+    "canvas": ([0, 8], [8, 8, 8], "8x8", [1e9, 8], [True, 8]),
+    "background": ([1, 2], "red", [1, None, 3]),
+    "model": (7,),
+    "weights": (None,),
+    "geometries": ([], [1, 2, 3]),
+    "files": ([], {}),
+    "extra": (1,),
+}
+
+
+def test_bad_headers(chain) -> None:
+    outer, body = parts(program_bytes(chain))
+    header = json.loads(outer["__metadata__"]["scenelang"])
+    for key, values in HEADERS.items():
+        for value in values:
+            outer["__metadata__"]["scenelang"] = json.dumps({**header, key: value})
+            with pytest.raises(ProgramError):
+                parse_program(joined(outer, body))
+
+
+def test_bad_layouts(chain) -> None:
+    """The reader is that of weights, whose tests have more of them."""
+    data = program_bytes(chain)
+    outer, body = parts(data)
+    for case in (
+        b"",
+        data[:-1],
+        data + b"x",
+        joined(b"[" * 100_000, body),
+        joined({**outer, "more": outer["tokens"]}, body),
+        joined({k: v for k, v in outer.items() if k != "tokens"}, body),
+        joined({k: v for k, v in outer.items() if k != "__metadata__"}, body),
+        joined({**outer, "__metadata__": {"scenelang": "[" * 50_000}}, body),
+        joined({**outer, "__metadata__": {"scenelang": "\\ud800"}}, body),
+        joined({**outer, "vectors": {**outer["vectors"], "shape": [4, 32]}}, body),
+        joined({**outer, "tokens": {**outer["tokens"], "dtype": "F32"}}, body),
+    ):
+        with pytest.raises(ProgramError):
+            parse_program(case)
+
+
+def test_bad_numbers(chain) -> None:
+    outer, body = parts(program_bytes(chain))
+    for name, at, value in (
+        ("vectors", 40, struct.pack("<f", float("nan"))),
+        ("tokens", 1, b"\x07"),
+        ("tokens", 0, b"\x01"),
+        ("objects", 0, struct.pack("<i", 9)),
+        ("objects", 0, struct.pack("<i", -1)),
+        ("places", 0, struct.pack("<i", 5)),
+        ("places", 4, struct.pack("<i", 0)),
+    ):
+        start = outer[name]["data_offsets"][0] + at
+        harmed = body[:start] + value + body[start + len(value) :]
+        with pytest.raises(ProgramError):
+            parse_program(joined(outer, harmed))
+
+
+def test_random_damage_is_an_error_or_a_program(chain) -> None:
+    data = program_bytes(chain)
+    rng = random.Random(10)
+    refused = 0
+    for _ in range(600):
+        harmed = bytearray(data)
+        for _ in range(rng.choice([1, 1, 3])):
+            # most of the damage to the headers, where it is hardest to bear
+            at = rng.randrange(8 + 1000) if rng.random() < 0.8 else rng.randrange(len(data))
+            harmed[at] = rng.randrange(256)
+        try:
+            parse_program(bytes(harmed))
+        except ProgramError:
+            refused += 1
+    assert refused > 200
