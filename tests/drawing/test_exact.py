@@ -31,11 +31,9 @@ from scenelang.drawing.exact.picture import graph_outputs, reference_image
 from scenelang.drawing.render import exact_graph
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import (
-    Chain,
     Color,
     Grayscale,
     Hue,
-    Link,
     Material,
     Object,
     Scale,
@@ -90,36 +88,12 @@ def test_colour_operations_equal_the_slow_loop() -> None:
     np.testing.assert_allclose(picture(scene), oracle.draw(scene), atol=1e-6)
 
 
-def test_areas_are_those_of_the_polygons() -> None:
-    for geometry, area in (
-        ("square", 2.0),
-        ("triangle", 3 * math.sqrt(3) / 4),
-        ("pentagon", 2.5 * math.sin(math.tau / 5)),
-        ("star", 5 * 0.381966 * math.sin(math.pi / 5)),
-    ):
-        scene = Scene(canvas=(256, 256), background=(0, 0, 0), nodes=(Object(geometry=geometry),))
-        assert picture(scene)[..., 0].mean() * 4 == pytest.approx(area, rel=2e-3)
-
-
 def test_without_background_alpha_is_coverage() -> None:
     disc = Object(geometry="square", transforms=(Scale(x=2, y=2, z=1),))
     image = picture(Scene(canvas=(4, 8), background=None, nodes=(disc,)))
     assert image.shape == (8, 4, 4)
     assert image[3, 2, 3] == 1.0
     assert image[0, 0, 3] == 0.0
-
-
-def test_rows_run_downwards_and_y_upwards() -> None:
-    image = picture(Scene(canvas=(64, 64), background=(0, 0, 0), nodes=(Object(geometry="triangle"),)))
-    widths = image[..., 0].sum(1)
-    assert widths[4] < widths[40]  # a vertex at +y: narrow above, wide below
-
-
-def test_later_objects_are_drawn_over_earlier_ones() -> None:
-    red = Object(geometry="square", material=Material(name="flat", ops=(Color(rgb=(1, 0, 0)),)))
-    blue = Object(geometry="star", material=Material(name="flat", ops=(Color(rgb=(0, 0, 1)),)))
-    image = picture(Scene(canvas=(9, 9), nodes=(Chain(children=(Link(node=red), Link(node=blue))),)))
-    assert image[4, 4].tolist() == [0, 0, 1]
 
 
 def test_nothing_blends_with_the_empty_set() -> None:
@@ -215,8 +189,7 @@ def check(scene: nsg.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "groups", "twelve", "tree", "wide", "tiny", "strong"])
 def test_pictures_are_those_of_all_objects_everywhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(list(name.encode()))
-    for _ in range(2):
-        check(random_scene(rng, SETS[name]).model_copy(update={"canvas": (72, 56)}), monkeypatch)
+    check(random_scene(rng, SETS[name]).model_copy(update={"canvas": (72, 56)}), monkeypatch)
 
 
 def test_all_booleans_and_far_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
