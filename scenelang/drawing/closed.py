@@ -180,11 +180,8 @@ def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
 
 
 def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
-    """Source of a Program's distances and colours: formulas, or its network.
-
-    Raises:
-        KeyError, ModelError, ProgramError: no such model, no weights, or others than it was compiled for.
-        RenderError: no formulas do.
+    """Source of a Program's distances and colours: formulas, or its network. Raises as `open_model`'s loader
+    does, and `RenderError` where no formulas do.
     """
     formulas = closed_forms(program.model) if exact else None
     network, digest = load_arrays(program.model, program.weights)

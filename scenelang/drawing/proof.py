@@ -167,10 +167,8 @@ def enclosed(
 ) -> tuple[Interval, Mask]:
     """Channels (K, B) that regions show, and which objects (P,) may change them.
 
-    Args:
-        distance, colour: of the pairs, (P,) and (3, P): world distances wherever in the region.
-        behind: (K,) what is shown where nothing is: a background, or four zeros.
-        nest, groups: of a stream with groups, and how these join.
+    Distances (P,) and colours (3, P) of the pairs hold wherever in the region; ``behind`` (K,) is shown where
+    nothing is. ``nest`` and ``groups`` are of streams with groups.
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
@@ -481,21 +479,12 @@ class ProofError(Exception):
 def prove_image(
     lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
 ) -> tuple[Image, Proof]:
-    """Prove by how much each pixel of a picture, whoever drew it, differs from the exact one at most.
+    """Prove by how much each pixel of an image, whoever drew it, differs from the exact one at most: the
+    picture and its proof, from the scene as written and its stream of leaves.
 
-    Args:
-        lowered, graph: the scene as written, and its stream of leaves.
-        manifest: of the model that it was compiled for.
-        image: (H, W, 3), or (H, W, 4) where the background is none.
-        redraw: draw again what is not proved right to `PROVED`: by what is known of it, and where that is not
-            enough by the exact distances.
-
-    Returns:
-        The picture and its proof.
-
-    Raises:
-        ProofError: the model is not of the plane, or learned more than distances; a file is missing.
-        ModelError: a file is damaged.
+    If ``redraw``, pixels not proved right to `PROVED` are drawn again, by exact distances where bounds are
+    not enough. Raises `ProofError` where the model is not of the plane, learned more than distances, or a
+    file is missing, `ModelError` where one is damaged.
     """
     stream = Stream(lowered, graph, manifest, known_errors(manifest))
     (width, height), behind = graph.canvas, np.zeros(4)

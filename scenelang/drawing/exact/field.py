@@ -43,9 +43,8 @@ def sample_points(
 
 
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
-    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M).
-
-    They are linear if ``light``, decoded before anything is mixed.
+    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M); linear if ``light``,
+    decoded before anything is mixed.
     """
     assert look.element is not None
     values = _values(look.element, light)
@@ -119,9 +118,8 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object, of a distance of shape S.
-
-    Colours broadcast against (*S, 3); tokens are numbers, or arrays that broadcast against S.
+    """Yield (D, C) after each object, of a distance of shape S; colours broadcast against (*S, 3), tokens
+    against S.
     """
     big_d = c_now = None
     for d, c, token in zip(distances, colours, tokens, strict=True):
@@ -217,11 +215,8 @@ def evaluate(
     owners: bool = False,
     brought: Brought | None = None,
 ) -> tuple[Any, Any]:
-    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64.
-
-    Args:
-        outer: steps of the folds around it, nearest first.
-        owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
+    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64, with steps of the folds
+    around it, nearest first; if ``owners``, the number (M, 1) of the object that paints in place of C.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):

@@ -44,10 +44,8 @@ def brought(
 ) -> Brought:
     """Read shapes from the bytes of a file with a suffix of `MOST_OF`.
 
-    Args:
-        name: of the whole.
-        files: those that it names, by the names that it has for them.
-        apart: whether its parts are elements of their own; if left out, those of drawings are.
+    ``files`` are those that it names, by the names that it has for them; ``apart`` says whether its parts are
+    elements of their own, by default those of drawings.
     """
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
@@ -167,13 +165,10 @@ FOLDER: Final = "SCENELANG_ORIGINALS"
 
 
 def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
-    """The true shapes of the elements that a scene shows, by geometry.
+    """The true shapes of the elements that a scene shows, by geometry, from files in the folder that the
+    environment's `FOLDER` names, or beside the file of elements.
 
-    Their files lie in the folder that the environment's `FOLDER` names, or beside the file of elements.
-
-    Raises:
-        FitError: a file is not there or another, or what reads it is not installed.
-        OSError: a file cannot be read.
+    Raises `FitError` where one is missing, another, or cannot be read for want of a package, and `OSError`.
     """
     shown = {leaf.geometry for leaf in leaves(graph.root)} & graph.elements.keys()
     beside = {file.name: file.zoo.folder for file in scene.elements if file.zoo is not None}

@@ -130,9 +130,8 @@ def way_back(steps: Sequence[Step]) -> Any:
 
 
 class Body:
-    """A leaf of linear colours with all steps into the world, nearest the leaf first.
-
-    Its ball holds every point whose distance is below a margin, in world units.
+    """A leaf of linear colours with all steps into the world, nearest the leaf first; its ball holds every
+    point whose distance is below a margin, in world units.
     """
 
     def __init__(
@@ -163,9 +162,8 @@ class Body:
         self.centre, self.radius = centre, radius
 
     def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
-        """Entry and exit t of rays o + t d through the ball, an ellipsoid of the world, and their speed.
-
-        Rays that miss it enter at inf and leave at -inf. The speed is that behind the first map.
+        """Entry and exit t of rays o + t d through the ball, an ellipsoid of the world, inf and -inf where
+        they miss it, and their speed behind the first map.
         """
         o, d = self.first(o) - self.centre, self.first.inverse @ d
         a, b, c = (d * d).sum(0), (o * d).sum(0), (o * o).sum(0) - self.radius**2
@@ -279,12 +277,9 @@ class Field:
         self.media = True in kinds
 
     def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
-        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each.
-
-        Args:
-            p: world points (3, M).
-            met: (N, M), in which objects' balls they lie; the others count as far away.
-            speed: (N, M), as `Body.span` tells, of the rays on which they lie.
+        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each, at world
+        points (3, M); ``met`` (N, M) says in which objects' balls they lie, ``speed`` is as `Body.span`
+        tells.
         """
         count = p.shape[1]
         fastest, most = np.full(count, 1e-9), np.full(count, FAR)
@@ -372,9 +367,8 @@ class Changes(NamedTuple):
 
 
 def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
-    """Follow rays o + t d, t from 0 to ``end`` (M,), until they end or meet something opaque.
-
-    Places are found to 1e-9 or so if ``exact``, otherwise to about 1e-6.
+    """Follow rays o + t d, t from 0 to ``end`` (M,), until they end or meet something opaque, found to 1e-9
+    or so if ``exact``, otherwise to about 1e-6.
     """
     enter, leave, speed = spans = np.empty((3, len(field.bodies), o.shape[1]))
     for index, body in enumerate(field.bodies):
@@ -428,8 +422,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
 
 
 TILE = 1 << 15  # samples at a time
-TOLERANCE = 2e-4
-"""A part of a ray in a medium is halved until its scattered light changes by less."""
+TOLERANCE = 2e-4  # A part of a ray in a medium is halved until its scattered light changes by less
 
 HALVINGS = 9
 
@@ -446,10 +439,8 @@ def solid_image(
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
-    """Draw the exact picture of a scene of solids, as `reference_image` does.
-
-    Raises:
-        ValueError: the stage has a fault, or the eye is inside something opaque.
+    """Draw the exact picture of a scene of solids, as `reference_image` does; raises `ValueError` where the
+    stage has a fault, too.
     """
     if fault := stage.camera.fault() or stage.light.fault():
         raise ValueError(fault)
@@ -555,9 +546,8 @@ def _visible(field: Field, light: Light, p: Array) -> Array:
 def _scattered(
     field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
 ) -> Array:
-    """Light (3, K) that parts of rays o + t d inside media scatter to where the rays come from.
-
-    Each begins at ``enter``, with an optical depth and the transmittance ``weight`` from the eye to there.
+    """Light (3, K) that parts of rays in media scatter back along them; each begins at ``enter``, with an
+    optical depth and the transmittance ``weight`` from the eye to there.
     """
     opaque = -np.expm1(-depth)
 

@@ -34,14 +34,10 @@ _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
 @dataclass(slots=True)
 class Kept:
-    """The last picture of a sequence.
+    """The last picture of a sequence."""
 
-    Args:
-        keys: what each of its tiles showed, a digest.
-        picture: (H, W, 3 or 4), as `Tile` has it.
-    """
-
-    keys: list[bytes] = field(default_factory=list)
+    keys: list[bytes] = field(default_factory=list)  # what each of its tiles showed, a digest
+    # (H, W, 3 or 4), as `Tile` has it
     picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
     def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
@@ -164,18 +160,10 @@ def draw(
     tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
-    """Draw a Program's objects in stream order.
+    """Draw a Program's objects in stream order; arguments are those of `Run`.
 
-    Args:
-        threads: tiles drawn at the same time; by default 1.
-        split: tiles are as high as for so many threads; by default ``threads``.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
-        tile: pixels at a time, at least one row.
-        progress: called with the share done, from any thread.
-
-    Raises:
-        ProgramError: no compiled scene has such vectors.
+    Without ``split`` tiles are as high as for ``threads``, by default 1; ``tile`` is their pixels, at least
+    one row. Raises `ProgramError` for vectors that no compiled scene has.
     """
     (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
@@ -215,10 +203,8 @@ def halved(program: Program) -> Program:
 
 
 def as_image(picture: npt.NDArray[np.float32]) -> Image:
-    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage.
-
-    Raises:
-        ProgramError: some of it is not finite.
+    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage. Raises
+    `ProgramError` where it is not finite.
     """
     if not np.isfinite(picture.sum()):
         raise ProgramError("a damaged program: numbers that the network cannot draw with")

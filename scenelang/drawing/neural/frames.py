@@ -165,19 +165,12 @@ class Frames:
 
 
 class _Stage(NamedTuple):
-    """One map, or one warp, of every object.
+    """One map, or one warp, of every object."""
 
-    Args:
-        numbers: where its numbers lie in a geometry vector.
-        moves: (N,) whether it moves anything.
-        steep: (N,) how far it takes points apart at most, per distance; of a warp, at the origin.
-        rate: (N,) of a warp, how fast its angle changes at most, per distance.
-    """
-
-    numbers: slice
-    moves: np.ndarray
-    steep: Floats
-    rate: Floats
+    numbers: slice  # where its numbers lie in a geometry vector
+    moves: np.ndarray  # (N,) whether it moves anything
+    steep: Floats  # (N,) how far it takes points apart at most, per distance; of a warp, at the origin
+    rate: Floats  # (N,) of a warp, how fast its angle changes at most, per distance
 
 
 def _step(factors: Array) -> Affine | Warp:
