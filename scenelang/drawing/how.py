@@ -89,9 +89,7 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 
 
 def keep_memory() -> bool:
-    """Have glibc reuse blocks up to `KEEP_BYTES`, as otherwise every 4 KB of a large array is a page fault;
-    False where the C library is another or did not take it.
-    """
+    """Have glibc reuse blocks up to `KEEP_BYTES`, not page fault by page fault; False without glibc."""
     import ctypes
 
     try:

@@ -286,9 +286,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         write_output(path, self.encode(image_format(path)))
 
     def encode(self, kind: str = "PNG") -> bytes:
-        """Contents of a file in one of Pillow's formats, without alpha over white, or as ``"EXR"``, with
-        `layers`.
-        """
+        """Contents in one of Pillow's formats, if without alpha over white, or ``"EXR"``, with `layers`."""
         if kind == "EXR":
             return exr(self.layers())
         from PIL import Image as pillow

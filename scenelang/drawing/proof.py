@@ -104,10 +104,8 @@ def _seen(steps: Sequence[Step], far: float) -> float:
 
 
 def _misplaced(steps: Sequence[Step], far: float) -> float:
-    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there.
-
-    Everything is by coordinates, without signs: `size` of points behind the steps so far, `ways` how far they
-    move in the leaf as they move there, `forth` the reverse.
+    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there. Points,
+    `size`, their ways into the leaf and back, `ways` and `forth`, are by coordinates, without signs.
     """
     size, ways, forth, lost, run = np.full(2, far), np.eye(2), np.eye(2), np.full(2, EPS * far), IDENTITY
     for step in steps:

@@ -70,10 +70,8 @@ def draw(
     place: str | None = None,
     **run: Unpack[Run],
 ) -> Drawing:
-    """Draw a Program by the library that fits, as of `Run`; raises as `render`.
-
-    ``place`` is ``"numpy"`` or a torch device; by default numpy for solids and small pictures, else
-    ``how.device``.
+    """Draw a Program by the library that fits, as of `Run`; raises as `render`. ``place`` is ``"numpy"`` or a
+    torch device; by default numpy for solids and small pictures, else ``how.device``.
     """
     run = {"threads": how.threads, **run, **how.care}
     if place is None:
@@ -208,7 +206,6 @@ def prove_drawn(
     graphs: Mapping[str, Graph], model: str, draw: Callable[[], Image], redraw: bool
 ) -> tuple[Image, Proof]:
     """A picture and its proof, by the graphs after `lower` and each pass; raises as `prove`, before drawing.
-
     The stream that is proved has all objects, so that no pass that drops some has to be believed.
     """
     from scenelang.compiler.manifest import load_manifest
@@ -267,9 +264,7 @@ def outputs_of(
     *,
     spans: Spans | None = None,
 ) -> Outputs:
-    """Outputs of what a backend draws, a proof aside; ``spans`` are of the Scene's nodes. Raises as
-    `render_outputs`.
-    """
+    """Outputs of what a backend draws, a proof aside; raises as `render_outputs`."""
     wanted = tuple([name for name in wanted if name != "proof"])
     if not wanted:
         return Outputs()

@@ -48,9 +48,7 @@ class Load(NamedTuple):
 
 
 def load_of(program: Program) -> Load:
-    """The load of a compiled scene: in the plane from its bounds, of solids from a very small picture. Raises
-    `ModelError` where the weights of a model of solids are missing.
-    """
+    """The load of a Program, of solids by a very small picture; `ModelError` if their weights are missing."""
     width, height = program.canvas
     if program.stage is not None:
         scale = PROBE / (width * height) ** 0.5
@@ -87,9 +85,7 @@ class Drawer(NamedTuple):
 def choose_drawer(
     program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
 ) -> Drawer:
-    """Choose the library for a single picture, from the Program and options of `How` alone. Raises
-    `RenderError` where there is no such model.
-    """
+    """Choose the library for a single picture; `RenderError` where there is no such model."""
     if exact:
         return Drawer("numpy", "formulas in the network's place")
     if device != "auto":

@@ -30,9 +30,7 @@ _drawing = threading.Lock()
 
 
 def choose_device(device: str) -> str:
-    """The torch device that ``auto``, ``cpu`` or ``cuda`` means here. Raises `RenderError` where there is no
-    CUDA, `ValueError` for other names.
-    """
+    """The torch device of ``auto``, ``cpu`` or ``cuda``; `RenderError` without CUDA, else `ValueError`."""
     if device not in ("auto", "cpu", "cuda"):
         raise ValueError(f"unknown device `{device}`; there are `auto`, `cpu` and `cuda`")
     if device == "cpu":
@@ -69,9 +67,7 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
 
 @contextmanager
 def _one_torch_thread() -> Iterator[None]:
-    """Torch computes each operation on one core meanwhile; set around the pool, as worker threads take it
-    over.
-    """
+    """One thread per operation of torch; set around the pool, whose threads take it over."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -43,9 +43,7 @@ def sample_points(
 
 
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
-    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M); linear if ``light``,
-    decoded before anything is mixed.
-    """
+    """Colours (M, 3) of a look with an element at its own coordinates (d, M), linear if ``light``."""
     assert look.element is not None
     values = _values(look.element, light)
     if values.ndim == 4:
@@ -118,9 +116,7 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object, of a distance of shape S; colours broadcast against (*S, 3), tokens
-    against S.
-    """
+    """Yield (D, C) after each object, of distances of shape S; colours broadcast against (*S, 3)."""
     big_d = c_now = None
     for d, c, token in zip(distances, colours, tokens, strict=True):
         if big_d is None:

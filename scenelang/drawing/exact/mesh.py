@@ -164,9 +164,7 @@ class Shape(Protocol):
         """Signed distances (M,) of points (M, d), negative inside."""
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """At most ``count`` points (K, d) spread evenly on the outside, and outward normals there; also the
-        share of the surface that has no inside on either side.
-        """
+        """At most ``count`` points (K, d) all over the outside, their normals, and the share without one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,9 +239,7 @@ class Mesh:
         return triangle, share / share.sum(1, keepdims=True)
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """At most ``count`` points (K, d) spread evenly on the outside, and outward normals there; also the
-        share of the surface that has no inside on either side.
-        """
+        """At most ``count`` points (K, d) all over the outside, their normals, and the share without one."""
         at, share = self.spread(count, 1)
         a, b, c = self.vertices[self.triangles[at]].swapaxes(0, 1)
         normals = np.cross(b - a, c - a)
@@ -382,9 +378,8 @@ def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
 def read_solids(
     data: bytes, suffix: str, files: Mapping[str, bytes] | None = None
 ) -> tuple[list[Solid], list[str]]:
-    """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it.
-
-    Without ``files``, materials and textures by name, looks are not read. Raises `FitError`.
+    """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it;
+    without ``files``, materials and textures by name, looks are not read. Raises `FitError`.
     """
     with needed("trimesh"):
         import trimesh

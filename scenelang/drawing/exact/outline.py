@@ -51,9 +51,7 @@ class Coded(NamedTuple):
 
 @contextmanager
 def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
-    """A picture of at most so many pixels (.png, .jpg), which it says before anything is decoded. Raises
-    `FitError`, also of what is done with it.
-    """
+    """A picture (.png, .jpg) of at most so many pixels by its header; all faults become `FitError`."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -250,9 +248,7 @@ class Outline:
             raise FitError("it covers nothing")
 
     def painted(self) -> list[tuple[Painted, list[Layer]]]:
-        """Its colours in the order of painting, and the layers of each; one joins earlier ones of its colour
-        where nothing painted since touches it.
-        """
+        """Its colours in the order of painting, and the layers of each, joined where nothing lies between."""
         result: list[tuple[Painted, list[Layer]]] = []
         for layer in self._source:
             for color, layers in reversed(result):

@@ -130,9 +130,7 @@ def way_back(steps: Sequence[Step]) -> Any:
 
 
 class Body:
-    """A leaf of linear colours with all steps into the world, nearest the leaf first; its ball holds every
-    point whose distance is below a margin, in world units.
-    """
+    """A leaf of linear colours with all steps into the world, and the ball of distances below a margin."""
 
     def __init__(
         self, leaf: Leaf, steps: Sequence[Step], margin: float, brought: Brought | None = None
@@ -162,9 +160,7 @@ class Body:
         self.centre, self.radius = centre, radius
 
     def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
-        """Entry and exit t of rays o + t d through the ball, an ellipsoid of the world, inf and -inf where
-        they miss it, and their speed behind the first map.
-        """
+        """Entry and exit t of rays o + t d through the ball, inf and -inf if none, and speed there."""
         o, d = self.first(o) - self.centre, self.first.inverse @ d
         a, b, c = (d * d).sum(0), (o * d).sum(0), (o * o).sum(0) - self.radius**2
         root = b * b - a * c
@@ -367,9 +363,7 @@ class Changes(NamedTuple):
 
 
 def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
-    """Follow rays o + t d, t from 0 to ``end`` (M,), until they end or meet something opaque, found to 1e-9
-    or so if ``exact``, otherwise to about 1e-6.
-    """
+    """Follow rays o + t d, t from 0 to ``end`` (M,), to 1e-9 or so if ``exact``, otherwise to 1e-6."""
     enter, leave, speed = spans = np.empty((3, len(field.bodies), o.shape[1]))
     for index, body in enumerate(field.bodies):
         spans[:, index] = body.span(o, d)
@@ -439,9 +433,7 @@ def solid_image(
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
-    """Draw the exact picture of a scene of solids, as `reference_image` does; raises `ValueError` where the
-    stage has a fault, too.
-    """
+    """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too."""
     if fault := stage.camera.fault() or stage.light.fault():
         raise ValueError(fault)
     field = Field(root, brought)
@@ -546,9 +538,7 @@ def _visible(field: Field, light: Light, p: Array) -> Array:
 def _scattered(
     field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
 ) -> Array:
-    """Light (3, K) that parts of rays in media scatter back along them; each begins at ``enter``, with an
-    optical depth and the transmittance ``weight`` from the eye to there.
-    """
+    """Light (3, K) that parts of rays in media from ``enter`` on, of a ``weight`` to the eye, scatter."""
     opaque = -np.expm1(-depth)
 
     def part(at: Ints, low: Array, high: Array) -> Array:

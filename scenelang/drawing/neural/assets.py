@@ -93,9 +93,7 @@ class GridShape(Lattice):
         return Slopes(np.stack(more), 1.0)
 
     def field(self, q: Array, gradient: bool) -> Array:
-        """Distances (1, M), or these and how they change over a cell (1 + d, M), which shows no edges in
-        light.
-        """
+        """Distances (1, M), or these with their change over a cell (1 + d, M), which hides edges."""
         xp, step, rows = self.xp, 0.5 / self.half, [self.distance(q)]
         for axis in range(self.d) if gradient else ():
             moved = [*q]

@@ -66,9 +66,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
 
 
 def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """A mask of pixels (groups, B), of a side, that one object's colour may share with another's, as a blend
-    that comes later may show though it is no outline.
-    """
+    """A mask (groups, B) of pixels of a side where one object's colour may tie with another's."""
     xp, token = field.xp, field.tokens[meetings.pairs.object]
     joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
     tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
@@ -147,9 +145,7 @@ class Tile:
 
 
 class Coverage:
-    """Asks a field for pixels, without what objects cannot reach if ``skip``, and what is proved not to
-    matter.
-    """
+    """Asks a field for pixels; ``skip`` leaves out what is out of reach or proved not to matter."""
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True) -> None:
         self.field, self.xp, self.skip = field, field.xp, skip
@@ -234,9 +230,7 @@ class Coverage:
     def _matter(
         self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
     ) -> tuple[Meetings, tuple[Index, Index]]:
-        """Pairs that matter to the four samples of pixels, without those proved to show what their middles
-        do.
-        """
+        """Pairs that matter to the four samples of pixels, but for pixels proved to be as their middles."""
         some, source = meetings.some(column)
         place = some.places()
         by = np.argsort(place, kind="stable")

@@ -416,8 +416,7 @@ def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArr
 
 def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Blocks, rows and levels of pairs and of the groups that end between them, and how many levels are used.
-
-    The rows of N objects are followed by those of objects that begin a state as they are, and by groups'.
+    Behind the rows of N objects are those of objects that begin a state as they are, and groups'.
     """
     meetings, _ = meetings_of(pairs)
     nest, count = nesting(meetings, field.groups), len(field.tokens)

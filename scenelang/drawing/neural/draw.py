@@ -203,9 +203,7 @@ def halved(program: Program) -> Program:
 
 
 def as_image(picture: npt.NDArray[np.float32]) -> Image:
-    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage. Raises
-    `ProgramError` where it is not finite.
-    """
+    """The image of a picture (H, W, 3), or premultiplied (H, W, 4); `ProgramError` if not finite."""
     if not np.isfinite(picture.sum()):
         raise ProgramError("a damaged program: numbers that the network cannot draw with")
     return from_samples(picture[..., :3], picture[..., 3] if picture.shape[2] == 4 else None)

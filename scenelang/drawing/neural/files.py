@@ -47,9 +47,7 @@ def slopes_path(name: str, digest: str = "") -> Path:
 
 
 def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:
-    """The arrays of a file of proofs, by shapes; None where it is missing or its header is another. Raises
-    `ModelError` where it is damaged.
-    """
+    """The arrays of a file of proofs; None if missing or of another header, `ModelError` if damaged."""
     try:
         result = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
         arrays = result.arrays()

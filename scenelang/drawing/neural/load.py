@@ -103,16 +103,14 @@ class Model:
 
     @property
     def framed(self) -> Framed:
-        """The network of a model that meets objects in their frames. Raises `ModelError` for another one."""
+        """The network that meets objects in their frames; `ModelError` where there is none."""
         if not isinstance(self.network, Framed):
             raise ModelError(f"model `{self.manifest.name}` has no framed renderer")
         return self.network
 
 
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
-    """Build the network that a weights file holds. Raises `ModelError` where it does not fit the manifest or
-    itself, or is not finite.
-    """
+    """Build the network of a weights file; `ModelError` where it does not fit the manifest or itself."""
     header, arrays = open_weights(data)
     make = _MAKERS.get(manifest.renderer)
     if make is None:
@@ -167,9 +165,7 @@ _MAKERS: dict[str, _Make] = {
 
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
-    """Load a shipped model, or one whose weights lie at ``path``; raises and takes ``weights`` as
-    `load_arrays`.
-    """
+    """Load a shipped model, or weights at ``path``; raises and takes ``weights`` as `load_arrays`."""
     manifest, data = load_manifest(name), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
     if isinstance(network, Framed):

@@ -54,9 +54,7 @@ class Pairs:
         return cls(block[by], objects[by], none, none, np.full(len(by), np.inf))
 
     def split(self, wide: int, parts: int) -> Pairs:
-        """The same pairs of blocks that are smaller in both directions by a factor; ``wide`` larger ones in a
-        row.
-        """
+        """The same pairs in blocks smaller in both directions by a factor, of ``wide`` in a row."""
         down, across = np.divmod(self.block, wide)
         at = np.arange(parts)
         first = (down * parts * wide + across) * parts
@@ -185,10 +183,8 @@ def flat_nesting(meetings: Meetings) -> Nesting:
 
 
 def nesting(meetings: Meetings, groups: Groups) -> Nesting:
-    """Find which states the pairs of each column join.
-
-    A group that draws goes on in the state around it where that is still empty, so that only those that meet
-    something take a state of their own.
+    """Find which states pairs join: a group that draws goes on in the state around it while that is empty, so
+    that only groups that meet something take a state of their own.
     """
     if not groups.deepest:
         return flat_nesting(meetings)
@@ -326,9 +322,7 @@ def shown(
 
 
 class _Gates(NamedTuple):
-    """Gates of n operands: their cells, levels by their own distances, infinite for those that are given as
-    open, and slopes by the state's.
-    """
+    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's."""
 
     cell: Cell
     own: Interval
@@ -428,9 +422,7 @@ class Raster:
         return result
 
     def centres(self, place: tuple[Index, Index], side: int) -> np.ndarray:
-        """World coordinates (2, side * side, B), float32, of blocks' pixels row by row. Up to here they are
-        float64, as at 8192 pixels float32 would move samples by a hundredth of a pixel.
-        """
+        """World coordinates (2, side * side, B) of blocks' pixels row by row, float32 only at the end."""
         result = np.empty((2, side, side, len(place[0])), np.float32)
         steps = self.px * np.arange(side)[:, None]
         result[0] = (self.left + self.px * place[0]) + steps

@@ -72,10 +72,7 @@ class Cell(NamedTuple):
 
 
 class FramedNetwork:
-    """The formulas of the network, over parameters of either library.
-
-    Numpy's parameters are attributes of `FramedArrays`, torch's those of the module `Framed`.
-    """
+    """The formulas of the network, over parameters of `FramedArrays` or of torch's module `Framed`."""
 
     config: FramedConfig
     slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes

@@ -138,9 +138,7 @@ class StreamingConfig:
 
 
 class ConvLSTM(nn.Module):
-    """A convolutional LSTM cell without peepholes: four 5 x 5 convolutions in one, from the channels of an
-    object's map with its token to F filters.
-    """
+    """A convolutional LSTM cell without peepholes, of F filters: four 5 x 5 convolutions in one."""
 
     def __init__(self, inputs: int, filters: int) -> None:
         super().__init__()
@@ -178,9 +176,7 @@ class Level(nn.Module):
         nn.init.ones_(last.bias)  # pictures are over white
 
     def states(self, maps: Tensor, marks: Tensor, count: Tensor | None = None) -> list[Tensor]:
-        """Hidden maps (B, F, R, R) after each object of a stream, from maps (B, N, F, R, R) and tokens as one
-        of four (B, N, 4).
-        """
+        """Hidden maps (B, F, R, R) after each object, from maps (B, N, F, R, R) and marks (B, N, 4)."""
         hidden = torch.zeros_like(maps[:, 0])
         cell = torch.zeros_like(hidden, dtype=marks.dtype)
         result = []
@@ -254,9 +250,7 @@ TILE = 1 << 13  # samples that `reading` answers at a time
 def draw_whole(
     network: Streaming | Reading, program: Program, *, progress: Callable[[float], None] | None = None
 ) -> Drawing:
-    """Draw a Program's objects in stream order. Raises `ProgramError` for a canvas or background that the
-    network was not trained for.
-    """
+    """Draw a Program's objects in stream order; `ProgramError` for other canvases or backgrounds."""
     if program.background is None or min(program.background) < 1.0:
         raise ProgramError("this model draws on white only")
     if (program.tokens > OPERATOR).any():

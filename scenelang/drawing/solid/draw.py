@@ -53,9 +53,7 @@ class Shade(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it: (R,
-    K), colours and, of fields with textures, plain colours.
-    """
+    """Points (3, K) that light may reach, what they send to the eye without it, and more with it (R, K)."""
 
     p: Array
     base: Array
@@ -371,9 +369,7 @@ class Lighting:
 
     def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
         """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
-
-        Between nodes the light is a polynomial; it meets the colours of many more points, in turn those of
-        the pixel's samples.
+        Between nodes the light is a polynomial; it meets colours of many more points, in turn the samples'.
         """
         xp, (ray, begin, end, before) = self.xp, pieces
         gauss, count = np.polynomial.legendre.leggauss, 2 * panels
@@ -509,9 +505,7 @@ ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
 def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1) -> Outputs:
-    """Outputs of a field of solids, by pixels' centres, alpha by four samples where it changes from pixel to
-    pixel; objects are numbered as the field has them, from 1.
-    """
+    """Outputs of a field, by pixels' centres, alpha by four samples; objects are numbered from 1."""
     width, height = canvas
     lighting = Lighting(field, stage)
     result = np.empty((ROWS, height, width), np.float32)

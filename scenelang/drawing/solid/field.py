@@ -160,9 +160,7 @@ class Pairs(NamedTuple):
 
 @dataclass(slots=True)
 class States:
-    """Distances and registers of states, and optional values, as of `Meeting`: M points', then, where groups
-    are open, those of each one's second state, and so on.
-    """
+    """Distances, registers and optional values of M points, then of those in second states, and so on."""
 
     memory: Array
     slope: Array
@@ -255,9 +253,7 @@ class SolidField:
         ]
 
     def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """Build the textures of objects, which get a plain colour too, unlike any other's, by which outlines
-        and shadows are found.
-        """
+        """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
         xp, like = self.xp, self.network.codes
         worn = {
             i: Texture(xp, paint, frames[i], like, light=True)
@@ -370,9 +366,7 @@ class SolidField:
         return looks
 
     def _local(self, at: Array, objects: Array) -> tuple[Array, list[tuple[SolidFrame, Array, Array]]]:
-        """Leaf coordinates (3, P) of points (3, P) behind the objects' maps, and of objects with more than a
-        map their frames, indices and points.
-        """
+        """Leaf coordinates (3, P) behind the maps; for objects with more, frames, indices and points."""
         xp, q = self.xp, at
         own = [
             (frame, index, xp.take(at, index))

@@ -151,8 +151,8 @@ class SolidNetwork:
         )
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
-        """The cell of a token for blends of a width, with the gates of each of `Wanted`. The fold of s d and
-        s D is s D', so that the cell's own width is that of any other.
+        """The cell of a token for blends of a width, with the gates of each `Wanted`: s d and s D fold to s
+        D'.
         """
         paint, scale = self.config.paint_lines, BLEND / width
         gain = self.xp.exp(self.cell_gain[token])[:, None]
@@ -163,9 +163,7 @@ class SolidNetwork:
         return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
 
     def cut(self, token: int, width: float) -> tuple[Cell, ...]:
-        """As `cell`, of a cut with a rounded edge, a blend turned inside out: ``subtract`` leaves -smooth(-D,
-        d), ``intersect`` -smooth(-D, -d).
-        """
+        """As `cell`, of a rounded cut: `subtract` leaves -smooth(-D, d), `intersect` -smooth(-D, -d)."""
         blend, concat = self.cell(SMOOTH, width)[Wanted.DISTANCE], self.xp.concat
         side = -1.0 if token == SUBTRACT else 1.0
         edge = Cell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
@@ -234,9 +232,7 @@ class SolidNetwork:
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
     def alone(self, reach: Array, cell: Cell) -> Array:
-        """Factors of distances (N,) of up to a reach (N,) where nothing has been met, by the cell of
-        `Wanted.ALL`; 0 where a gate may not be open there.
-        """
+        """Factors of distances (N,) up to a reach (N,) where nothing is met; 0 if a gate may not be open."""
         least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
         gates = (least[:1], least[1:n], least[n:])
         return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
