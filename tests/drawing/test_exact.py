@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -54,24 +53,6 @@ def test_distance_equals_a_loop_over_edges(geometry: str) -> None:
     corners = oracle.outline(geometry)
     slow = [oracle.polygon_distance(corners, *p) for p in points.tolist()]
     np.testing.assert_allclose(leaf_distance(geometry, points.T), slow, atol=1e-12)
-
-
-def test_solid_distances_equal_the_nearest_of_many_points() -> None:
-    rng = np.random.default_rng(2)
-    points, (u, v) = rng.uniform(-2, 2, (3, 60)), np.mgrid[0 : math.tau : 500j, 0 : math.tau : 500j]
-    surfaces = {
-        "sphere": (np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)),
-        "torus": ((0.7 + 0.3 * np.cos(v)) * np.cos(u), 0.3 * np.sin(v), (0.7 + 0.3 * np.cos(v)) * np.sin(u)),
-    }
-    for geometry, surface in surfaces.items():
-        on = np.stack([c.ravel() for c in surface], 1)
-        nearest = [np.sqrt(((on - p) ** 2).sum(1).min()) for p in points.T]
-        d = leaf_distance(geometry, points)
-        np.testing.assert_allclose(abs(d), nearest, atol=6e-4)
-        inside = points[0] ** 2 + points[1] ** 2 + points[2] ** 2 < 1
-        if geometry == "torus":
-            inside = (np.hypot(points[0], points[2]) - 0.7) ** 2 + points[1] ** 2 < 0.09
-        assert ((d < 0) == inside).all()
 
 
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "groups", "twelve", "shuffled", "tree", "wide"])

@@ -14,7 +14,7 @@ from scenelang.assets.picture import painted
 from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Light, Stage
-from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp
+from scenelang.compiler.steps import Affine, Displace, Step, Twist
 from scenelang.drawing.exact.field import combine, leaf_distance
 from scenelang.drawing.exact.solid import Field, solid_image
 from scenelang.drawing.neural.files import solid_arrays
@@ -23,7 +23,7 @@ from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.network import EMPTY, SolidArrays, SolidConfig, Wanted, element_box, surrounding
-from scenelang.drawing.solid.passes import BEGIN, END, RATE, SLACK, read_solid_frame
+from scenelang.drawing.solid.passes import BEGIN, END, RATE, SLACK
 from scenelang.language.words import TOKENS
 from tests.assets.shapes import element, noise, torus
 from tests.drawing.solids import (
@@ -35,7 +35,6 @@ from tests.drawing.solids import (
     graph,
     moved,
     network,
-    one_ball,
     scaled,
     torch_network,
     turned,
@@ -45,29 +44,6 @@ from tests.drawing.solids import (
 from tests.pictures import psnr_db
 
 rng = np.random.default_rng(7)
-
-
-def test_frames_lead_back_step_by_step() -> None:
-    inner = (Twist(0.8), Warp(0.5, (0.3, 0.0)), scaled(0.9, 0.7, 0.8), turned(1.0))
-    steps = (*inner, Warp(-0.4, (0, 0)), moved(1, 2, 3))
-    p = rng.normal(size=(3, 50))
-    q = p - np.array([[1.0], [2], [3]])
-    for step in reversed(steps[:-1]):
-        if isinstance(step, Warp | Twist):
-            if isinstance(step, Twist):
-                j, a = 2, step.twist * q[1]
-            else:
-                j, a = 1, step.twirl * np.linalg.norm(q, axis=0) + step.bend[0] * q[0]
-            new = q.copy()
-            new[0], new[j] = np.cos(a) * q[0] + np.sin(a) * q[j], np.cos(a) * q[j] - np.sin(a) * q[0]
-            q = new
-        else:
-            rows = np.reshape(step.rows, (3, 4))
-            q = np.linalg.solve(rows[:, :3], q - rows[:, 3:])
-    net = network()
-    frame = read_solid_frame(vector(Object("torus", steps), net))
-    assert frame.local(net.xp, frame.outer(net.xp, p.astype(np.float32))) == pytest.approx(q, abs=1e-4)
-    assert frame.scale == pytest.approx(0.7, rel=1e-6)
 
 
 @pytest.mark.parametrize("leaf", LEAVES)
@@ -131,17 +107,6 @@ def test_steps_pass_no_surface() -> None:
     inside = (begin <= t[met]) & (t[met] + 0.02 <= end)
     bound = (rate * inside).max(0)
     assert (abs(a - b) / 0.02 <= bound + 1e-3)[bound > 0].all()
-
-
-@pytest.mark.parametrize(
-    ("material", "canvas"), [("diffuse", (64, 64)), ("diffuse", (90, 45)), ("volumetric", (20, 16))]
-)
-def test_a_ball_is_drawn_as_in_closed_form(material: str, canvas: tuple[int, int]) -> None:
-    stage, rgb = Stage(light=Light((2.0, 3.0, 2.5), 20.0)), (0.5, 0.5, 0.5)
-    solids = field([Object("sphere", (scaled(0.8),), material, rgb)])
-    exact = one_ball((0.0, 0.0, 0.0), 0.8, material == "volumetric", rgb, stage, canvas)
-    assert psnr_db(draw_solids(solids, stage, canvas, samples="four")[0], exact) > 50
-    assert psnr_db(draw_solids(solids, stage, canvas)[0], exact) > 48
 
 
 @pytest.mark.parametrize(("last", "first"), [*zip(TOKENS, ["volumetric", "diffuse"] * 2, strict=True)])

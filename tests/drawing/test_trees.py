@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -12,16 +10,13 @@ from scenelang.compiler.spaces import Light, Stage
 from scenelang.drawing.closed import ClosedSolids
 from scenelang.drawing.exact.solid import Field, solid_image
 from scenelang.drawing.solid.draw import draw_solids
-from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.network import SolidNetwork, Wanted
+from scenelang.drawing.solid.network import Wanted
 from tests.drawing.solids import (
-    Answer,
     Join,
     Object,
     Tree,
     everywhere,
     field,
-    folded,
     moved,
     network,
     random_tree,
@@ -57,39 +52,6 @@ def tree_of(seed: int, least: int = 1) -> Tree:
     """A random tree; with media where the seed is odd."""
     rng = np.random.default_rng(seed)
     return random_tree(rng, int(rng.integers(least, 5)), (0.0, 0.5)[seed % 2])
-
-
-@pytest.mark.parametrize("library", ["numpy", "torch"])
-def test_states_are_those_of_the_recursion(library: str) -> None:
-    """Where every object is met: distances, colours, kinds and gradients; the leaves' own are the field's."""
-    net: SolidNetwork = network() if library == "numpy" else TORCH
-    deepest = 0
-    for seed in range(14 if library == "numpy" else 5):
-        tree, p = tree_of(seed, 2), around(seed, 800)
-        exact = folded(tree, partial(_alone, p=p, notes={}))
-        solids = tree_field(tree, net)
-        solids.far, deepest = True, max(deepest, solids.tree.deepest)
-        found = _told(solids, everywhere(solids, p, gradient=True))
-        inside = exact.d < -2e-3
-        assert abs(found.d - exact.d).max() < 5e-4
-        assert (abs(found.rgb - exact.rgb)[:, inside].max(0) > 5e-3).sum() <= 0.01 * inside.sum()
-        assert (found.medium == exact.medium)[inside].all()
-        assert (np.linalg.norm(found.slope - exact.slope, axis=0) > 0.02).mean() < 0.01
-    assert deepest > 2
-
-
-def _alone(o: Object, p: np.ndarray, notes: dict[Object, Answer]) -> Answer:
-    """What the field answers for an object alone."""
-    if o not in notes:
-        solids = field([o])
-        solids.far = True
-        notes[o] = _told(solids, everywhere(solids, p, gradient=True))
-    return notes[o]
-
-
-def _told(solids: SolidField, found: Meeting) -> Answer:
-    d, register, slope = (np.asarray(solids.xp.to_numpy(v), np.float64) for v in found[:3])
-    return Answer(d, register[-1] > 0.5, register[:3], slope)
 
 
 @pytest.mark.parametrize("library", ["numpy", "torch"])
