@@ -308,15 +308,12 @@ def layers_of(network: FramedNetwork, geometry: int) -> Layers:
 class Stream:
     """The N objects of a scene as written, ``lowered``, and of its stream of leaves, ``graph``.
 
-    Attributes:
-        frames: ways from the world to the leaves, in float64.
-        joins, group_joins: how objects and groups join; a blend that is free of others is not known here.
-        rounds: (N,) which objects join by a blend, or begin a group that does.
-        reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
-            same, or both folds are so far outside of everything that the blends to come, each of which brings
-            them nearer by its width at most, leave them outside.
-        rounding: (N,) leaf units by which float64 may misplace points within reach, or the fold's distance.
-        unknown: geometries of which nothing is known but that they lie in the unit disc.
+    ``frames`` are in float64; ``rounds`` (N,) says which objects join by a blend, or begin a group that does.
+    ``reach`` (N,) is in leaf units from its origin, beyond which an object has no say: without it the fold is
+    the same, or both folds are so far outside of everything that the blends to come, each of which brings
+    them nearer by its width at most, leave them outside. ``rounding`` (N,) is in leaf units by which float64
+    may misplace points within reach, or the fold's distance. ``unknown`` geometries lie in the unit disc;
+    nothing else is known of them.
     """
 
     def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:

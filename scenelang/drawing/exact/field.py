@@ -286,10 +286,9 @@ def within(
     signed: bool = True,
     brought: Brought | None = None,
 ) -> tuple[float, Node]:
-    """A bound below the distance of a node in a disc of world points, and the node without what is outside.
-
-    Nothing is left out unless ``signed``: then no more is asked for than the sign of the distance, and the
-    colour where it is negative. A blend wants the distance itself.
+    """A bound below the distance of a node in a disc of world points, and the node without what is outside,
+    if ``signed``: then only the sign of the distance counts, and the colour where it is negative. A blend
+    wants the distance itself.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):

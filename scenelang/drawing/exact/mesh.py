@@ -239,7 +239,7 @@ class Mesh:
         return triangle, share / share.sum(1, keepdims=True)
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """At most ``count`` points (K, d) all over the outside, their normals, and the share without one."""
+        """As `Shape.surface`; raises `FitError` where most of the surface has no inside."""
         at, share = self.spread(count, 1)
         a, b, c = self.vertices[self.triangles[at]].swapaxes(0, 1)
         normals = np.cross(b - a, c - a)

@@ -126,8 +126,7 @@ def fit_picture(
     """The smallest texture whose root mean square error, of channels in [0, 1], is at most ``max_error``.
 
     At most ``steps`` are tried, none after ``budget_s`` seconds; the same number gives the same bytes.
-    ``about`` is what the element says of itself, beside its figures; ``report`` is called with each that was
-    tried.
+    ``about`` is what the element says of itself; ``report`` is called with each that was tried.
     """
     started, tried, asked = time.monotonic(), [], max_error or NEAR_COLOUR
     true = picture.colours.astype(np.float32) / np.float32(255)

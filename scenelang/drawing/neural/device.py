@@ -325,10 +325,9 @@ def ready() -> bool:
 
 
 def draw_on_device(network: Framed, program: Program, samples: str = "adaptive") -> Drawing | None:
-    """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive.
-
-    None of what the kernel does not know: solids, decoders of more than 32 units, features beside a distance,
-    a state of more than one number, and frames that need float64. Raises `ProgramError` as `draw` does.
+    """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive; None of what
+    the kernel does not know: solids, decoders of more than 32 units, features beside a distance, a state of
+    more than one number, and frames that need float64. Raises `ProgramError` as `draw` does.
     """
     if samples == "draft":
         result = draw_on_device(network, halved(program), "one")

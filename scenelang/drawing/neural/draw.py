@@ -96,21 +96,13 @@ TILE = 1 << 18  # pixels that are drawn at a time
 
 @dataclass(slots=True)
 class Drawing:
-    """A picture and what it cost.
+    """A picture and what it cost."""
 
-    Args:
-        image: (H, W, 3), or (H, W, 4) with straight alpha.
-        pairs: (object, sample) pairs that went through the network.
-        refined: pixels that were sampled four times.
-        met: pixels that an object reached; the others show the background, unseen by the network.
-        work: of solids, what it took in rays and steps.
-    """
-
-    image: Image
-    pairs: int
-    refined: int
-    met: int
-    work: Work | None = None
+    image: Image  # (H, W, 3), or (H, W, 4) with straight alpha
+    pairs: int  # (object, sample) pairs that went through the network
+    refined: int  # pixels that were sampled four times
+    met: int  # pixels that an object reached; the others show the background, unseen by the network
+    work: Work | None = None  # of solids, what it took in rays and steps
 
 
 def draw_objects(

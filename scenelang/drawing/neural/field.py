@@ -66,20 +66,11 @@ class Trace:
 class Field:
     """A program's objects with their weights, ready to be met by points.
 
-    Args:
-        network: trained parameters, on any device.
-        vectors: (N, 64) float32, geometry and material vectors.
-        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
-        paints: likewise, None where a row has the colour of its vector.
-
-    Attributes:
-        frames: of the objects.
-        reach: (N,) leaf units from an object's origin beyond which it changes nothing; inf where it concerns
-            every point.
-        draws: (N,) whether something may be seen, where it is met, of what was empty before.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
+    Of rows of vectors (N, 64), ``brought`` has what users brought, None where it is a geometry of the model,
+    and ``paints`` textures, None where it is the colour of its vector. ``reach`` (N,) is in leaf units from
+    an object's origin, beyond which it changes nothing, inf where it concerns every point; ``draws`` (N,)
+    says whether it may be seen where nothing was before. Raises `ProgramError` where a vector holds no way to
+    a leaf, or an element cannot be drawn.
     """
 
     def __init__(

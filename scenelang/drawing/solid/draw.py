@@ -188,10 +188,9 @@ class Lighting:
         return points, weight.sum(0)
 
     def _lit(self, points: Points, soft: Array, seen: Trail) -> tuple[Array, Array, Work]:
-        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
-
-        Of the first points ``soft`` is 1 where they are not at a distance of 0 though something begins there;
-        ``seen`` is the trail of the rays from the eye that met the points.
+        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took. Of
+        the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there; ``seen``
+        is the eye's trail.
         """
         xp, (p, light, more) = self.xp, points
         lit = xp.where(abs(more).sum(0) > 0)
@@ -419,9 +418,7 @@ def draw_solids(
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
-    """Draw a field of solids: the picture, and what it took.
-
-    Arguments are those of `Run`; ``"quick"`` samples are ``"adaptive"`` at another of `PACES`. Raises
+    """Draw a field of solids: the picture, and what it took; arguments are those of `Run`. Raises
     `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas

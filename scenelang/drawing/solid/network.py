@@ -283,10 +283,9 @@ def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tu
 
 
 def folded(xp: Arrays, q: Array, way: Array) -> Array:
-    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and mirrors, which change no leaf.
-
-    They are its point's distances from the axis and from the plane across it, and how fast the ray goes away
-    from the axis, about it, and away from the plane.
+    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and mirrors, which change no leaf: its
+    point's distances from the axis and from the plane across it, and how fast the ray goes away from the
+    axis, about it, and away from the plane.
     """
     rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
     a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)

@@ -331,10 +331,8 @@ def find_passes(
     limit: Array,
     tight: bool = True,
 ) -> tuple[Array, Passes]:
-    """Indices (k,) of rays that may meet something that draws, and the balls that these pass.
-
-    Rays go from an origin (3,), behind the objects' maps ``origins`` (3, N), along unit directions (3, M) up
-    to a limit. If ``tight``, objects' boxes count too.
+    """Indices (k,) of rays that may meet something that draws, and the balls that these pass, boxes too if
+    ``tight``. Rays go from (3,), behind the objects' maps (3, N), along unit directions (3, M) up to a limit.
     """
     low, high, result = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
