@@ -86,8 +86,10 @@ class Turn(NamedTuple):
         return q
 
     def stretch(self, most: Array | float) -> Array:
-        """The largest stretch over all points no longer than ``most``: with u = dR/da p and v = grad a, and m =
-        |u| |v|, it is ``(m + sqrt(m² + 4 + 4 u.v)) / 2``, the larger singular value of 1 + u v^T.
+        """The largest stretch over all points no longer than ``most``.
+
+        With u = dR/da p, v = grad a and m = |u| |v| it is ``(m + sqrt(m² + 4 + 4 u.v)) / 2``, the larger
+        singular value of 1 + u v^T.
         """
         m = most * (abs(self.twirl) + np.linalg.norm(self.slope))
         across = most * np.hypot(self.slope[0], self.slope[self.other])
