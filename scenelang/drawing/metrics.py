@@ -36,9 +36,7 @@ def psnr(picture: Array, reference: Array, most: float = MOST_DB) -> float:
 
 
 def ssim(picture: Array, reference: Array) -> float:
-    """Structural similarity (Wang et al. 2004) in [-1, 1], 11-pixel Gaussian window, smaller in small
-    pictures.
-    """
+    """Structural similarity (Wang et al. 2004) in [-1, 1]; a Gaussian window of 11 pixels, less if small."""
     import torch
     from pytorch_msssim import ssim as torch_ssim
 

@@ -164,7 +164,7 @@ class Shape(Protocol):
         """Signed distances (M,) of points (M, d), negative inside."""
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """At most ``count`` points (K, d) all over, outward normals, and the surface's share with no inside."""
+        """At most ``count`` points (K, d) all over, outward normals, and the share with no inside."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,9 +151,7 @@ class SolidNetwork:
         )
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
-        """The cell of a token for blends of a width, with the gates of each `Wanted`: s d and s D fold to s
-        D'.
-        """
+        """The cell of a token for blends of a width, with each `Wanted`'s gates: s d and s D fold to s D'."""
         paint, scale = self.config.paint_lines, BLEND / width
         gain = self.xp.exp(self.cell_gain[token])[:, None]
         own, past = (line[:, None] * (gain * scale) for line in self.cell_lines[token])
@@ -209,11 +207,10 @@ class SolidNetwork:
         return xp.concat([value, g], 0)
 
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
-        """The memory behind an object at distances (M,), and how far the distance's gate is open (M,): the
-        cell.
+        """The memory behind an object at distances (M,), and how far the distance's gate is open (M,).
 
-        Memory is the distance so far and the register behind it: (1, M), (2, M) with the medium alone, or (1
-        + R, M) with colours before it; ``look`` is the object's own register (R, 1), or (R, M).
+        Memory is the distance so far and the register behind it: (1, M), (2, M) with the medium alone, or,
+        with colours before it, (1 + R, M); ``look`` is the object's own register (R, 1), or (R, M).
         """
         xp, state = self.xp, memory[:1]
         gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
