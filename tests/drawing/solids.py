@@ -1,4 +1,4 @@
-"""Scenes of solids by hand: graphs, streams of objects, trees of booleans, and slow folds of these."""
+"""Scenes of solids by hand: graphs, streams of objects, and trees of booleans."""
 
 from __future__ import annotations
 
