@@ -44,8 +44,8 @@ HEAVY = (
 )
 
 DRAWING = (
-    "tests/drawing/test_field.py", "tests/drawing/test_framed.py", "tests/compiler/test_exact.py",
-    "tests/drawing/test_cell.py", "tests/output/test_run.py", "tests/conformance",
+    "tests/drawing/test_field.py", "tests/drawing/test_cell.py", "tests/compiler/test_exact.py",
+    "tests/output/test_run.py", "tests/conformance",
 )  # fmt: skip
 COMPILING = (
     "tests/compiler", "tests/compiler/test_program_compile.py", "tests/compiler/test_flatten.py",
@@ -57,8 +57,7 @@ SOLIDS = (
     "tests/drawing/test_trees.py", "tests/drawing/test_solids.py",
 )  # fmt: skip
 TREES = (
-    "tests/drawing/test_groups.py", "tests/compiler/test_flatten.py", "tests/drawing/test_fold.py",
-    "tests/drawing/test_trees.py",
+    "tests/drawing/test_groups.py", "tests/compiler/test_flatten.py", "tests/drawing/test_trees.py",
 )  # fmt: skip
 TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/drawing/solid/*.py": SOLIDS,

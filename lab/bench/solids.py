@@ -29,6 +29,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 
 from lab.about import about, write_json
+from lab.bench import mitsuba_scenes, povray
 from lab.frontier.measure import machine
 from lab.sets.scenes import interval, scenes_of
 from scenelang.compiler.compile import compile_scene
@@ -46,7 +47,6 @@ from scenelang.drawing.neural.files import load_arrays, solid_arrays
 from scenelang.drawing.torch_backend import open_model
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
-from tests.drawing import mitsuba_scenes, povray
 
 MODEL, SIDE, SEED = "solids3d", 256, 2021
 SETS = {"diffuse": 4, "solids3d": 10}  # and how many of their scenes

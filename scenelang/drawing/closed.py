@@ -45,10 +45,8 @@ class ExactShape:
 
 
 class ExactSectors(ExactShape):
-    """Distance of a shape of dihedral symmetry, without angles.
-
-    A point is mirrored into the half sector that one segment bounds (`Geometry.sectors`) and turned, so that
-    the segment lies along an axis.
+    """Distance of a shape of dihedral symmetry, without angles: a point is mirrored into the half sector that
+    one segment bounds (`Geometry.sectors`) and turned, so that the segment lies along an axis.
     """
 
     def __init__(self, geometry: str) -> None:
@@ -180,12 +178,7 @@ def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
 
 
 def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
-    """Source of a Program's distances and colours: formulas, or its network.
-
-    Raises:
-        KeyError, ModelError, ProgramError: no such model, no weights, or others than it was compiled for.
-        RenderError: no formulas do.
-    """
+    """Formulas, or a Program's network; raises as `load_arrays`, and `RenderError` without formulas."""
     formulas = closed_forms(program.model) if exact else None
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)

@@ -53,12 +53,7 @@ class How(NamedTuple):
     samples: Samples = "adaptive"
 
     def checked(self) -> How:
-        """The same.
-
-        Raises:
-            ValueError: a value is none of those above.
-            RenderError: two of them exclude each other.
-        """
+        """The same. Raises `ValueError` for other values, `RenderError` where two exclude each other."""
         for name, known in CHOICES.items():
             if (value := getattr(self, name)) not in known:
                 ways = ", ".join(f"`{way}`" for way in known)
@@ -86,8 +81,7 @@ HELP: Final = {
     "threads": "Number of threads on the CPU.",
     "samples": "Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), "
     "one, with hard edges, or one for each 2 x 2 pixels.",
-}
-"""The line of `--help` for each field of `How`."""
+}  # The line of `--help` for each field of `How`
 
 
 KEEP_BYTES = 256 << 20
@@ -95,11 +89,7 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 
 
 def keep_memory() -> bool:
-    """Have glibc reuse blocks up to `KEEP_BYTES` instead of giving each back to the kernel.
-
-    Otherwise every operation on a large array pays a page fault for every 4 KB of its result. False where
-    the C library is another or did not take it.
-    """
+    """Have glibc reuse blocks up to `KEEP_BYTES`, not page fault by page fault; False without glibc."""
     import ctypes
 
     try:

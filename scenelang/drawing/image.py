@@ -31,13 +31,10 @@ if TYPE_CHECKING:
 
 
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
-PLANE: tuple[Output, ...] = ("object", "alpha")
-"""Outputs of 2D pictures."""
-DEEP = 0.01
-"""World units in a medium where its object is asked for, where it is as deep."""
+PLANE: tuple[Output, ...] = ("object", "alpha")  # Outputs of 2D pictures
+DEEP = 0.01  # World units in a medium where its object is asked for, where it is as deep
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-PROVED = 1 / 255
-"""Greatest error of a channel in a pixel that counts as proved right."""
+PROVED = 1 / 255  # Greatest error of a channel in a pixel that counts as proved right
 Floats = npt.NDArray[np.float32]
 Source = dict[str, str | int]
 """An object's ``geometry``, and ``file``, ``line`` and ``column`` where they are known."""
@@ -232,11 +229,7 @@ def png16(values: npt.NDArray[np.uint16], text: str) -> bytes:
 
 
 def output_file(path: Path, name: Output) -> Path:
-    """Path of an output of a picture: ``STEM.depth.png``, or the picture itself if that is an EXR.
-
-    Raises:
-        ValueError: the picture is neither.
-    """
+    """Path of an output of a picture: ``STEM.depth.png``, or an EXR itself; `ValueError` for others."""
     suffix = path.suffix.lower()
     if suffix not in (".png", ".exr"):
         raise ValueError(f"outputs go with .png or .exr pictures, not `{path.name}`")
@@ -293,10 +286,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         write_output(path, self.encode(image_format(path)))
 
     def encode(self, kind: str = "PNG") -> bytes:
-        """Contents of a file in one of Pillow's formats, or as ``"EXR"``, which has `layers`.
-
-        Formats without alpha (JPEG) get the picture over white.
-        """
+        """Contents in one of Pillow's formats, if without alpha over white, or ``"EXR"``, with `layers`."""
         if kind == "EXR":
             return exr(self.layers())
         from PIL import Image as pillow

@@ -36,10 +36,7 @@ def psnr(picture: Array, reference: Array, most: float = MOST_DB) -> float:
 
 
 def ssim(picture: Array, reference: Array) -> float:
-    """Structural similarity (Wang et al. 2004), 11-pixel Gaussian window; in [-1, 1], 1 for equal ones.
-
-    Pictures under 11 pixels along a side get a smaller window, which makes their figures their own.
-    """
+    """Structural similarity (Wang et al. 2004) in [-1, 1]; a Gaussian window of 11 pixels, less if small."""
     import torch
     from pytorch_msssim import ssim as torch_ssim
 
@@ -88,10 +85,8 @@ def compare(picture: Array, reference: Array) -> dict[str, float]:
 
 
 def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
-    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3).
-
-    Args:
-        plain: instead of the map, which needs the extra ``eval``, eight times how far each channel is off.
+    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3); if ``plain``,
+    eight times how far each channel is off in place of the map, which needs the extra ``eval``.
     """
     far = ("8 × difference", np.clip(8 * np.abs(picture - reference), 0, 1)) if plain else None
     parts = [

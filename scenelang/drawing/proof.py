@@ -104,10 +104,8 @@ def _seen(steps: Sequence[Step], far: float) -> float:
 
 
 def _misplaced(steps: Sequence[Step], far: float) -> float:
-    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there.
-
-    Everything is by coordinates, without signs: `size` of points behind the steps so far, `ways` how far they
-    move in the leaf as they move there, `forth` the reverse.
+    """Rounding error of float64 in leaf coordinates of points that are no longer than ``far`` there. Points,
+    `size`, their ways into the leaf and back, `ways` and `forth`, are by coordinates, without signs.
     """
     size, ways, forth, lost, run = np.full(2, far), np.eye(2), np.eye(2), np.full(2, EPS * far), IDENTITY
     for step in steps:
@@ -167,10 +165,8 @@ def enclosed(
 ) -> tuple[Interval, Mask]:
     """Channels (K, B) that regions show, and which objects (P,) may change them.
 
-    Args:
-        distance, colour: of the pairs, (P,) and (3, P): world distances wherever in the region.
-        behind: (K,) what is shown where nothing is: a background, or four zeros.
-        nest, groups: of a stream with groups, and how these join.
+    Distances (P,) and colours (3, P) of the pairs hold wherever in the region; ``behind`` (K,) is shown where
+    nothing is. ``nest`` and ``groups`` are of streams with groups.
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
@@ -312,15 +308,12 @@ def layers_of(network: FramedNetwork, geometry: int) -> Layers:
 class Stream:
     """The N objects of a scene as written, ``lowered``, and of its stream of leaves, ``graph``.
 
-    Attributes:
-        frames: ways from the world to the leaves, in float64.
-        joins, group_joins: how objects and groups join; a blend that is free of others is not known here.
-        rounds: (N,) which objects join by a blend, or begin a group that does.
-        reach: (N,) leaf units from its origin beyond which an object has no say. Without it the fold is the
-            same, or both folds are so far outside of everything that the blends to come, each of which brings
-            them nearer by its width at most, leave them outside.
-        rounding: (N,) leaf units by which float64 may misplace points within reach, or the fold's distance.
-        unknown: geometries of which nothing is known but that they lie in the unit disc.
+    ``frames`` are in float64; ``rounds`` (N,) says which objects join by a blend, or begin a group that does.
+    ``reach`` (N,) is in leaf units from its origin, beyond which an object has no say: without it the fold is
+    the same, or both folds are so far outside of everything that the blends to come, each of which brings
+    them nearer by its width at most, leave them outside. ``rounding`` (N,) is in leaf units by which float64
+    may misplace points within reach, or the fold's distance. ``unknown`` geometries lie in the unit disc;
+    nothing else is known of them.
     """
 
     def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
@@ -481,21 +474,12 @@ class ProofError(Exception):
 def prove_image(
     lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
 ) -> tuple[Image, Proof]:
-    """Prove by how much each pixel of a picture, whoever drew it, differs from the exact one at most.
+    """Prove by how much each pixel of an image, whoever drew it, differs from the exact one at most: the
+    picture and its proof, from the scene as written and its stream of leaves.
 
-    Args:
-        lowered, graph: the scene as written, and its stream of leaves.
-        manifest: of the model that it was compiled for.
-        image: (H, W, 3), or (H, W, 4) where the background is none.
-        redraw: draw again what is not proved right to `PROVED`: by what is known of it, and where that is not
-            enough by the exact distances.
-
-    Returns:
-        The picture and its proof.
-
-    Raises:
-        ProofError: the model is not of the plane, or learned more than distances; a file is missing.
-        ModelError: a file is damaged.
+    If ``redraw``, pixels not proved right to `PROVED` are drawn again, by exact distances where bounds are
+    not enough. Raises `ProofError` where the model is not of the plane, learned more than distances, or a
+    file is missing, `ModelError` where one is damaged.
     """
     stream = Stream(lowered, graph, manifest, known_errors(manifest))
     (width, height), behind = graph.canvas, np.zeros(4)

@@ -51,12 +51,8 @@ def draw_exact(
 ) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
-    Args:
-        progress: called with the share done, in [0, 1].
-
-    Raises:
-        SceneError: the scene uses what its model does not have.
-        RenderError: there is no picture from where the eye is, or no original of an element.
+    Raises `SceneError` for what the model does not have, `RenderError` where there is no picture from where
+    the eye is, or no original of an element.
     """
     from scenelang.drawing.exact.picture import reference_image
 
@@ -74,16 +70,8 @@ def draw(
     place: str | None = None,
     **run: Unpack[Run],
 ) -> Drawing:
-    """Draw a Program by the library that fits.
-
-    Args:
-        how: with a backend that draws Programs.
-        place: ``"numpy"`` or a torch device; by default numpy for solids and small pictures, else
-            ``how.device``.
-        **run: ``split``, ``kept`` and ``progress``, as of `Run`.
-
-    Raises:
-        RenderError: as `render`.
+    """Draw a Program by the library that fits, as of `Run`; raises as `render`. ``place`` is ``"numpy"`` or a
+    torch device; by default numpy for solids and small pictures, else ``how.device``.
     """
     run = {"threads": how.threads, **run, **how.care}
     if place is None:
@@ -218,7 +206,6 @@ def prove_drawn(
     graphs: Mapping[str, Graph], model: str, draw: Callable[[], Image], redraw: bool
 ) -> tuple[Image, Proof]:
     """A picture and its proof, by the graphs after `lower` and each pass; raises as `prove`, before drawing.
-
     The stream that is proved has all objects, so that no pass that drops some has to be believed.
     """
     from scenelang.compiler.manifest import load_manifest
@@ -277,11 +264,7 @@ def outputs_of(
     *,
     spans: Spans | None = None,
 ) -> Outputs:
-    """Outputs of what a backend draws, a proof aside; raises as `render_outputs`.
-
-    Args:
-        spans: where the nodes of a Scene were written.
-    """
+    """Outputs of what a backend draws, a proof aside; raises as `render_outputs`."""
     wanted = tuple([name for name in wanted if name != "proof"])
     if not wanted:
         return Outputs()

@@ -48,10 +48,7 @@ class Load(NamedTuple):
 
 
 def load_of(program: Program) -> Load:
-    """The load of a compiled scene: in the plane from its bounds, of solids from a very small picture.
-
-    Raises `ModelError` where the weights of a model of solids are missing.
-    """
+    """The load of a Program, of solids by a very small picture; `ModelError` if their weights are missing."""
     width, height = program.canvas
     if program.stage is not None:
         scale = PROBE / (width * height) ** 0.5
@@ -88,11 +85,7 @@ class Drawer(NamedTuple):
 def choose_drawer(
     program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
 ) -> Drawer:
-    """Choose the library for a single picture, from the Program and options of `How` alone.
-
-    Raises:
-        RenderError: there is no such model.
-    """
+    """Choose the library for a single picture; `RenderError` where there is no such model."""
     if exact:
         return Drawer("numpy", "formulas in the network's place")
     if device != "auto":
@@ -118,16 +111,11 @@ def work_ms(program: Program, samples: Samples = "adaptive") -> float:
 
 
 def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:
-    """Draw a Program by numpy: the plane on one core, solids, if they are large, on several.
+    """Draw a Program by numpy, or by formulas if ``exact``: the plane on one core, large solids on several;
+    the rest is as of `Run`.
 
-    Args:
-        program: of any size, for a model with a framed or a solids' network.
-        exact: ask formulas in place of the network.
-        **run: as of `Run`; ``threads`` and ``split`` are those of solids.
-
-    Raises:
-        RenderError: its model's weights are missing, it was compiled for others or by no compiler, or there
-            are no formulas for it.
+    Raises `RenderError` where the model's weights are missing or not those it was compiled for, or there are
+    no formulas.
     """
     keep_memory()
     try:
@@ -147,12 +135,8 @@ _TURN: Final = Rotate.degrees(30, axis=(0, 1, 0))
 
 
 def thumbnail(element: Element, side: int = 128, worn: Element | None = None) -> Image:
-    """An element alone on a square canvas (side, side, 3), one of space lit and turned a little.
-
-    A texture fills the canvas.
-
-    Args:
-        worn: colours of space that a geometry wears; without one a ball shows such.
+    """An element alone on a square canvas (side, side, 3); a texture fills it, one of space is lit, turned a
+    little and ``worn`` by a geometry, by default a ball.
     """
     if element.form == "picture":
         colours = np.frombuffer(pixels(element), np.uint8).reshape(*element.sizes, 3)

@@ -30,12 +30,7 @@ _drawing = threading.Lock()
 
 
 def choose_device(device: str) -> str:
-    """The torch device that ``auto``, ``cpu`` or ``cuda`` means here.
-
-    Raises:
-        RenderError: CUDA is asked for and there is none.
-        ValueError: an unknown name.
-    """
+    """The torch device of ``auto``, ``cpu`` or ``cuda``; `RenderError` without CUDA, else `ValueError`."""
     if device not in ("auto", "cpu", "cuda"):
         raise ValueError(f"unknown device `{device}`; there are `auto`, `cpu` and `cuda`")
     if device == "cpu":
@@ -57,14 +52,9 @@ def _load(name: str, device: str, weights: str) -> Model:
 def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
     """A shipped model, loaded once for each process and device.
 
-    Args:
-        name: of the model.
-        device: of torch.
-        weights: SHA-256 of those that a Program was compiled for, hex: where others replaced them since, they
-            are loaded.
-
-    Raises:
-        RenderError: there is no such model, or its weights are missing or damaged.
+    ``weights`` is the SHA-256, hex, of those that a Program was compiled for; where others replaced them
+    since, they are loaded. Raises `RenderError` where there is no such model, or its weights are missing or
+    damaged.
     """
     try:
         with _loading:
@@ -77,10 +67,7 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
 
 @contextmanager
 def _one_torch_thread() -> Iterator[None]:
-    """Torch computes each operation on one core meanwhile.
-
-    It is set around the pool, not inside it: worker threads take the setting over when they start.
-    """
+    """One thread per operation of torch; set around the pool, whose threads take it over."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -101,17 +88,11 @@ def _by_kernel(network: Network, program: Program, samples: str) -> Drawing | No
 
 
 def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Unpack[Run]) -> Drawing:
-    """Draw a Program.
+    """Draw a Program, as of `Run`; one drawing runs at a time, on all of ``threads``.
 
-    One drawing runs at a time, on all of ``threads``: torch's number of threads is the process's.
-
-    Args:
-        skip: leave out points that an object cannot reach; without it no pixel measured differed by 0.001.
-        **run: as of `Run`; ``samples`` with framed and solids' renderers.
-
-    Raises:
-        RenderError: the Program was compiled for another model or other weights, its vectors are not
-            those of a compiled scene, or the model does not draw in this way.
+    Without ``skip`` points that an object cannot reach are asked too; no pixel measured differed by 0.001.
+    Raises `RenderError` where the Program is of another model or other weights, its vectors are not those of
+    a compiled scene, or the model does not draw in this way.
     """
     name, network = model.manifest.name, model.network
     if program.model != name:

@@ -1,8 +1,8 @@
-"""Scenes of solids by hand: graphs, streams of objects, trees of booleans, and slow folds of these."""
+"""Scenes of solids by hand: graphs, streams of objects, and trees of booleans."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from scenelang.compiler.groups import BEGINS, ENDS
 from scenelang.compiler.lifting import SOLID_LAYOUT as LAYOUT
 from scenelang.compiler.lifting import Parts, inverse_frame
 from scenelang.compiler.program import Paint
-from scenelang.compiler.spaces import Stage, Triple
+from scenelang.compiler.spaces import Triple
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed
 from scenelang.compiler.weights import shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
@@ -253,43 +253,6 @@ def tree_graph(node: Tree) -> Fold:
     return Fold("scene", tuple(link(join.op, join.k, at) for join, at in zip(node, nodes, strict=True)))
 
 
-class Answer(NamedTuple):
-    """Distance (M,), whether the material is a medium (M,), colour (3, M) and gradient (3, M)."""
-
-    d: np.ndarray
-    medium: np.ndarray
-    rgb: np.ndarray
-    slope: np.ndarray
-
-
-def folded(node: Tree | Object, known: Callable[[Object], Answer]) -> Answer:
-    """What a tree comes to, from the language's formulas."""
-    if isinstance(node, Object):
-        return known(node)
-    state = folded(node[0].node, known)
-    for op, operand, k in node[1:]:
-        state = joined(op, k, state, folded(operand, known))
-    return state
-
-
-def joined(op: Combine, k: float, a: Answer, b: Answer) -> Answer:
-    """One step."""
-    if op == "union":
-        paint, later = b.d < np.maximum(a.d, 0), b.d < a.d
-        d, slope = np.minimum(a.d, b.d), np.where(later, b.slope, a.slope)
-    elif op == "smooth":
-        k = k or BLEND
-        paint = h = np.clip(0.5 + 0.5 * (a.d - b.d) / k, 0, 1)
-        d, slope = a.d + (b.d - a.d) * h - k * h * (1 - h), a.slope + h * (b.slope - a.slope)
-    else:
-        side = -1.0 if op == "subtract" else 1.0
-        paint, e, edge = 0.0 * a.d, side * b.d, side * b.slope
-        h = np.clip(0.5 - 0.5 * (e - a.d) / k, 0, 1) if k else 1.0 * (a.d > e)
-        d, slope = h * a.d + (1 - h) * e + k * h * (1 - h), edge + h * (a.slope - edge)
-    medium = np.where(paint > 0.5, b.medium, a.medium)
-    return Answer(d, medium, a.rgb + paint * (b.rgb - a.rgb), slope)
-
-
 def random_tree(rng: np.random.Generator, depth: int, media: float = 0.0) -> Tree:
     """Up to so deep; operators are equally likely, and a third of all cuts have rounded edges."""
 
@@ -312,56 +275,3 @@ def random_tree(rng: np.random.Generator, depth: int, media: float = 0.0) -> Tre
     found = node(depth)
     assert isinstance(found, Tree)
     return found
-
-
-def one_ball(
-    centre: Triple, radius: float, medium: bool, rgb: Triple, stage: Stage, canvas: tuple[int, int]
-) -> np.ndarray:
-    """The picture of one ball over the ground in closed form, sample by sample; of a medium a sum."""
-    (width, height), unit = canvas, min(canvas)
-    eye, light = np.array(stage.camera.eye), np.array(stage.light.position)
-    forward, right, up = np.array(stage.camera.axes())
-    x, y = ((np.arange(2 * side) + 0.5 - side) / unit for side in canvas)
-    d = forward / np.tan(stage.camera.fov_rad / 2) + x[:, None] * right - y[:, None, None] * up
-    d /= np.linalg.norm(d, axis=2, keepdims=True)
-
-    def chord(o, d):
-        """Where rays enter and leave the ball, both 0 where they miss it."""
-        o = o - centre
-        b = (o * d).sum(-1)
-        root = b * b - (o * o).sum(-1) + radius**2
-        enter, leave = -b - np.sqrt(np.maximum(root, 0)), -b + np.sqrt(np.maximum(root, 0))
-        met = (root > 0) & (leave > 0)
-        return np.where(met, np.maximum(enter, 0), 0), np.where(met, leave, 0)
-
-    def received(p, n):
-        way = light - p
-        r = np.linalg.norm(way, axis=-1, keepdims=True)
-        enter, leave = chord(p + 1e-4 * n, way / r)
-        through = np.exp(-3.0 * (leave - enter)) if medium else leave == enter
-        facing = np.maximum(0, (n * way / r).sum(-1))
-        direct = stage.light.power * facing / r[..., 0] ** 2 * through
-        return direct[..., None] * stage.light.rgb + 0.12 + 0.06 * n[..., 1:2]
-
-    horizon, zenith = np.array(stage.horizon), np.array(stage.zenith)
-    behind = horizon + (zenith - horizon) * np.clip(2 * d[..., 1:2], 0, 1)
-    p = eye + (stage.ground.y - eye[1]) / d[..., 1:2] * d
-    fade = np.exp(-(p[..., :1] ** 2 + p[..., 2:] ** 2) / 64)
-    shade = np.array(stage.ground.rgb) * received(p, np.array([0.0, 1.0, 0.0]))
-    behind = np.where(d[..., 1:2] < 0, fade * shade + (1 - fade) * horizon, behind)
-    enter, leave = (v[..., None] for v in chord(eye, d))
-    if medium:
-        behind = behind * np.exp(-3.0 * (leave - enter))
-        dt = (leave - enter) / 2000
-        for i in range(2000):
-            p = eye + (enter + (i + 0.5) * dt) * d
-            way = light - p
-            r = np.linalg.norm(way, axis=2, keepdims=True)
-            through = np.exp(-3.0 * chord(p, way / r)[1][..., None])
-            direct = stage.light.power / (4 * r * r) * through * stage.light.rgb
-            behind = behind + np.exp(-3.0 * (i + 0.5) * dt) * 3.0 * dt * np.array(rgb) * (direct + 0.12)
-    else:
-        p = eye + enter * d
-        behind = np.where(leave > 0, np.array(rgb) * received(p, (p - centre) / radius), behind)
-    pixels = np.clip(behind.reshape(height, 2, width, 2, 3).mean((1, 3)), 0, 1)
-    return np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * pixels ** (1 / 2.4) - 0.055)

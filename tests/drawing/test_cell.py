@@ -1,12 +1,21 @@
-"""The cell of the framed renderer: what its gates can express, and how it is taught."""
+"""The cell of the framed renderer: the fold it can express, shut gates, and the network it was trained as."""
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 import torch
 from torch import Tensor
 
+from lab.sets.plane import SETS, random_scene
 from lab.training.network import Trainee
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import Program
 from scenelang.drawing.exact.field import fold
+from scenelang.drawing.neural.coverage import Coverage
+from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.load import Model, load_model
+from scenelang.drawing.neural.meetings import raster
 from scenelang.drawing.neural.network import TOKENS, FramedConfig
 from scenelang.language.words import BLEND
 
@@ -71,35 +80,39 @@ def test_a_shut_gate_is_shut_and_asks_for_nothing() -> None:
     assert not levels.grad.any()  # type: ignore[union-attr]
 
 
-def test_a_narrower_gate_blends_less() -> None:
-    network = Trainee(FramedConfig(), 4, 1).requires_grad_(False)
-    network.bump.fill_(0.5)
-    wide = network.cell_weights()[3]
-    network.cell_gain.fill_(2.0)
-    torch.testing.assert_close(network.cell_weights()[3], wide * torch.tensor(-2.0).exp())
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return load_model("shapes2d")
 
 
-def test_a_given_state_replaces_the_network_s_own() -> None:
-    """Given what it answers itself a stream is unchanged; given something else, one step follows from it."""
-    torch.manual_seed(1)
-    network, g = Trainee(FramedConfig(), 4, 1).requires_grad_(False), torch.Generator().manual_seed(2)
-    q = torch.randn(2, 4, 2, 30, generator=g)
-    scale, code, colours = (
-        torch.ones(2, 4),
-        torch.randn(2, 4, 4, generator=g),
-        torch.rand(2, 4, 3, generator=g),
-    )
-    tokens = torch.tensor([[0, 1, 2, 3], [0, 0, 1, 1]])
-    own = network.trace(q, scale, code, colours, tokens)
-    again = network.trace(q, scale, code, colours, tokens, (own.depth, own.colour))
-    torch.testing.assert_close(again.depth, own.depth)
-    torch.testing.assert_close(again.colour, own.colour)
-    depth, shown = torch.randn(2, 4, 30, generator=g), torch.rand(2, 4, 30, 3, generator=g)
-    given = network.trace(q, scale, code, colours, tokens, (depth, shown))
-    torch.testing.assert_close(given.depth[:, 0], own.depth[:, 0])
-    weights = tuple(w[tokens[:, 3]] for w in network.cell_weights())
-    state, colour = network.step(
-        own.distance[:, 3, None], depth[:, 2, None], shown[:, 2].mT, colours[:, 3, :, None], weights
-    )
-    torch.testing.assert_close(given.depth[:, 3], state[:, 0])
-    torch.testing.assert_close(given.colour[:, 3], colour.mT)
+def programs(name: str, count: int, canvas: tuple[int, int] = (64, 64)) -> list[Program]:
+    rng = np.random.default_rng(list(name.encode()))
+    return [
+        compile_scene(random_scene(rng, SETS[name]).model_copy(update={"canvas": canvas}))
+        for _ in range(count)
+    ]
+
+
+def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
+    """The inference path (channels first, folded weights, skipping off) against `Trainee.trace`."""
+    network = Trainee(model.framed.config, 4, 1).requires_grad_(False)
+    network.load_state_dict(model.network.state_dict())
+    for program in programs("chains", 4):
+        field, count = Field(network, program.vectors, program.tokens), len(program)
+        canvas = (24, 16)
+        grid = raster(canvas, range(16))
+        tile = Coverage(field, skip=False).tile(canvas, range(16), "one")
+        shown = torch.from_numpy(tile.picture.reshape(-1, 4).T.copy())
+        p = torch.from_numpy(grid.centres((np.arange(24), np.zeros(24, int)), 16)[:, ::16].copy())
+        p = p.reshape(2, -1)
+        every = np.repeat(np.arange(count), p.shape[1])
+        q = field.frames.local(field.xp, every, p.repeat(1, count)).reshape(2, count, -1).swapaxes(0, 1)
+        scale = torch.from_numpy(field.frames.scale.astype(np.float32))
+        codes = torch.from_numpy(program.vectors[:, :4].copy())
+        colours = field.colours.T
+        tokens = torch.from_numpy(program.tokens.astype(np.int64))
+        trace = network.trace(q[None], scale[None], codes[None], colours[None], tokens[None])
+        coverage = (0.5 - trace.margin[0, -1] / 4).clamp(0, 1)
+        torch.testing.assert_close(shown[3], coverage, atol=2e-3, rtol=0)
+        colour = trace.colour[0, -1] * coverage[:, None]
+        torch.testing.assert_close(shown[:3].T, colour, atol=4e-3, rtol=0)

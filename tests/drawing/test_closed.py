@@ -39,17 +39,6 @@ SCENES = {
         torus { scale(0.6); rotate(60deg, axis = X); translate(0.6, 0, 0.2); material volumetric; }
         sphere { scale(0.3); translate(0.2, 0.3, -1); }""",
     ),
-    "lit from within": (
-        75,
-        """sphere { scale(0.8, 0.7, 0.6); translate(0.2, 0, 0); material volumetric { color(#48f); } }
-        sphere { scale(0.2); translate(-0.6, 0.6, 0.5); } light(position = [0.4, 0.3, 0.2], power = 1);""",
-    ),
-    "blended": (
-        85,
-        """chain { sphere { scale(0.5); translate(-0.4, 0, 0); material diffuse { color(#e8c060); } }
-        smooth(k = 0.5) torus { scale(0.6); rotate(70deg, axis = X); translate(0.4, 0, 0); }
-        smooth(k = 0.3) sphere { scale(0.3); translate(0, 0.8, 0); material diffuse { color(#48f); } } }""",
-    ),
     "every operator": (
         56,
         """chain {

@@ -131,12 +131,6 @@ def test_the_network_tells_what_the_reference_does() -> None:
     assert np.percentile(abs(ours.normal - exact.normal), 99) < 0.02
 
 
-def test_threads_leave_no_trace() -> None:
-    program = nsg.compile(nsg.loads(MIXED))
-    one, three = (nsg.render_outputs(program, ALL, threads=n) for n in (1, 3))
-    assert all(np.allclose(getattr(one, n), getattr(three, n), atol=1e-3) for n in ALL)
-
-
 def test_objects_keep_their_numbers_where_the_compiler_leaves_some_out() -> None:
     text = "canvas(40, 30); for (i in 0..4) { sphere { scale(0.3); translate(i - 2, i == 1 ? -9 : 0, 0); } }"
     scene = nsg.loads(text)

@@ -16,7 +16,6 @@ from lab import errors as lab
 from lab.sets.plane import SETS
 from lab.sets.scenes import sets_of
 from scenelang.assets.zoo import zoo_bytes
-from scenelang.compiler.geometries import SECTORS
 from scenelang.compiler.graph import Look
 from scenelang.compiler.lifting import inverse_frame
 from scenelang.compiler.manifest import load_manifest
@@ -29,12 +28,12 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import RADIUS
-from scenelang.drawing.proof import PROVER, TAME, Errors, Stream, Written, layers_of, load_errors
+from scenelang.drawing.proof import PROVER, TAME, Errors, Written, layers_of, load_errors
 from scenelang.language.scene import Scene
 from tests.assets.scenes import IMPORT, good
 from tests.assets.shapes import element, square
 from tests.compiler.random_scenes import blob_scene, random_scene
-from tests.pictures import Array, premultiplied
+from tests.pictures import premultiplied
 
 RNG = np.random.default_rng
 
@@ -92,14 +91,6 @@ def test_bands_meet(monkeypatch: pytest.MonkeyPatch) -> None:
     again, banded = nsg.prove(scene, redraw=True)
     np.testing.assert_array_equal(banded.bound, proof.bound)
     np.testing.assert_array_equal(again, image)
-
-
-def test_fewer_pixels_are_asked_at_a_time_where_more_objects_reach_them() -> None:
-    scene = nsg.loads("canvas(64, 32); square { scale(9); } square { scale(0.5); translate(-1.5, 0.5); }")
-    graphs: dict[str, Any] = {}
-    nsg.compile(scene, after=graphs.__setitem__)
-    stream = Stream(graphs["lower"], graphs["flatten"], load_manifest("shapes2d"), {})
-    assert stream.crowd(scene.canvas) == pytest.approx(1 + 1 / 8)
 
 
 FAR = "".join(
@@ -174,26 +165,13 @@ NAMES = load_manifest(PROVER).geometries
 ROUNDING = 1e-9
 
 
-def polygon_distance(name: str, p: Array) -> Array:
-    """Of a leaf, by all of its edges and the number of turns around a point."""
-    n, phase, outer, inner = SECTORS[name]
-    angle = phase + np.pi / n * np.arange(2 * n)
-    corners = np.where(np.arange(2 * n) % 2, inner, outer) * np.exp(1j * angle)
-    z, d, turns = p[0] + 1j * p[1], np.full(p.shape[1], np.inf), np.zeros(p.shape[1])
-    for a, b in zip(corners, np.roll(corners, -1), strict=True):
-        t = (((z - a) * np.conj(b - a)).real / abs(b - a) ** 2).clip(0, 1)
-        d = np.minimum(d, abs(z - a - t * (b - a)))
-        turns += np.angle((b - z) / (a - z))
-    return np.where(abs(turns) > 1, -d, d)
-
-
 def attacked(found: Errors, name: str, seed: int) -> float:
     """By how much the exact distance stays within its bounds at the worst point of a search."""
     rng, worst = np.random.default_rng(seed), np.inf
     p = rng.uniform(-1.3, 1.3, (2, 100_000)) * RADIUS ** rng.choice([0, 0.5, 1.2], 100_000)
     for step in 10.0 ** -np.arange(1, 8):
         low, high = found.exact(p)
-        exact = polygon_distance(name, p)
+        exact = leaf_distance(name, p)
         left = np.minimum(high - exact, exact - low)
         worst = min(worst, left.min())
         p = np.repeat(p[:, np.argsort(left)[:2000]], 10, 1)
@@ -231,22 +209,6 @@ def test_bounds_hold_for_networks_of_any_kind(name: str) -> None:
     exact = leaf_distance(name, p)
     assert np.minimum(high - exact, exact - low).min() > -ROUNDING
     assert np.median(high - low) < 0.2
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("half", [0.1, 1e-3])
-def test_gradients_of_exact_distances_are_enclosed(name: str, half: float) -> None:
-    rng = np.random.default_rng(1)
-    p = rng.uniform(-2, 2, (20_000, 2))
-    q = p + half * rng.uniform(-1, 1, p.shape)
-    low, high = lab.gradients(name, p, half)
-    h = 1e-7
-    for axis, step in enumerate(h * np.eye(2)):
-        slope = (polygon_distance(name, (q + step).T) - polygon_distance(name, (q - step).T)) / (2 * h)
-        # a step may leave the box
-        inside = (abs(q - p) < half - 2 * h).all(1)
-        assert (slope - high[:, axis])[inside].max() < 1e-6
-        assert (low[:, axis] - slope)[inside].max() < 1e-6
 
 
 def test_files_of_others_are_left_alone_and_damaged_ones_told(
@@ -364,7 +326,7 @@ def test_nothing_wrong_is_proved() -> None:
 @pytest.mark.parametrize(("low", "high", "least"), [(0, 6, 0.75), (6, 12, 0.5), (12, 20, 0.35)])
 def test_wild_scenes(low: float, high: float, least: float) -> None:
     shares = []
-    for seed in range(30):
+    for seed in range(20):
         try:
             scene = nsg.loads(wild_scene(seed, low, high))
             image, proof = nsg.prove(scene)
@@ -373,7 +335,7 @@ def test_wild_scenes(low: float, high: float, least: float) -> None:
         assert broken(scene, image, proof) == 0, seed
         assert broken(scene, *nsg.prove(scene, image, redraw=True)) == 0, seed
         shares.append(proof.share)
-    assert len(shares) > 7
+    assert len(shares) > 4
     assert np.mean(shares) > least
 
 

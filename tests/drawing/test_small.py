@@ -1,17 +1,23 @@
-"""Pictures drawn by numpy: the same as torch's, small ones alone, chosen by the Program alone."""
+"""Pictures drawn by numpy are torch's, the Program alone chooses the library; samples of a pixel."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import How, RenderError
+from scenelang.compiler.weights import Codes
+from scenelang.drawing.how import How, RenderError, Samples
+from scenelang.drawing.image import enlarged
+from scenelang.drawing.neural.load import Model
+from scenelang.drawing.neural.paper import Streaming, StreamingConfig
 from scenelang.drawing.small import MOST_MS, choose_drawer, draw_small, work_ms
 from scenelang.drawing.torch_backend import draw_program, open_model
 from scenelang.language.evaluation import Source
@@ -73,14 +79,6 @@ def test_odd_scenes_look_the_same() -> None:
             assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text), model=model))
 
 
-def test_the_same_bytes_each_time_and_in_any_company() -> None:
-    p, other = program(STAR, canvas=(64, 64)), program("square;" + STAR, canvas=(64, 64))
-    first = nsg.render(p)
-    nsg.render(other)
-    assert np.array_equal(nsg.render(p), first)
-    assert np.array_equal(draw_small(p).image, first)
-
-
 def test_small_work_is_numpy_s() -> None:
     small, wide, many = program(STAR), program(STAR, canvas=(8000, 6000)), program(CLOUD)
     assert choose_drawer(small).library == "numpy"
@@ -121,3 +119,30 @@ def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
     assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
     alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
     assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"
+
+
+def test_sampling_is_counted() -> None:
+    p, model = program(STAR, canvas=(64, 64), background=(0, 0, 0)), open_model("shapes2d")
+    drawn = {s: draw_program(p, model, threads=1, samples=s) for s in get_args(Samples)[:-1]}
+    assert drawn["one"].refined == 0
+    assert 0 < drawn["four"].refined == drawn["four"].met < 64 * 64  # the others have one colour
+    assert 0 < drawn["adaptive"].refined < 64 * 64 / 4
+    assert drawn["one"].pairs < drawn["adaptive"].pairs < drawn["four"].pairs
+    assert np.array_equal(drawn["quick"].image, drawn["adaptive"].image)  # the plane knows no quicker way
+    scene = nsg.loads(f"canvas(64, 64); {STAR}")
+    half = nsg.render(scene, samples="one", size=(32, 32))
+    assert np.array_equal(nsg.render(scene, samples="draft"), enlarged(half, (64, 64)))
+
+
+def test_ways_to_sample_that_are_refused() -> None:
+    scene = nsg.loads(f"canvas(16, 16); background(#fff); {STAR}")
+    with pytest.raises(ValueError, match="unknown samples `two`; there are `adaptive`, `four`, `quick`, "):
+        nsg.render(scene, samples="two")  # type: ignore[arg-type]
+    with pytest.raises(RenderError, match="the reference always takes four samples a pixel"):
+        nsg.render(scene, backend="reference", samples="one")
+    manifest = load_manifest("shapes2d")
+    manifest = replace(manifest, name="small", renderer="streaming", sizes=((16, 16),), white=True)
+    small = Model(manifest, Streaming(StreamingConfig(64, 16, 1 / 16)), Codes({}, {}, "ab" * 32), {})
+    p = replace(compile_scene(scene), model="small", weights="ab" * 32)
+    with pytest.raises(RenderError, match="model `small` samples pixels in one way only, not `four`"):
+        draw_program(p, small, samples="four")

@@ -11,7 +11,7 @@ import scenelang as nsg
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import enlarged
-from scenelang.drawing.small import choose_drawer, draw_small
+from scenelang.drawing.small import draw_small
 from scenelang.drawing.torch_backend import draw_program, open_model
 from scenelang.output.plan import plan_of
 from tests.pictures import psnr_db
@@ -57,14 +57,6 @@ def test_the_network_draws_what_the_reference_does(
     program.save(tmp_path / "p.safetensors")
     assert np.array_equal(nsg.render(nsg.load_program(tmp_path / "p.safetensors")), picture)
     assert np.allclose(nsg.render(scene, threads=1), nsg.render(scene, threads=3), atol=1 / 255)
-
-
-def test_torch_draws_the_same(program: Program, exact: nsg.Image) -> None:
-    assert choose_drawer(program).library == "numpy"
-    assert choose_drawer(program, "cpu").library == "torch"
-    drawn = nsg.render(program, device="cpu")
-    assert psnr_db(drawn, nsg.render(program)) > 48
-    assert psnr_db(drawn, exact) > 42
 
 
 def test_samples_and_backgrounds(scene: nsg.Scene, exact: nsg.Image) -> None:
@@ -114,26 +106,6 @@ def test_nothing_is_seen_from_inside() -> None:
     inside = nsg.loads("sphere { translate(0, 1.2, 6); }")
     with pytest.raises(RenderError, match="inside"):
         nsg.render(inside, backend="reference")
-
-
-SCENES = {
-    "a light inside a medium": """
-        light(position = [0, 0.3, 0], power = 2);
-        sphere { material volumetric { color(#fa6); } }
-        torus { translate(1.4, 0, 0); }
-    """,
-    "a solid that is half in a medium": """
-        sphere { material volumetric { color(#49f); } }
-        torus { rotate(60deg, axis = X); translate(0.7, 0, 0.2); material diffuse { color(#f40); } }
-    """,
-}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_odd_scenes_are_drawn_as_by_the_reference(name: str) -> None:
-    scene = nsg.loads("canvas(48, 48);" + SCENES[name])
-    ours, exact = (np.asarray(nsg.render(scene, backend=by), float) for by in ("neural", "reference"))
-    assert -10 * np.log10(np.square(ours - exact).mean()) > 46
 
 
 def test_the_stages_farthest_numbers_are_drawn_without_a_warning() -> None:

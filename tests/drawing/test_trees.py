@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -12,16 +10,13 @@ from scenelang.compiler.spaces import Light, Stage
 from scenelang.drawing.closed import ClosedSolids
 from scenelang.drawing.exact.solid import Field, solid_image
 from scenelang.drawing.solid.draw import draw_solids
-from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.network import SolidNetwork, Wanted
+from scenelang.drawing.solid.network import Wanted
 from tests.drawing.solids import (
-    Answer,
     Join,
     Object,
     Tree,
     everywhere,
     field,
-    folded,
     moved,
     network,
     random_tree,
@@ -42,9 +37,15 @@ BALL, RING = Object("sphere", (scaled(0.7),)), Object("torus", (turned(0.5), mov
 CLOSED, TORCH = ClosedSolids("solids3d"), torch_network()
 
 
-def points(seed: int, count: int) -> np.ndarray:
+def around(seed: int, count: int, reach: float = 1.2) -> np.ndarray:
     """Points (3, M) around the origin."""
-    return np.random.default_rng(seed).uniform(-1.2, 1.2, (3, count)).astype(np.float32)
+    return np.random.default_rng(seed).uniform(-reach, reach, (3, count)).astype(np.float32)
+
+
+def rays(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (3, M) from the eye to points, and their lengths (M,)."""
+    t = np.linalg.norm(p - EYE[:, None], axis=0)
+    return (p - EYE[:, None]) / t, t
 
 
 def tree_of(seed: int, least: int = 1) -> Tree:
@@ -54,50 +55,17 @@ def tree_of(seed: int, least: int = 1) -> Tree:
 
 
 @pytest.mark.parametrize("library", ["numpy", "torch"])
-def test_states_are_those_of_the_recursion(library: str) -> None:
-    """Where every object is met: distances, colours, kinds and gradients; the leaves' own are the field's."""
-    net: SolidNetwork = network() if library == "numpy" else TORCH
-    deepest = 0
-    for seed in range(14 if library == "numpy" else 5):
-        tree, p = tree_of(seed, 2), points(seed, 800)
-        exact = folded(tree, partial(_alone, p=p, notes={}))
-        solids = tree_field(tree, net)
-        solids.far, deepest = True, max(deepest, solids.tree.deepest)
-        found = _told(solids, everywhere(solids, p, gradient=True))
-        inside = exact.d < -2e-3
-        assert abs(found.d - exact.d).max() < 5e-4
-        assert (abs(found.rgb - exact.rgb)[:, inside].max(0) > 5e-3).sum() <= 0.01 * inside.sum()
-        assert (found.medium == exact.medium)[inside].all()
-        assert (np.linalg.norm(found.slope - exact.slope, axis=0) > 0.02).mean() < 0.01
-    assert deepest > 2
-
-
-def _alone(o: Object, p: np.ndarray, notes: dict[Object, Answer]) -> Answer:
-    """What the field answers for an object alone."""
-    if o not in notes:
-        solids = field([o])
-        solids.far = True
-        notes[o] = _told(solids, everywhere(solids, p, gradient=True))
-    return notes[o]
-
-
-def _told(solids: SolidField, found: Meeting) -> Answer:
-    d, register, slope = (np.asarray(solids.xp.to_numpy(v), np.float64) for v in found[:3])
-    return Answer(d, register[-1] > 0.5, register[:3], slope)
-
-
-@pytest.mark.parametrize("library", ["numpy", "torch"])
 def test_what_is_not_met_changes_nothing(library: str) -> None:
     """Where rays meet some objects of a tree: signs, colours, kinds and owners of the exact field."""
     count = astray = 0
     seeds = 60 if library == "numpy" else 12
     for seed in range(seeds):
-        tree, p = tree_of(seed, 2), points(seed, 3000)
+        tree, p = tree_of(seed, 2), around(seed, 3000)
         exact = Field(tree_graph(tree)).at(p.astype(float))
         rgb, medium, owner = (np.broadcast_to(v, p.shape) for v in (exact.rgb, exact.medium, exact.owner))
         solids = tree_field(tree, CLOSED if library == "numpy" else TORCH)
-        xp, like, t = solids.xp, solids.network.codes, np.linalg.norm(p - EYE[:, None], axis=0)
-        way, eye, limit = (xp.array(v, like) for v in ((p - EYE[:, None]) / t, EYE, t + 10))
+        xp, like, (way, t) = solids.xp, solids.network.codes, rays(p)
+        way, eye, limit = (xp.array(v, like) for v in (way, EYE, t + 10))
         with xp.inference():
             met, passes = solids.passes(eye, way, limit)
             at, there = xp.to_numpy(met), xp.take(xp.array(t, like), met)
@@ -120,30 +88,25 @@ def test_what_is_not_met_changes_nothing(library: str) -> None:
 
 
 def test_a_group_that_meets_nothing_has_no_state() -> None:
-    """One that draws goes on in what is empty; a cut on nothing is nothing."""
+    """One that draws goes on in what is empty; a cut on nothing is nothing and leaves the colour as it is."""
     away = Object("sphere", (scaled(0.3), moved(0, 0, -2)))
-    p = np.random.default_rng(4).uniform(-0.5, 0.5, (3, 200)).astype(np.float32)
-    t = np.linalg.norm(p - EYE[:, None], axis=0)
-    way = (p - EYE[:, None]) / t
+    way, t = rays(p := around(4, 200, 0.5))
     group = Tree((Join("union", BALL), Join("subtract", RING)))
-    first, second = (tree_field(Tree(joins)) for joins in (
-        (Join("union", away), Join("union", group)), (Join("union", BALL), Join("subtract", group))
-    ))  # fmt: skip
-    for solids, depth in ((first, 1), (second, 2)):
+    for joins, depth in (
+        ((Join("union", away), Join("union", group)), 1),
+        ((Join("union", BALL), Join("subtract", group)), 2),
+    ):
+        solids = tree_field(Tree(joins))
         met, passes = solids.passes(EYE, way, t)
         assert solids.pairs(passes, t[met]).depth == depth
-    alone = tree_field(Tree((Join("union", RING), Join("subtract", BALL), Join("union", away))))
-    cut = tree_field(
-        Tree((Join("union", RING), Join("subtract", Tree((Join("union", away), Join("subtract", RING))))))
-    )
+    assert tree_field(Tree((Join("union", RING), Join("subtract", BALL), Join("union", away)))).draws is False
+    nothing = Tree((Join("union", away), Join("subtract", RING)))
+    cut = tree_field(Tree((Join("union", RING), Join("subtract", nothing))))
     met, passes = cut.passes(EYE, way, t)
-    assert alone.draws is False
-    near = cut.meet(passes, t[met], Wanted.ALL)
-    whole = everywhere(field([RING]), p[:, met])
+    near, whole = cut.meet(passes, t[met], Wanted.ALL), everywhere(field([RING]), p[:, met])
     some = near.distance < 1
     assert some.sum() > 50
     assert near.distance[some] == pytest.approx(whole.distance[some], abs=1e-5)
-    # a cut with nothing in it leaves the colour as it is
     assert near.register[:, some] == pytest.approx(whole.register[:, some], abs=1e-5)
 
 
@@ -151,13 +114,12 @@ def test_a_group_that_meets_nothing_has_no_state() -> None:
 @pytest.mark.parametrize("kinds", [("diffuse", "volumetric"), ("volumetric", "diffuse")])
 def test_steps_in_media_pass_no_change_of_kind(op: str, kinds: tuple[str, str]) -> None:
     """Nowhere within the bound on how far the material is the same is it another."""
-    rng, (a, b) = np.random.default_rng(6), kinds
+    a, b = kinds
     mist = BALL._replace(material=a, steps=(scaled(1.2),))
     inner = Tree((Join("union", RING._replace(material=b)), Join(op, BALL._replace(material=a), 0.2)))
     solids = tree_field(Tree((Join("union", mist), Join("union", inner), Join("smooth", RING, 0.2))))
-    p = rng.uniform(-1, 1, (3, 1500)).astype(np.float32)
-    t = np.linalg.norm(p - EYE[:, None], axis=0)
-    met, passes = solids.passes(EYE, (p - EYE[:, None]) / t, t + 5)
+    way, t = rays(around(6, 1500, 1.0))
+    met, passes = solids.passes(EYE, way, t + 5)
     t = t[met]
     here = solids.meet(passes, t, Wanted.KIND, change=True)
     dense = (here.distance < 0) & (here.register[0] > 0.5)
@@ -186,17 +148,15 @@ def test_segments_answer_for_groups_that_are_unions() -> None:
         assert psnr_db(mine, solid_image(tree_graph(tree), STAGE, (48, 40))) > 45
 
 
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 66), marks=pytest.mark.slow)])
-def test_pictures_of_trees_are_those_of_the_reference(seeds: range) -> None:
+def test_pictures_of_trees_are_those_of_the_reference() -> None:
     """Diffuse and volumetric; those of closed forms differ by what samples of a pixel do."""
     learned, closed = [], []
-    for seed in seeds:
+    for seed in range(4):
         tree = tree_of(seed)
         exact = solid_image(tree_graph(tree), STAGE, (48, 48))
         for found, net in ((learned, network()), (closed, CLOSED)):
             found.append(min(50.0, psnr_db(draw_solids(tree_field(tree, net), STAGE, (48, 48))[0], exact)))
     assert np.mean(learned) > 47
-    assert np.quantile(learned, 0.05) > 40
     assert min(closed) > 43
 
 
@@ -219,11 +179,11 @@ HOLE = Tree((Join("union", ball(0, 0, 1.5)), Join("subtract", ball(0.8, 0, 0.2))
 )
 def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
     """Intersections in one another whose leaves lie apart; a rounded edge along a hole in a group."""
-    p = np.random.default_rng(8).uniform(-2, 2, (3, 20000)).astype(np.float32)
+    p = around(8, 20000, 2.0)
     exact = Field(tree_graph(tree)).at(p.astype(float)).d
     solids = tree_field(tree, CLOSED)
-    t = np.linalg.norm(p - EYE[:, None], axis=0)
-    met, passes = solids.passes(EYE, (p - EYE[:, None]) / t, t + 5)
+    way, t = rays(p)
+    met, passes = solids.passes(EYE, way, t + 5)
     d = np.full(len(t), 1.0)
     d[met] = solids.meet(passes, t[met], Wanted.DISTANCE).distance
     clear = abs(exact) > LEAST
@@ -232,38 +192,18 @@ def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
 
 
 LEFT = {
-    "beads": """
-        intersect {
-            sphere { scale(1.1); }
-            union {
-                sphere { scale(0.2); translate(-0.6, 0.2, 0.5); }
-                sphere { scale(0.25); translate(0.5, 0.1, 0.6); }
-            }
-        }
-        """,
-    "hole": """
-        subtract {
-            sphere;
-            subtract {
-                sphere { scale(0.9); translate(0.25, 0.25, 0.6); }
-                sphere { scale(0.16); translate(0, 0.2, 0.35); }
-                sphere { scale(0.1); translate(0.3, 0.45, 0.35); }
-            }
-        }
-        """,
-    "mist": """
-        intersect {
-            sphere { material volumetric; }
-            union {
-                sphere { scale(0.4); translate(-0.6, 0.2, 0.5); }
-                subtract {
-                    sphere { scale(0.6); translate(0.5, 0.1, 0.3); }
-                    sphere { scale(0.2); translate(0.5, 0.3, 0.6); }
-                }
-            }
-        }
-        sphere { scale(0.3); translate(-0.2, -0.3, 0.3); }
-        """,
+    "beads": """intersect { sphere { scale(1.1); }
+        union { sphere { scale(0.2); translate(-0.6, 0.2, 0.5); }
+            sphere { scale(0.25); translate(0.5, 0.1, 0.6); } } }""",
+    "hole": """subtract { sphere;
+        subtract { sphere { scale(0.9); translate(0.25, 0.25, 0.6); }
+            sphere { scale(0.16); translate(0, 0.2, 0.35); }
+            sphere { scale(0.1); translate(0.3, 0.45, 0.35); } } }""",
+    "mist": """intersect { sphere { material volumetric; }
+        union { sphere { scale(0.4); translate(-0.6, 0.2, 0.5); }
+            subtract { sphere { scale(0.6); translate(0.5, 0.1, 0.3); }
+                sphere { scale(0.2); translate(0.5, 0.3, 0.6); } } } }
+        sphere { scale(0.3); translate(-0.2, -0.3, 0.3); }""",
 }
 
 

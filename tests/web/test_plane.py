@@ -28,7 +28,7 @@ from scenelang.web.export import View, view_of
 from scenelang.web.plane import leaves
 from tests.assets.shapes import ball, element, square
 from tests.browser import watched
-from tests.drawing.test_pruned import of_sets, rng_of, wild
+from tests.drawing.test_bounds import of_sets, rng_of, wild
 from tests.pictures import premultiplied, psnr_db
 from tests.test_examples import SCENES, sized
 

@@ -43,10 +43,7 @@ def sample_points(
 
 
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
-    """Colours (M, 3) of a look with an element, whose own coordinates q are (d, M).
-
-    They are linear if ``light``, decoded before anything is mixed.
-    """
+    """Colours (M, 3) of a look with an element at its own coordinates (d, M), linear if ``light``."""
     assert look.element is not None
     values = _values(look.element, light)
     if values.ndim == 4:
@@ -119,10 +116,7 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object, of a distance of shape S.
-
-    Colours broadcast against (*S, 3); tokens are numbers, or arrays that broadcast against S.
-    """
+    """Yield (D, C) after each object, of distances of shape S; colours broadcast against (*S, 3)."""
     big_d = c_now = None
     for d, c, token in zip(distances, colours, tokens, strict=True):
         if big_d is None:
@@ -217,11 +211,8 @@ def evaluate(
     owners: bool = False,
     brought: Brought | None = None,
 ) -> tuple[Any, Any]:
-    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64.
-
-    Args:
-        outer: steps of the folds around it, nearest first.
-        owners: in place of the colour the number (M, 1) of the object that paints; in a blend the nearer one.
+    """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64, with steps of the folds
+    around it, nearest first; if ``owners``, the number (M, 1) of the object that paints in place of C.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
@@ -295,10 +286,9 @@ def within(
     signed: bool = True,
     brought: Brought | None = None,
 ) -> tuple[float, Node]:
-    """A bound below the distance of a node in a disc of world points, and the node without what is outside.
-
-    Nothing is left out unless ``signed``: then no more is asked for than the sign of the distance, and the
-    colour where it is negative. A blend wants the distance itself.
+    """A bound below the distance of a node in a disc of world points, and the node without what is outside,
+    if ``signed``: then only the sign of the distance counts, and the colour where it is negative. A blend
+    wants the distance itself.
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):

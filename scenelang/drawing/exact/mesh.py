@@ -164,10 +164,7 @@ class Shape(Protocol):
         """Signed distances (M,) of points (M, d), negative inside."""
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """Points (K, d) spread evenly on the outside, ``count`` at most, and outward normals there.
-
-        Also the share of the surface that has no inside on either side.
-        """
+        """At most ``count`` points (K, d) all over, outward normals, and the share with no inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,14 +287,10 @@ def needed(name: str) -> Iterator[None]:
 def mesh_of(
     vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto", look: Look | None = None
 ) -> Mesh:
-    """The solid that triangles enclose, and what it looks like.
+    """The solid that triangles enclose, and what it looks like; raises `FitError`.
 
-    Args:
-        sign: what tells inside: ``winding`` numbers, which take any mesh, or normals, for ``closed`` ones
-            whose surface nowhere passes through itself; ``auto`` is ``winding``.
-
-    Raises:
-        FitError: it is empty, too large or damaged.
+    ``sign`` tells inside: ``winding`` numbers take any mesh, ``closed`` ones, which nowhere pass through
+    themselves, have normals; ``auto`` is ``winding``.
     """
     with needed("trimesh"):
         import trimesh
@@ -385,10 +378,8 @@ def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
 def read_solids(
     data: bytes, suffix: str, files: Mapping[str, bytes] | None = None
 ) -> tuple[list[Solid], list[str]]:
-    """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it.
-
-    Materials and textures are in ``files`` by the names that it has for them; without, looks are not read.
-    Raises `FitError` where it is damaged or too large, or has what cannot be read.
+    """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it;
+    without ``files``, materials and textures by name, looks are not read. Raises `FitError`.
     """
     with needed("trimesh"):
         import trimesh

@@ -42,12 +42,8 @@ class Brought(NamedTuple):
 def brought(
     data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
 ) -> Brought:
-    """Read shapes from the bytes of a file with a suffix of `MOST_OF`.
-
-    Args:
-        name: of the whole.
-        files: those that it names, by the names that it has for them.
-        apart: whether its parts are elements of their own; if left out, those of drawings are.
+    """Read shapes from the bytes of a file with a suffix of `MOST_OF`; ``files`` are those that it names.
+    ``apart`` says whether its parts are elements of their own, by default those of drawings.
     """
     if suffix in outline.MOST_OF_DRAWING:
         return drawn_parts(outline.read_outline(data, suffix), name, apart)
@@ -167,13 +163,8 @@ FOLDER: Final = "SCENELANG_ORIGINALS"
 
 
 def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
-    """The true shapes of the elements that a scene shows, by geometry.
-
-    Their files lie in the folder that the environment's `FOLDER` names, or beside the file of elements.
-
-    Raises:
-        FitError: a file is not there or another, or what reads it is not installed.
-        OSError: a file cannot be read.
+    """The true shapes of a scene's elements, by geometry, from files in the folder that the environment's
+    `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
     """
     shown = {leaf.geometry for leaf in leaves(graph.root)} & graph.elements.keys()
     beside = {file.name: file.zoo.folder for file in scene.elements if file.zoo is not None}

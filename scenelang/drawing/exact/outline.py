@@ -51,10 +51,7 @@ class Coded(NamedTuple):
 
 @contextmanager
 def opened(data: bytes, most: int = MOST_PIXELS) -> Iterator[Image.Image]:
-    """A picture of at most so many pixels (.png, .jpg), which it says before anything is decoded.
-
-    Raises `FitError` where it is damaged, another kind of file or too large; also of what is done with it.
-    """
+    """A picture (.png, .jpg) of at most so many pixels by its header; all faults become `FitError`."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -126,14 +123,10 @@ def fit_picture(
     about: dict[str, str | float] | None = None,
     report: Callable[[Coded], None] = lambda coded: None,
 ) -> tuple[Element, list[Coded]]:
-    """The smallest texture whose error is at most ``max_error``.
+    """The smallest texture whose root mean square error, of channels in [0, 1], is at most ``max_error``.
 
-    Args:
-        max_error: root mean square of channels in [0, 1]; `NEAR_COLOUR` if left out.
-        budget_s: nothing further is tried after so many seconds.
-        steps: how many are tried at most, whatever the time; the same number gives the same bytes.
-        about: what the element says of itself, beside its figures.
-        report: called with each that was tried.
+    At most ``steps`` are tried, none after ``budget_s`` seconds; the same number gives the same bytes.
+    ``about`` is what the element says of itself; ``report`` is called with each that was tried.
     """
     started, tried, asked = time.monotonic(), [], max_error or NEAR_COLOUR
     true = picture.colours.astype(np.float32) / np.float32(255)
@@ -221,9 +214,7 @@ def _normals(edges: Edges) -> Points:
 
 class Outline:
     """A flat shape in the unit disc: the midpoint of its bounding box is the origin, its farthest point at 1.
-
-    Raises:
-        FitError: the layers cover nothing.
+    Raises `FitError` where the layers cover nothing.
     """
 
     dimension = 2
@@ -256,10 +247,7 @@ class Outline:
             raise FitError("it covers nothing")
 
     def painted(self) -> list[tuple[Painted, list[Layer]]]:
-        """Its colours in the order of painting, and the layers of each, as they lay in the file.
-
-        A layer joins earlier ones of its colour where nothing that was painted since touches it.
-        """
+        """Its colours in the order of painting, and the layers of each, joined where nothing lies between."""
         result: list[tuple[Painted, list[Layer]]] = []
         for layer in self._source:
             for color, layers in reversed(result):

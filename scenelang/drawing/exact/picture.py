@@ -23,19 +23,12 @@ def reference_image(
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
-    """Draw the exact picture of a lowered graph.
+    """Draw the exact picture of a lowered graph: (H, W, 3), or (H, W, 4) with straight alpha where the
+    background is none.
 
-    Args:
-        graph: from `lower`; passes keep its picture.
-        per_side: samples along each side of a pixel; 2 is the definition (4 spp).
-        brought: shapes of elements.
-        progress: called with the share done, in [0, 1].
-
-    Returns:
-        (H, W, 3), or (H, W, 4) with straight alpha where the background is none.
-
-    Raises:
-        ValueError: the eye is inside something opaque, or a shape is known only by what was made of it.
+    A pixel has ``per_side`` samples along each side, by definition 2; ``brought`` are shapes of elements;
+    ``progress`` is called with the share done. Raises `ValueError` where the eye is inside something opaque,
+    or a shape is known only by what was made of it.
     """
     check_shapes(graph, brought)
     if graph.stage is not None:

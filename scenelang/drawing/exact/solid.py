@@ -88,8 +88,8 @@ class Turn(NamedTuple):
     def stretch(self, most: Array | float) -> Array:
         """The largest stretch over all points no longer than ``most``.
 
-        With u = dR/da p and v = grad a it is ``(m + sqrt(m² + 4 + 4 u.v)) / 2``, m = |u| |v|: the larger
-        singular value of 1 + u v^T. u is no longer than p, and at a right angle to it.
+        With u = dR/da p, v = grad a and m = |u| |v| it is ``(m + sqrt(m² + 4 + 4 u.v)) / 2``, the larger
+        singular value of 1 + u v^T.
         """
         m = most * (abs(self.twirl) + np.linalg.norm(self.slope))
         across = most * np.hypot(self.slope[0], self.slope[self.other])
@@ -130,10 +130,7 @@ def way_back(steps: Sequence[Step]) -> Any:
 
 
 class Body:
-    """A leaf of linear colours with all steps into the world, nearest the leaf first.
-
-    Its ball holds every point whose distance is below a margin, in world units.
-    """
+    """A leaf of linear colours with all steps into the world, and the ball of distances below a margin."""
 
     def __init__(
         self, leaf: Leaf, steps: Sequence[Step], margin: float, brought: Brought | None = None
@@ -163,10 +160,7 @@ class Body:
         self.centre, self.radius = centre, radius
 
     def span(self, o: Array, d: Array) -> tuple[Array, Array, Array]:
-        """Entry and exit t of rays o + t d through the ball, an ellipsoid of the world, and their speed.
-
-        Rays that miss it enter at inf and leave at -inf. The speed is that behind the first map.
-        """
+        """Entry and exit t of rays o + t d through the ball, inf and -inf if none, and speed there."""
         o, d = self.first(o) - self.centre, self.first.inverse @ d
         a, b, c = (d * d).sum(0), (o * d).sum(0), (o * o).sum(0) - self.radius**2
         root = b * b - a * c
@@ -279,12 +273,9 @@ class Field:
         self.media = True in kinds
 
     def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
-        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each.
-
-        Args:
-            p: world points (3, M).
-            met: (N, M), in which objects' balls they lie; the others count as far away.
-            speed: (N, M), as `Body.span` tells, of the rays on which they lie.
+        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each, at world
+        points (3, M); ``met`` (N, M) says in which objects' balls they lie, ``speed`` is as `Body.span`
+        tells.
         """
         count = p.shape[1]
         fastest, most = np.full(count, 1e-9), np.full(count, FAR)
@@ -372,10 +363,7 @@ class Changes(NamedTuple):
 
 
 def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
-    """Follow rays o + t d, t from 0 to ``end`` (M,), until they end or meet something opaque.
-
-    Places are found to 1e-9 or so if ``exact``, otherwise to about 1e-6.
-    """
+    """Follow rays o + t d, t from 0 to ``end`` (M,), to 1e-9 or so if ``exact``, otherwise to 1e-6."""
     enter, leave, speed = spans = np.empty((3, len(field.bodies), o.shape[1]))
     for index, body in enumerate(field.bodies):
         spans[:, index] = body.span(o, d)
@@ -428,8 +416,7 @@ def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) 
 
 
 TILE = 1 << 15  # samples at a time
-TOLERANCE = 2e-4
-"""A part of a ray in a medium is halved until its scattered light changes by less."""
+TOLERANCE = 2e-4  # A part of a ray in a medium is halved until its scattered light changes by less
 
 HALVINGS = 9
 
@@ -446,11 +433,7 @@ def solid_image(
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
-    """Draw the exact picture of a scene of solids, as `reference_image` does.
-
-    Raises:
-        ValueError: the stage has a fault, or the eye is inside something opaque.
-    """
+    """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too."""
     if fault := stage.camera.fault() or stage.light.fault():
         raise ValueError(fault)
     field = Field(root, brought)
@@ -555,10 +538,7 @@ def _visible(field: Field, light: Light, p: Array) -> Array:
 def _scattered(
     field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
 ) -> Array:
-    """Light (3, K) that parts of rays o + t d inside media scatter to where the rays come from.
-
-    Each begins at ``enter``, with an optical depth and the transmittance ``weight`` from the eye to there.
-    """
+    """Light (3, K) that parts of rays in media from ``enter`` on, of a ``weight`` to the eye, scatter."""
     opaque = -np.expm1(-depth)
 
     def part(at: Ints, low: Array, high: Array) -> Array:

@@ -20,13 +20,9 @@ from scenelang.drawing.neural.network import CELLS, NODE, RADII, RADIUS, STEEP, 
 
 
 def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corners: Sequence[int]) -> Array:
-    """Values (…, M) inside cells of a grid, linear along each axis.
-
-    Args:
-        flat: values at nodes (…, K), the last axis first to change.
-        first: the least node (M,) of each cell.
-        share: how far into the cell a point lies, d times (M,).
-        corners: where from there the 2^(d - 1) edges along the last axis begin.
+    """Values (…, M) inside cells of a grid, linear along each axis, from ``flat`` (…, K), the last axis
+    first. ``first`` is the least node (M,) of each cell, ``share`` how far into it a point lies, d times
+    (M,).
     """
     values = []
     for corner in corners:
@@ -97,10 +93,7 @@ class GridShape(Lattice):
         return Slopes(np.stack(more), 1.0)
 
     def field(self, q: Array, gradient: bool) -> Array:
-        """Distances (1, M), or these and how they change (1 + d, M).
-
-        The change is that over a cell, as the edges of one would show in the light.
-        """
+        """Distances (1, M), or these with their change over a cell (1 + d, M), which hides edges."""
         xp, step, rows = self.xp, 0.5 / self.half, [self.distance(q)]
         for axis in range(self.d) if gradient else ():
             moved = [*q]
@@ -129,17 +122,8 @@ MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
 class Texture:
-    """Colours of a paint at leaf coordinates.
-
-    Args:
-        xp: the library.
-        paint: the element and the steps of its colours.
-        frame: the way (6,) from leaf coordinates x and y to the picture's.
-        like: an array that lies where the colours are asked for.
-        light: whether colours are linear there, not as they are written.
-
-    Raises:
-        ProgramError: the element is damaged, or the frame beyond float32.
+    """Colours of a paint at leaf coordinates, linear if ``light``; ``frame`` leads from x and y to the
+    picture (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
     """
 
     def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
@@ -154,8 +138,7 @@ class Texture:
         self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
         self.texels, self.sides = flat, values.shape[-2:]
         across = abs(np.array([row[:2] for row in self.place.rows])).max() if values.ndim == 3 else 0.5
-        self.detail = float(across) * max(values.shape)
-        """Texels that a way of a leaf unit may cross, about."""
+        self.detail = float(across) * max(values.shape)  # Texels that a way of a leaf unit may cross, about
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""

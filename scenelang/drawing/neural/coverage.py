@@ -66,10 +66,7 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
 
 
 def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """A mask of pixels (groups, B), of a side, that one object's colour may share with another's.
-
-    In a union, outside both of them, that is not an outline, but a later blend may show it.
-    """
+    """A mask (groups, B) of pixels of a side where one object's colour may tie with another's."""
     xp, token = field.xp, field.tokens[meetings.pairs.object]
     joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
     tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
@@ -93,13 +90,8 @@ def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
 def add_textures(
     field: Field, meetings: Meetings, trace: Trace, p: Array, memory: Array, seen: Array, px: float
 ) -> None:
-    """Add the textures that points show to their colours.
-
-    Args:
-        p: the points (2, groups, B).
-        memory: state and register (groups, S + 3, B).
-        seen: (groups, B) of which points.
-        px: side of the pixels for which textures are looked up four times, world units; 0: once.
+    """Add the textures that points (2, groups, B) show, where ``seen``, to their colours in ``memory``
+    (groups, S + 3, B); ``px`` is the side of pixels, world units, whose textures are looked up four times.
     """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
     shares = trace.shares(xp, nesting(meetings, field.groups), seen)
@@ -135,21 +127,14 @@ FLAT = 1e-4  # of a channel: a block that is known so well has one colour
 
 @dataclass(slots=True)
 class Tile:
-    """Some rows of pixels.
+    """Some rows of pixels."""
 
-    Args:
-        picture: (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4).
-        background: (3,), if any.
-        pairs: (object, sample) pairs that went through the network.
-        refined: pixels that were sampled four times.
-        met: pixels that were asked one by one.
-    """
-
+    # (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4)
     picture: np.ndarray
-    background: np.ndarray | None
-    pairs: int = 0
-    refined: int = 0
-    met: int = 0
+    background: np.ndarray | None  # (3,), if any
+    pairs: int = 0  # (object, sample) pairs that went through the network
+    refined: int = 0  # pixels that were sampled four times
+    met: int = 0  # pixels that were asked one by one
 
     def over(self, picture: np.ndarray) -> np.ndarray:
         """The picture (…, 3 or 4) over the background, of premultiplied colour and coverage (…, 4)."""
@@ -160,12 +145,7 @@ class Tile:
 
 
 class Coverage:
-    """Asks a field for pixels.
-
-    Args:
-        skip: leave out what objects cannot reach or is proved not to matter.
-        prove: leave out the latter, too.
-    """
+    """Asks a field for pixels; ``skip`` leaves out what is out of reach or proved not to matter."""
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True) -> None:
         self.field, self.xp, self.skip = field, field.xp, skip
@@ -250,10 +230,7 @@ class Coverage:
     def _matter(
         self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
     ) -> tuple[Meetings, tuple[Index, Index]]:
-        """Pairs that matter to the four samples of pixels, by leaf coordinates and distances at centres.
-
-        Pixels that are proved to show what their middles do are left out.
-        """
+        """Pairs that matter to the four samples of pixels, but for pixels proved to be as their middles."""
         some, source = meetings.some(column)
         place = some.places()
         by = np.argsort(place, kind="stable")
@@ -393,11 +370,8 @@ class Coverage:
         return left
 
     def _proved(self, pairs: Pairs, middle: np.ndarray, rise: np.ndarray) -> tuple[Pairs, Index, np.ndarray]:
-        """Pairs that are still open, and blocks of one colour (n,) with their pictures (n, 4).
-
-        Args:
-            pairs: sorted by block.
-            middle, rise: distances at the blocks' centres, and by how much others in them differ at most.
+        """Pairs, sorted by block, that are still open, and blocks of one colour (n,) with their pictures (n,
+        4). Others in a block differ from the ``middle`` distance by ``rise`` at most.
         """
         meetings, source = meetings_of(pairs)
         shown = self.field.proved(meetings, middle[source], rise[source])

@@ -325,14 +325,9 @@ def ready() -> bool:
 
 
 def draw_on_device(network: Framed, program: Program, samples: str = "adaptive") -> Drawing | None:
-    """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive.
-
-    Returns:
-        The drawing, None of what the kernel does not know: solids, decoders of more than 32 units, features
-        beside a distance, a state of more than one number, and frames that need float64.
-
-    Raises:
-        ProgramError: as `scenelang.drawing.neural.draw.draw`.
+    """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive; None of what
+    the kernel does not know: solids, decoders of more than 32 units, features beside a distance, a state of
+    more than one number, and frames that need float64. Raises `ProgramError` as `draw` does.
     """
     if samples == "draft":
         result = draw_on_device(network, halved(program), "one")
@@ -356,12 +351,8 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
 def start(
     field: Field, grid: Raster, pairs: Pairs, background: Sequence[float] | None, samples: int, like: Tensor
 ) -> Tensor:
-    """A picture (H, W, 3), or without a background premultiplied (H, W, 4), that a device has begun to draw.
-
-    Args:
-        field: on the host.
-        pairs: of objects and the raster's largest blocks.
-        like: a tensor that lies on the device.
+    """A picture (H, W, 3), or without a background premultiplied (H, W, 4), that the device of ``like`` has
+    begun to draw, of a field on the host and pairs of its objects and the raster's largest blocks.
     """
     (width, height), across = grid.canvas, grid.wide // LEVELS[0]
     blocks = across * grid.high // LEVELS[0]
@@ -424,8 +415,7 @@ def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArr
 
 def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Blocks, rows and levels of pairs and of the groups that end between them, and how many levels are used.
-
-    The rows of N objects are followed by those of objects that begin a state as they are, and by groups'.
+    Behind the rows of N objects are those of objects that begin a state as they are, and groups'.
     """
     meetings, _ = meetings_of(pairs)
     nest, count = nesting(meetings, field.groups), len(field.tokens)

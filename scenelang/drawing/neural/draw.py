@@ -34,14 +34,10 @@ _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
 @dataclass(slots=True)
 class Kept:
-    """The last picture of a sequence.
+    """The last picture of a sequence."""
 
-    Args:
-        keys: what each of its tiles showed, a digest.
-        picture: (H, W, 3 or 4), as `Tile` has it.
-    """
-
-    keys: list[bytes] = field(default_factory=list)
+    keys: list[bytes] = field(default_factory=list)  # what each of its tiles showed, a digest
+    # (H, W, 3 or 4), as `Tile` has it
     picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
 
     def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
@@ -100,21 +96,13 @@ TILE = 1 << 18  # pixels that are drawn at a time
 
 @dataclass(slots=True)
 class Drawing:
-    """A picture and what it cost.
+    """A picture and what it cost."""
 
-    Args:
-        image: (H, W, 3), or (H, W, 4) with straight alpha.
-        pairs: (object, sample) pairs that went through the network.
-        refined: pixels that were sampled four times.
-        met: pixels that an object reached; the others show the background, unseen by the network.
-        work: of solids, what it took in rays and steps.
-    """
-
-    image: Image
-    pairs: int
-    refined: int
-    met: int
-    work: Work | None = None
+    image: Image  # (H, W, 3), or (H, W, 4) with straight alpha
+    pairs: int  # (object, sample) pairs that went through the network
+    refined: int  # pixels that were sampled four times
+    met: int  # pixels that an object reached; the others show the background, unseen by the network
+    work: Work | None = None  # of solids, what it took in rays and steps
 
 
 def draw_objects(
@@ -164,18 +152,10 @@ def draw(
     tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
-    """Draw a Program's objects in stream order.
+    """Draw a Program's objects in stream order; arguments are those of `Run`.
 
-    Args:
-        threads: tiles drawn at the same time; by default 1.
-        split: tiles are as high as for so many threads; by default ``threads``.
-        kept: the picture before this one, of which tiles that show the same are taken over.
-        samples: of a pixel: ``"adaptive"``, four near outlines and one elsewhere, ``"four"`` or ``"one"``.
-        tile: pixels at a time, at least one row.
-        progress: called with the share done, from any thread.
-
-    Raises:
-        ProgramError: no compiled scene has such vectors.
+    Without ``split`` tiles are as high as for ``threads``, by default 1; ``tile`` is their pixels, at least
+    one row. Raises `ProgramError` for vectors that no compiled scene has.
     """
     (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
@@ -215,11 +195,7 @@ def halved(program: Program) -> Program:
 
 
 def as_image(picture: npt.NDArray[np.float32]) -> Image:
-    """The image of a picture (H, W, 3), or (H, W, 4) of premultiplied colour and coverage.
-
-    Raises:
-        ProgramError: some of it is not finite.
-    """
+    """The image of a picture (H, W, 3), or premultiplied (H, W, 4); `ProgramError` if not finite."""
     if not np.isfinite(picture.sum()):
         raise ProgramError("a damaged program: numbers that the network cannot draw with")
     return from_samples(picture[..., :3], picture[..., 3] if picture.shape[2] == 4 else None)

@@ -35,16 +35,11 @@ _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """Effect of P pairs on points.
+    """Effect of P pairs on points."""
 
-    Args:
-        paint: (groups, P) how far the object's colour came in.
-        margin: (groups, P) by how much what was there before is nearer than the object, world units.
-        joined: the same of groups of the stream that ended, round by round, with their distances.
-    """
-
-    paint: Array
-    margin: Array
+    paint: Array  # (groups, P) how far the object's colour came in
+    margin: Array  # (groups, P) by how much what was there before is nearer than the object, world units
+    # the same of groups of the stream that ended, round by round, with their distances
     joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
 
     def shares(self, xp: Arrays, nest: Nesting, seen: Array) -> Array:
@@ -71,20 +66,11 @@ class Trace:
 class Field:
     """A program's objects with their weights, ready to be met by points.
 
-    Args:
-        network: trained parameters, on any device.
-        vectors: (N, 64) float32, geometry and material vectors.
-        brought: what users brought, None where a row shows a geometry of the model; all of them if left out.
-        paints: likewise, None where a row has the colour of its vector.
-
-    Attributes:
-        frames: of the objects.
-        reach: (N,) leaf units from an object's origin beyond which it changes nothing; inf where it concerns
-            every point.
-        draws: (N,) whether something may be seen, where it is met, of what was empty before.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or an element cannot be drawn.
+    Of rows of vectors (N, 64), ``brought`` has what users brought, None where it is a geometry of the model,
+    and ``paints`` textures, None where it is the colour of its vector. ``reach`` (N,) is in leaf units from
+    an object's origin, beyond which it changes nothing, inf where it concerns every point; ``draws`` (N,)
+    says whether it may be seen where nothing was before. Raises `ProgramError` where a vector holds no way to
+    a leaf, or an element cannot be drawn.
     """
 
     def __init__(
@@ -136,8 +122,7 @@ class Field:
         widths = widths_of(self._raw, self.parts.width.astype(np.float64))
         self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
         """Widths of the blends by which objects join (N,), world units."""
-        self.group_widths = widths[groups.rows]
-        """Widths of the blends by which groups join (G,), 0 for none."""
+        self.group_widths = widths[groups.rows]  # Widths of the blends by which groups join (G,), 0 for none
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
@@ -168,8 +153,7 @@ class Field:
         self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
         """Colours of the objects (3, N); 0 for those with a texture."""
         self.textures: list[Texture] = []
-        self.texture = np.full(len(self.paints), NO_TEXTURE)
-        """Index of each object's texture (N,)."""
+        self.texture = np.full(len(self.paints), NO_TEXTURE)  # Index of each object's texture (N,)
         known: dict[tuple[Paint, bytes], int] = {}
         for i, paint in enumerate(self.paints):
             if paint is None or not self.draws[i]:  # the others leave colours as they are
@@ -214,10 +198,8 @@ class Field:
         return memory
 
     def features(self, objects: np.ndarray, q: Array, far: np.ndarray) -> Array:
-        """Features (groups, F, P) in world units of objects (P,) at leaf coordinates (2, groups, P).
-
-        Args:
-            far: (P,) whether points of a column may lie beyond `RADIUS`.
+        """Features (groups, F, P) in world units of objects (P,) at leaf coordinates (2, groups, P); ``far``
+        (P,) says whether points of a column may lie beyond `RADIUS`.
         """
         xp, shape = self.xp, self.shape[objects]
         used = np.flatnonzero(np.bincount(shape)).tolist()
@@ -259,11 +241,8 @@ class Field:
         return path, joins[path], np.append(self.group_widths, -1.0)[path]
 
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
-        """State and register (groups, S + 3, B) of columns that have met their objects.
-
-        Args:
-            features: of the pairs (groups, F, P).
-            trace: where to write down what each object did.
+        """State and register (groups, S + 3, B) of columns that have met their objects, by the features
+        (groups, F, P) of the pairs; ``trace`` takes down what each object did.
         """
         xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
         nest, count = nesting(meetings, self.groups), len(meetings.columns)
@@ -314,11 +293,7 @@ class Field:
 
     def _took(self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool) -> tuple[Array, Array]:
         """Let memories (groups, S + R, n) take an object in each; how far its colour came in, and the margin.
-
-        Args:
-            cell: of the objects (…, n).
-            d: their features (groups, F, n).
-            colours: their registers (R, n), or (groups, R, n).
+        ``d`` are features (groups, F, n), colours registers (R, n) or (groups, R, n).
         """
         s, (lines, bias, candidate, bump) = self.network.config.state, cell
         levels, wanted = bias, 0.0

@@ -47,15 +47,7 @@ def slopes_path(name: str, digest: str = "") -> Path:
 
 
 def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:
-    """The arrays of a file of proofs; None where it is missing or about something else, as its header says.
-
-    Args:
-        header: what it has to say, among it the digest of the weights.
-        shapes: of its arrays.
-
-    Raises:
-        ModelError: it is damaged.
-    """
+    """The arrays of a file of proofs; None if missing or of another header, `ModelError` if damaged."""
     try:
         result = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
         arrays = result.arrays()
@@ -81,10 +73,8 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
     return {code.tobytes(): Slopes(own, far) for code, own in zip(codes, arrays["cells"], strict=True)}
 
 
-MOST_SIZE: Final = 128
-"""Most units of a layer for solids: their square, times the code, is 9 MB."""
-MOST_WIDTH: Final = 1024
-"""Most units of a layer in the plane."""
+MOST_SIZE: Final = 128  # Most units of a layer for solids: their square, times the code, is 9 MB
+MOST_WIDTH: Final = 1024  # Most units of a layer in the plane
 Config = TypeVar("Config", FramedConfig, SolidConfig)
 
 
@@ -141,14 +131,8 @@ def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
 
 
 def load_arrays(name: str, weights: str = "") -> ArrayModel:
-    """Load a shipped model.
-
-    Args:
-        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
-
-    Raises:
-        KeyError: there is no such model.
-        ModelError: its weights are missing or damaged.
+    """Load a shipped model; ``weights`` is the digest of ones that were `replaced`, others are today's.
+    Raises `KeyError` where there is none, `ModelError` where weights are missing or damaged.
     """
     return _load(name, replaced(weights))
 

@@ -61,18 +61,13 @@ def _combine(xp: Arrays, factors: tuple[Number, ...], p: Point) -> Array:
 
 
 class Frames:
-    """The ways of N objects back to their leaves: a map, warps, a map, warps, outermost first.
+    """The ways of N objects back to their leaves, by vectors (N, .): a map, warps, a map, warps, outermost
+    first.
 
-    Args:
-        g: vectors (N, .), or as much of them as leads to the leaf.
-
-    Attributes:
-        scale: (N,) world distance per leaf distance, the smallest singular value of the composed map.
-        stretch: (N,) how much faster than one world unit per world unit a distance can change at most.
-        wild: (N,) whether points may leave float32 on the way, which costs a detour through float64.
-
-    Raises:
-        ProgramError: one does not lead from the world to a leaf, as those of compiled scenes do.
+    ``scale`` (N,) is world distance per leaf distance, the smallest singular value of the composed map,
+    ``stretch`` (N,) by how much more than 1 a distance can change per world unit, ``wild`` (N,) whether
+    points may leave float32 on the way, which costs a detour through float64. Raises `ProgramError` where a
+    vector does not lead to a leaf, as those of compiled scenes do.
     """
 
     def __init__(self, g: np.ndarray, layout: Layout = PLANE_LAYOUT) -> None:
@@ -165,19 +160,12 @@ class Frames:
 
 
 class _Stage(NamedTuple):
-    """One map, or one warp, of every object.
+    """One map, or one warp, of every object."""
 
-    Args:
-        numbers: where its numbers lie in a geometry vector.
-        moves: (N,) whether it moves anything.
-        steep: (N,) how far it takes points apart at most, per distance; of a warp, at the origin.
-        rate: (N,) of a warp, how fast its angle changes at most, per distance.
-    """
-
-    numbers: slice
-    moves: np.ndarray
-    steep: Floats
-    rate: Floats
+    numbers: slice  # where its numbers lie in a geometry vector
+    moves: np.ndarray  # (N,) whether it moves anything
+    steep: Floats  # (N,) how far it takes points apart at most, per distance; of a warp, at the origin
+    rate: Floats  # (N,) of a warp, how fast its angle changes at most, per distance
 
 
 def _step(factors: Array) -> Affine | Warp:

@@ -89,18 +89,12 @@ Network = Framed | Solids | Streaming | Reading
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model that draws Programs.
-
-    Args:
-        network: the trained network, in evaluation mode, without gradients.
-        codes: of its weights, as `compile_scene` takes them.
-        header: how the weights were trained (config, seed, revision, budget).
-    """
+    """A model that draws Programs."""
 
     manifest: Manifest
-    network: Network
-    codes: Codes
-    header: dict[str, Any]
+    network: Network  # the trained network, in evaluation mode, without gradients
+    codes: Codes  # of its weights, as `compile_scene` takes them
+    header: dict[str, Any]  # how the weights were trained (config, seed, revision, budget)
 
     @property
     def digest(self) -> str:
@@ -109,22 +103,14 @@ class Model:
 
     @property
     def framed(self) -> Framed:
-        """The network of a model that meets objects in their frames.
-
-        Raises:
-            ModelError: it is another one.
-        """
+        """The network that meets objects in their frames; `ModelError` where there is none."""
         if not isinstance(self.network, Framed):
             raise ModelError(f"model `{self.manifest.name}` has no framed renderer")
         return self.network
 
 
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
-    """Build the network that a weights file holds.
-
-    Raises:
-        ModelError: the file does not fit the manifest or itself, or holds numbers that are not finite.
-    """
+    """Build the network of a weights file; `ModelError` where it does not fit the manifest or itself."""
     header, arrays = open_weights(data)
     make = _MAKERS.get(manifest.renderer)
     if make is None:
@@ -179,15 +165,7 @@ _MAKERS: dict[str, _Make] = {
 
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
-    """Load a shipped model, or one whose weights lie at ``path``.
-
-    Args:
-        weights: digest of weights that were `replaced`; with any other, those of today are loaded.
-
-    Raises:
-        KeyError: there is no such model.
-        ModelError: its weights are missing or damaged.
-    """
+    """Load a shipped model, or weights at ``path``; raises and takes ``weights`` as `load_arrays`."""
     manifest, data = load_manifest(name), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
     if isinstance(network, Framed):

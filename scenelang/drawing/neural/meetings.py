@@ -28,19 +28,13 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """P pairs.
+    """P pairs."""
 
-    Args:
-        block, object: (P,).
-        open: (P,) whether what the block met before is proved not to matter.
-        far: (P,) whether points of the block may be seen at the rim of what the decoder knows.
-        rate: (P,) how many leaf units two points of the block may be apart, per world unit.
-    """
-
-    block: Index
-    object: Index
-    open: Mask
-    far: Mask
+    block: Index  # (P,)
+    object: Index  # (P,)
+    open: Mask  # (P,) whether what the block met before is proved not to matter
+    far: Mask  # (P,) whether points of the block may be seen at the rim of what the decoder knows
+    # (P,) how many leaf units two points of the block may be apart, per world unit
     rate: npt.NDArray[np.float64]
 
     def __len__(self) -> int:
@@ -60,11 +54,7 @@ class Pairs:
         return cls(block[by], objects[by], none, none, np.full(len(by), np.inf))
 
     def split(self, wide: int, parts: int) -> Pairs:
-        """The same pairs of blocks that are smaller in both directions by a factor.
-
-        Args:
-            wide: larger blocks in a row.
-        """
+        """The same pairs in blocks smaller in both directions by a factor, of ``wide`` in a row."""
         down, across = np.divmod(self.block, wide)
         at = np.arange(parts)
         first = (down * parts * wide + across) * parts
@@ -75,17 +65,11 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True)
 class Meetings:
-    """Pairs slot by slot.
+    """Pairs slot by slot."""
 
-    Args:
-        columns: (B,) blocks.
-        pairs: slot by slot.
-        lengths: of the slots, none longer than the one before.
-    """
-
-    columns: Index
-    pairs: Pairs
-    lengths: Index
+    columns: Index  # (B,) blocks
+    pairs: Pairs  # slot by slot
+    lengths: Index  # of the slots, none longer than the one before
 
     def slots(self) -> list[slice]:
         """Slices of the pairs of each slot."""
@@ -130,32 +114,20 @@ class Closing(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A slot of nested meetings.
+    """A slot of nested meetings."""
 
-    Args:
-        part: where its pairs lie.
-        level: (n,) of the states that its pairs join; 0 is the stream's own.
-        fresh: (n,) whether an object begins its state as it is.
-        before, after: groups that end before the slot, and behind it where columns end, in rounds.
-    """
-
-    part: slice
-    level: Index
-    fresh: Mask
-    before: list[Closing]
-    after: list[Closing]
+    part: slice  # where its pairs lie
+    level: Index  # (n,) of the states that its pairs join; 0 is the stream's own
+    fresh: Mask  # (n,) whether an object begins its state as it is
+    before: list[Closing]  # groups that end before the slot, in rounds
+    after: list[Closing]  # those that end behind it where columns end
 
 
 class Nesting(NamedTuple):
-    """Nested meetings.
+    """Nested meetings."""
 
-    Args:
-        turns: slot by slot.
-        levels: how many states are needed; 1 where all pairs join the stream's own.
-    """
-
-    turns: list[Turn]
-    levels: int
+    turns: list[Turn]  # slot by slot
+    levels: int  # how many states are needed; 1 where all pairs join the stream's own
 
     def places(self, turn: Turn, blocks: int) -> Index | slice:
         """States that a turn's pairs join: level l of column i is state ``l * blocks + i``."""
@@ -170,15 +142,12 @@ class Nesting(NamedTuple):
         pair: Callable[[Turn, Index | slice], tuple[Mask, Mask]],
         group: Callable[[Index, Index, Index], tuple[Mask, Mask]],
     ) -> None:
-        """Fold pairs and groups; fill in which pairs change nothing or are hidden, and which hide the rest.
+        """Fold pairs and groups; fill in which pairs (P,) change nothing or are hidden, and which hide the
+        rest.
 
-        Args:
-            blocks: columns of the meetings.
-            shut, opened: (P,) of the pairs, filled in.
-            pair: takes a turn's pairs into states (n,); returns whether each changes nothing, and whether
-                nothing else is left.
-            group: takes states (n,) into others, as groups of these numbers end, and empties them; returns
-                the same.
+        ``pair`` takes a turn's pairs into states (n,) and returns whether each changes nothing, and whether
+        nothing else is left; ``group`` takes states into others, as groups of these numbers end, and empties
+        them.
         """
         done = []  # of groups that ended, round by round: where they join, and what came of it
 
@@ -214,10 +183,8 @@ def flat_nesting(meetings: Meetings) -> Nesting:
 
 
 def nesting(meetings: Meetings, groups: Groups) -> Nesting:
-    """Find which states the pairs of each column join.
-
-    Of a group's rows a column may meet some or none. A group that draws goes on in the state around it where
-    that is still empty, so that only those that meet something take a state of their own.
+    """Find which states pairs join: a group that draws goes on in the state around it while that is empty, so
+    that only groups that meet something take a state of their own.
     """
     if not groups.deepest:
         return flat_nesting(meetings)
@@ -305,16 +272,11 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Facts that are proved of blocks.
+    """Facts that are proved of blocks."""
 
-    Args:
-        picture: premultiplied colour and coverage (4, B).
-        shut, open: (P,) objects that change nothing in their block, and ones that hide all before them.
-    """
-
-    picture: Interval
-    shut: Mask
-    open: Mask
+    picture: Interval  # premultiplied colour and coverage (4, B)
+    shut: Mask  # (P,) objects that change nothing in their block
+    open: Mask  # (P,) ones that hide all before them
 
 
 def shown(
@@ -329,13 +291,9 @@ def shown(
 ) -> Shown:
     """Fold intervals, of a network whose state is one number and that knows one feature.
 
-    Args:
-        distance: of the pairs (P,), world units.
-        cell: of the pairs, which come last: lines (1 + L, 2, P), bias (1 + L, P), candidate and bump (1, P).
-        colours: of the pairs (3, P).
-        empty: the state before the first object.
-        slope: of coverage, per world unit.
-        joins: cells of the groups, which come last.
+    Distances (P,), world units, and colours (3, P) are of the pairs. Cells, of the pairs and of the groups,
+    come last in their arrays. ``empty`` is the state before the first object, ``slope`` that of coverage per
+    world unit.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
     state = _Learned.empty(empty, blocks * nest.levels)
@@ -364,10 +322,7 @@ def shown(
 
 
 class _Gates(NamedTuple):
-    """Gates of n operands: their cells, levels by their own distances, and slopes by the state's.
-
-    Those that are given as open have levels of infinity.
-    """
+    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's."""
 
     cell: Cell
     own: Interval
@@ -439,23 +394,15 @@ ROUNDING = 1e-6  # world units
 
 @dataclass(frozen=True, slots=True)
 class Raster:
-    """Pixels in rows of blocks, of the largest size in both directions.
+    """Pixels in rows of blocks, of the largest size in both directions."""
 
-    Args:
-        px: world units.
-        canvas: width, and rows of pixels that are wanted.
-        wide, high: pixels up to the ends of the last blocks.
-        left, top: world coordinates of the middle of the first pixel.
-        largest: side of the largest blocks, pixels.
-    """
-
-    px: float
-    canvas: tuple[int, int]
-    wide: int
+    px: float  # world units
+    canvas: tuple[int, int]  # width, and rows of pixels that are wanted
+    wide: int  # pixels up to the ends of the last blocks, and rows of them
     high: int
-    left: float
-    top: float
-    largest: int = LEVELS[0]
+    left: float  # world x of the middle of the first pixel
+    top: float  # its world y
+    largest: int = LEVELS[0]  # side of the largest blocks, pixels
 
     def place(self, block: Index, side: int) -> tuple[Index, Index]:
         """Column and row of the first pixels of blocks, numbered from the top row of them down."""
@@ -475,10 +422,7 @@ class Raster:
         return result
 
     def centres(self, place: tuple[Index, Index], side: int) -> np.ndarray:
-        """World coordinates (2, side * side, B), float32, of blocks' pixels row by row.
-
-        They are float64 up to here: at 8192 pixels float32 would move samples by a hundredth of a pixel.
-        """
+        """World coordinates (2, side * side, B) of blocks' pixels row by row, float32 only at the end."""
         result = np.empty((2, side, side, len(place[0])), np.float32)
         steps = self.px * np.arange(side)[:, None]
         result[0] = (self.left + self.px * place[0]) + steps

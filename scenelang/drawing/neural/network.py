@@ -45,23 +45,14 @@ RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones a
 
 @dataclass(frozen=True, slots=True)
 class FramedConfig:
-    """Sizes of the network.
+    """Sizes of the network."""
 
-    Args:
-        code: entries of the geometry code.
-        material_code: entries of the material code.
-        features: distance-like features F of an object at a point.
-        state: entries S of the LSTM state.
-        decoder_width: hidden units of the decoder's two layers.
-        paint_lines: lines L of which the highest opens the register's gate.
-    """
-
-    code: int = 4
-    material_code: int = 12
-    features: int = 1
-    state: int = 1
-    decoder_width: int = 32
-    paint_lines: int = 2
+    code: int = 4  # entries of the geometry code
+    material_code: int = 12  # entries of the material code
+    features: int = 1  # distance-like features F of an object at a point
+    state: int = 1  # entries S of the LSTM state
+    decoder_width: int = 32  # hidden units of the decoder's two layers
+    paint_lines: int = 2  # lines L of which the highest opens the register's gate
 
 
 class Decoder(NamedTuple):
@@ -81,10 +72,7 @@ class Cell(NamedTuple):
 
 
 class FramedNetwork:
-    """The formulas of the network, over parameters of either library.
-
-    Numpy's parameters are attributes of `FramedArrays`, torch's those of the module `Framed`.
-    """
+    """The formulas of the network, over parameters of `FramedArrays` or of torch's module `Framed`."""
 
     config: FramedConfig
     slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes
@@ -118,10 +106,7 @@ class FramedNetwork:
         return [Decoder([(self.xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
 
     def cell_weights(self) -> tuple[Array, ...]:
-        """The `Cell`, with tokens in front.
-
-        The steeper a gate, the lower its bump, so that what a blend adds shrinks as it narrows.
-        """
+        """The `Cell`, with tokens in front; the steeper a gate, the lower its bump, for narrow blends."""
         gain = self.xp.exp(self.cell_gain)
         bump = self.bump / gain[:, : self.config.state]
         lines = (self.cell_lines * gain[:, None]).swapaxes(1, 2)
@@ -133,12 +118,8 @@ class FramedNetwork:
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
     def decode(self, q: Array, radius: Array | None, scale: Array | float, decoder: Decoder) -> Array:
-        """Features (…, F, M) of leaf coordinates.
-
-        Args:
-            q: leaf coordinates (…, d, M).
-            radius: their lengths (…, 1, M), or (M,); None where none lies beyond `RADIUS`.
-            scale: world distance per leaf distance, a number or (…, 1, 1).
+        """Features (…, F, M) of leaf coordinates (…, d, M), whose lengths ``radius`` are None where none lies
+        beyond `RADIUS`; ``scale`` is the world distance per leaf distance.
         """
         if radius is None:
             return self.xp.perceptron(q, decoder.layers) * scale  # (…, F, M)
@@ -148,15 +129,9 @@ class FramedNetwork:
     def update(
         self, levels: Array, candidate: Array, bump: Array, state: Array, colour: Array, object_colour: Array
     ) -> tuple[Array, Array]:
-        """State and register behind the gates.
-
-        Args:
-            levels: of the gates before they are clamped (…, S + L, M).
-            candidate: what the state becomes where its gate is open (…, S, M).
-            bump: as in `Cell`, or (…, S, M).
-            state: (…, S, M).
-            colour: the register (…, R, M).
-            object_colour: (…, R, 1).
+        """State (…, S, M) and register (…, R, M) behind the gates, whose levels (…, S + L, M) are not yet
+        clamped; where a gate is open the state becomes ``candidate`` (…, S, M). ``bump`` is as in `Cell`, or
+        (…, S, M).
         """
         s, xp = self.config.state, self.xp
         take = levels[..., :s, :].clip(0.0, 1.0)
@@ -208,11 +183,8 @@ SIDE = 2 * RADIUS / CELLS
 
 
 class Slopes:
-    """s by place and radius.
-
-    Args:
-        slack: s (radii, CELLS, CELLS) for `RADII`, rows from the least y up.
-        far: by how much faster f may change where points may lie beyond `RADIUS`, which are seen at its rim.
+    """s by place and radius: ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, and
+    ``far``, by how much faster f may change where points may lie beyond `RADIUS`.
     """
 
     def __init__(self, slack: npt.NDArray[Any], far: float) -> None:

@@ -40,19 +40,12 @@ from scenelang.language.words import TOKENS
 
 @dataclass(frozen=True, slots=True)
 class ReadingConfig:
-    """Sizes of the network.
+    """Sizes of the network."""
 
-    Args:
-        vector: numbers D of an object.
-        hidden: entries H of both states.
-        reads: how often a pixel reads the scene.
-        octaves: frequencies L of the Fourier features, π to 2^(L - 1) π per world unit.
-    """
-
-    vector: int = 64
-    hidden: int = 128
-    reads: int = 8
-    octaves: int = 6
+    vector: int = 64  # numbers D of an object
+    hidden: int = 128  # entries H of both states
+    reads: int = 8  # how often a pixel reads the scene
+    octaves: int = 6  # frequencies L of the Fourier features, π to 2^(L - 1) π per world unit
 
 
 def fourier_features(points: Tensor, octaves: int) -> Tensor:
@@ -79,13 +72,8 @@ class Reading(nn.Module):
         self.head = nn.Linear(config.hidden, 3)
 
     def forward(self, vectors: Tensor, tokens: Tensor, points: Tensor, count: Tensor | None = None) -> Tensor:
-        """Colours (B, P, 3) at points.
-
-        Args:
-            vectors: (B, N, D).
-            tokens: (B, N), int64.
-            points: (B, P, 2), world units.
-            count: (B,) objects in use; the others are not pooled.
+        """Colours (B, P, 3) at points (B, P, 2), world units, of vectors (B, N, D) and tokens (B, N), int64;
+        of each stream ``count`` (B,) objects are in use.
         """
         b, n, _ = vectors.shape
         order = torch.arange(n, device=vectors.device, dtype=vectors.dtype) / 4
@@ -126,19 +114,12 @@ FILTERS = {2: 256, 4: 256, 8: 256, 16: 256, 32: 256, 64: 128, 128: 64, 256: 32, 
 
 @dataclass(frozen=True, slots=True)
 class StreamingConfig:
-    """Sizes of the network.
+    """Sizes of the network."""
 
-    Args:
-        vector: numbers D of an object.
-        resolution: pixels along a side, a power of two from 4 to 512.
-        width: share of the filters of Table 3; 1 is the paper's network.
-        most: filters of a level at most.
-    """
-
-    vector: int = 64
-    resolution: int = 32
-    width: float = 1.0
-    most: int = 256
+    vector: int = 64  # numbers D of an object
+    resolution: int = 32  # pixels along a side, a power of two from 4 to 512
+    width: float = 1.0  # share of the filters of Table 3; 1 is the paper's network
+    most: int = 256  # filters of a level at most
 
     def __post_init__(self) -> None:
         if self.resolution not in FILTERS or self.resolution < SMALLEST:
@@ -157,12 +138,7 @@ class StreamingConfig:
 
 
 class ConvLSTM(nn.Module):
-    """A convolutional LSTM cell without peepholes: four 5 x 5 convolutions in one.
-
-    Args:
-        inputs: channels of an object's map, tokens among them.
-        filters: channels F of state and output.
-    """
+    """A convolutional LSTM cell without peepholes, of F filters: four 5 x 5 convolutions in one."""
 
     def __init__(self, inputs: int, filters: int) -> None:
         super().__init__()
@@ -200,13 +176,7 @@ class Level(nn.Module):
         nn.init.ones_(last.bias)  # pictures are over white
 
     def states(self, maps: Tensor, marks: Tensor, count: Tensor | None = None) -> list[Tensor]:
-        """Hidden maps (B, F, R, R) after each object of a stream.
-
-        Args:
-            maps: of the objects (B, N, F, R, R).
-            marks: tokens as one of four (B, N, 4).
-            count: as `Streaming.forward` takes it.
-        """
+        """Hidden maps (B, F, R, R) after each object, from maps (B, N, F, R, R) and marks (B, N, 4)."""
         hidden = torch.zeros_like(maps[:, 0])
         cell = torch.zeros_like(hidden, dtype=marks.dtype)
         result = []
@@ -223,11 +193,7 @@ class Level(nn.Module):
 
 
 class Streaming(nn.Module):
-    """Parameters and forward pass of the streaming renderer.
-
-    Args:
-        grown: build the levels of growing too, from 4 x 4; else the last alone.
-    """
+    """Parameters and forward pass of the streaming renderer, with the levels of growing if ``grown``."""
 
     def __init__(self, config: StreamingConfig, *, grown: bool = False) -> None:
         super().__init__()
@@ -248,14 +214,11 @@ class Streaming(nn.Module):
         resolution: int | None = None,
         blend: float = 1.0,
     ) -> Tensor:
-        """Images (B, 3, R, R) of streams, row 0 at the top.
+        """Images (B, 3, R, R) of streams, row 0 at the top, of vectors (B, N, D) and tokens (B, N), int64;
+        ``count`` (B,) objects are in use, behind which the state stays as it is.
 
-        Args:
-            vectors: (B, N, D).
-            tokens: (B, N), int64.
-            count: (B,) objects in use; the state stays as it is for the padding after them.
-            resolution: draw at this level of growing instead of the last.
-            blend: share of this level's image; the rest is that of the level below, enlarged.
+        In growing, ``resolution`` is the level and ``blend`` its share of the image; the rest is the level
+        below, enlarged.
         """
         r = resolution or self.config.resolution
         steps = int(math.log2(r))
@@ -287,11 +250,7 @@ TILE = 1 << 13  # samples that `reading` answers at a time
 def draw_whole(
     network: Streaming | Reading, program: Program, *, progress: Callable[[float], None] | None = None
 ) -> Drawing:
-    """Draw a Program's objects in stream order.
-
-    Raises:
-        ProgramError: the canvas or the background is one that the network was not trained for.
-    """
+    """Draw a Program's objects in stream order; `ProgramError` for other canvases or backgrounds."""
     if program.background is None or min(program.background) < 1.0:
         raise ProgramError("this model draws on white only")
     if (program.tokens > OPERATOR).any():

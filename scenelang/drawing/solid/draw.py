@@ -53,10 +53,7 @@ class Shade(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points (3, K) where light may arrive, what they send to the eye without it, and what more with it.
-
-    The latter two are (R, K), colours and, of fields with textures, plain colours.
-    """
+    """Points (3, K) that light may reach, what they send to the eye without it, and more with it (R, K)."""
 
     p: Array
     base: Array
@@ -87,9 +84,8 @@ class Lighting:
         )
 
     def shade(self, way: Array, px: float = 0.0) -> Shade:
-        """Light along rays from the eye, whose unit directions are (3, M).
-
-        Textures are looked up four times for pixels of a side px, of a picture that is 2 wide; once for 0.
+        """Light along rays from the eye, whose unit directions are (3, M). Textures are looked up four times
+        for pixels of a side px, of a picture that is 2 wide; once for 0.
         """
         xp, stage = self.xp, self.stage
         high, limit = (way[1] * 2).clip(0.0, 1.0), self.limit(way)
@@ -127,14 +123,10 @@ class Lighting:
     def _glow(
         self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array, px: float
     ) -> tuple[Array, Work]:
-        """Light (R, M) that pieces of rays in media send towards the eye.
+        """Light (R, M) that pieces of rays in media send towards the eye, by their shares (P,) of what is
+        seen, and what nodes on them send (R, K), where light reaches them if ``free`` (K,).
 
         Those whose nodes do not tell how the light goes on between them are cut and asked again.
-
-        Args:
-            share: what pieces have of what is seen (P,).
-            light: what nodes on them send (R, K).
-            free: whether any light reaches those (K,).
         """
         xp, count, work = self.xp, self.pace.nodes, Work(met=light.shape[1])
         glow = xp.full((len(light), way.shape[1]), 0.0, way)
@@ -196,11 +188,9 @@ class Lighting:
         return points, weight.sum(0)
 
     def _lit(self, points: Points, soft: Array, seen: Trail) -> tuple[Array, Array, Work]:
-        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took.
-
-        Args:
-            soft: of the first points, 1 where they are not at a distance of 0 though something begins there.
-            seen: the trail of the rays from the eye that met the points.
+        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took. Of
+        the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there; ``seen``
+        is the eye's trail.
         """
         xp, (p, light, more) = self.xp, points
         lit = xp.where(abs(more).sum(0) > 0)
@@ -332,9 +322,8 @@ class Lighting:
         return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
     def _mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
-        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n.
-
-        What a medium gives way to, if soft, has its own plane, and its own colours there.
+        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n;
+        what a medium gives way to, if soft, has its own plane and colours there.
         """
         xp, field = self.xp, self.field
         if len(t) > PIXELS:
@@ -379,9 +368,7 @@ class Lighting:
 
     def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
         """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
-
-        Between the nodes the light goes as the polynomial through them does. What this makes of a colour is
-        summed up at many more points, which are in turn those of the pixel's samples.
+        Between nodes the light is a polynomial; it meets colours of many more points, in turn the samples'.
         """
         xp, (ray, begin, end, before) = self.xp, pieces
         gauss, count = np.polynomial.legendre.leggauss, 2 * panels
@@ -431,18 +418,8 @@ def draw_solids(
     samples: str = "adaptive",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
-    """Draw a field of solids: the picture, and what it took.
-
-    Args:
-        canvas: width and height in pixels.
-        threads: bands drawn at the same time.
-        split: bands are as high as for so many threads; by default ``threads``.
-        samples: of a pixel: ``"adaptive"``, four where something changes from pixel to pixel and one
-            elsewhere, ``"quick"``, the same at another of `PACES`, ``"four"`` or ``"one"``.
-        progress: called with the share done, from any thread.
-
-    Raises:
-        ProgramError: numbers out of all proportion, which no compiled scene has.
+    """Draw a field of solids: the picture, and what it took; arguments are those of `Run`. Raises
+    `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas
     lighting = Lighting(field, stage, PACES.get(samples, CAREFUL))
@@ -525,10 +502,7 @@ ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
 def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1) -> Outputs:
-    """Outputs of a field of solids; objects are numbered as the field has them, from 1.
-
-    Alpha is the mean of four samples where it changes from pixel to pixel, the rest is of the centre.
-    """
+    """Outputs of a field, by pixels' centres, alpha by four samples; objects are numbered from 1."""
     width, height = canvas
     lighting = Lighting(field, stage)
     result = np.empty((ROWS, height, width), np.float32)

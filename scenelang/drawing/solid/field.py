@@ -145,34 +145,22 @@ class Meeting(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Points of M rays and the objects that they meet: P pairs.
+    """Points of M rays and the objects that they meet: P pairs."""
 
-    Args:
-        places: the points (k,) that meet an object, those that meet a second, and so on; None where all do.
-            Of points in groups they are those of their states, as `Closing` has them.
-        rays: (P,), place by place.
-        objects: their numbers (P,).
-        at: where the rays begin behind the objects' maps (3, P).
-        way: how that changes along the rays (3, P).
-        closings: of the groups that end before each place, and behind the last.
-        depth: how many states a point has.
-    """
-
+    # the points (k,) that meet an object, those that meet a second, and so on; None where all do. Of points
+    # in groups they are those of their states, as `Closing` has them
     places: list[Array | None]
-    rays: Array
-    objects: Array
-    at: Array
-    way: Array
-    closings: list[list[Closing]]
-    depth: int = 1
+    rays: Array  # (P,), place by place
+    objects: Array  # their numbers (P,)
+    at: Array  # where the rays begin behind the objects' maps (3, P)
+    way: Array  # how that changes along the rays (3, P)
+    closings: list[list[Closing]]  # of the groups that end before each place, and behind the last
+    depth: int = 1  # how many states a point has
 
 
 @dataclass(slots=True)
 class States:
-    """Distances and registers of states, and optional values, as of `Meeting`.
-
-    Entries are those of M points, then, where groups are open, those of each one's second state, and so on.
-    """
+    """Distances, registers and optional values of M points, then of those in second states, and so on."""
 
     memory: Array
     slope: Array
@@ -183,14 +171,9 @@ class States:
 class SolidField:
     """A program's objects with their weights, ready to be met by points of rays.
 
-    Args:
-        network: trained parameters, on any device.
-        vectors, tokens: (N, 64) float32 and (N,), as of a Program.
-        brought, paints: elements and textures of rows, None where a row has the geometry or the colour of
-            its vector; none if left out.
-
-    Raises:
-        ProgramError: an object's vector holds no way from the world to a leaf, or an element is damaged.
+    Of rows of vectors (N, 64) and tokens (N,), ``brought`` and ``paints`` are elements and textures, None
+    where a row has the geometry or the colour of its vector. Raises `ProgramError` where a vector holds no
+    way to a leaf, or an element is damaged.
     """
 
     def __init__(
@@ -270,10 +253,7 @@ class SolidField:
         ]
 
     def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """Build the textures of objects that have one in place of a colour.
-
-        They get a plain colour too, unlike any other's, by which outlines and shadows are found.
-        """
+        """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
         xp, like = self.xp, self.network.codes
         worn = {
             i: Texture(xp, paint, frames[i], like, light=True)
@@ -386,10 +366,7 @@ class SolidField:
         return looks
 
     def _local(self, at: Array, objects: Array) -> tuple[Array, list[tuple[SolidFrame, Array, Array]]]:
-        """Leaf coordinates (3, P) of points (3, P) behind the objects' maps.
-
-        Of objects with more than a map, their frames, indices and points too.
-        """
+        """Leaf coordinates (3, P) behind the maps; for objects with more, frames, indices and points."""
         xp, q = self.xp, at
         own = [
             (frame, index, xp.take(at, index))
@@ -488,14 +465,10 @@ class SolidField:
         owners: bool = False,
         p: Array | None = None,
     ) -> Meeting:
-        """Let points of rays meet the objects.
+        """Let points of rays, by their passes or pairs, meet the objects, t (M,) along each.
 
-        Args:
-            passes: of the rays, or their pairs with the objects.
-            t: how far along each the point is (M,).
-            wanted: what of the register to answer beside the distance.
-            gradient, change, owners: what else; with owners the register says nothing.
-            p: the points themselves (3, M), where they are a little off the rays.
+        Beside the distance ``wanted`` of the register is answered; with ``owners`` the register says nothing.
+        ``p`` are the points themselves (3, M), where they are a little off the rays.
         """
         xp, count = self.xp, len(t)
         pairs = self.pairs(passes, t) if isinstance(passes, Passes) else passes

@@ -392,15 +392,10 @@ def march(
     whole: bool = False,
     steps: int = STEPS,
 ) -> Trail:
-    """Follow rays.
+    """Follow rays from an origin (3,) along unit directions (3, M) up to a limit (M,), in ``steps`` at most.
 
-    Args:
-        origin, way: of all rays (3,), and unit directions (3, M).
-        limit: how far to go (M,).
-        halvings: of the interval in which a medium gives way to a solid; none where only that it does counts.
-        gap: as of `Pace`.
-        whole: whether nobody asks where media begin and end, so that the network for segments may answer.
-        steps: of all rays at most.
+    ``halvings`` of the interval find where a medium gives way to a solid; ``gap`` is as of `Pace`. If
+    ``whole``, nobody asks where media begin and end, so that the network for segments may answer.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))

@@ -59,13 +59,10 @@ def element_box(element: Element) -> np.ndarray:
 
 
 def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """The least and the greatest coordinates (2, 3) of what lies in [-1, 1]^3, at most 0.03 too far out.
+    """The least and the greatest coordinates (2, 3) of what lies in [-1, 1]^3, at most 0.03 too far out, by
+    distances (M,) of points (3, M), which change by at most `STEEPEST` over a way of 1.
 
-    Cells are halved where something may lie in them that is not in the box of points that are known to be
-    inside.
-
-    Args:
-        distance: of points (3, M), (M,); it changes by at most `STEEPEST` over a way of 1.
+    Cells are halved where something may lie in them outside the box of points known to be inside.
     """
     centre, half = np.zeros((3, 1), np.float32), 1.0
     low, high = np.full((3, 1), np.inf, np.float32), np.full((3, 1), -np.inf, np.float32)
@@ -154,10 +151,7 @@ class SolidNetwork:
         )
 
     def cell(self, token: int, width: float) -> tuple[Cell, ...]:
-        """The cell of a token for blends of a width, with the gates of each of `Wanted`.
-
-        The fold of s d and s D is s D', so that the cell's own width is that of any other.
-        """
+        """The cell of a token for blends of a width, with each `Wanted`'s gates: s d and s D fold to s D'."""
         paint, scale = self.config.paint_lines, BLEND / width
         gain = self.xp.exp(self.cell_gain[token])[:, None]
         own, past = (line[:, None] * (gain * scale) for line in self.cell_lines[token])
@@ -167,10 +161,7 @@ class SolidNetwork:
         return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
 
     def cut(self, token: int, width: float) -> tuple[Cell, ...]:
-        """As `cell`, of a cut with an edge that is rounded over a width: a blend turned inside out.
-
-        What is left by `subtract` is -smooth(-D, d), by `intersect` -smooth(-D, -d).
-        """
+        """As `cell`, of a rounded cut: `subtract` leaves -smooth(-D, d), `intersect` -smooth(-D, -d)."""
         blend, concat = self.cell(SMOOTH, width)[Wanted.DISTANCE], self.xp.concat
         side = -1.0 if token == SUBTRACT else 1.0
         edge = Cell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
@@ -188,9 +179,8 @@ class SolidNetwork:
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
     def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
-        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M).
-
-        Of rays (5, M), as `folded` tells them, and a segment's layers: their lengths (1, M).
+        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M); of rays
+        (5, M), as `folded` tells them, and a segment's layers, their lengths (1, M).
         """
         if not gradient:
             return self.xp.smooth(q, layers)
@@ -217,13 +207,10 @@ class SolidNetwork:
         return xp.concat([value, g], 0)
 
     def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
-        """The memory behind an object, and how far the distance's gate is open (M,): the cell.
+        """The memory behind an object at distances (M,), and how far the distance's gate is open (M,).
 
-        Args:
-            d: the object's distance (M,).
-            memory: the distance so far and the register behind it (1, M), (2, M) with the medium alone, or
-                (1 + R, M) with colours before it.
-            look: the object's own register (R, 1), or (R, M).
+        Memory is the distance so far and the register behind it: (1, M), (2, M) with the medium alone, or,
+        with colours before it, (1 + R, M); ``look`` is the object's own register (R, 1), or (R, M).
         """
         xp, state = self.xp, memory[:1]
         gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
@@ -242,10 +229,7 @@ class SolidNetwork:
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
     def alone(self, reach: Array, cell: Cell) -> Array:
-        """Factors of distances (N,) of up to a reach (N,) where nothing has been met.
-
-        0 where a gate may not be open there. The cell is that of `Wanted.ALL`.
-        """
+        """Factors of distances (N,) up to a reach (N,) where nothing is met; 0 if a gate may not be open."""
         least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
         gates = (least[:1], least[1:n], least[n:])
         return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
@@ -296,10 +280,9 @@ def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tu
 
 
 def folded(xp: Arrays, q: Array, way: Array) -> Array:
-    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and the mirrors, which change no leaf.
-
-    They are the distances of its point from the axis and from the plane across it, and how fast the ray goes
-    away from the axis, about it, and away from the plane, by points and unit directions (3, M).
+    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and mirrors, which change no leaf: its
+    point's distances from the axis and from the plane across it, and how fast the ray goes away from the
+    axis, about it, and away from the plane.
     """
     rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
     a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)

@@ -264,11 +264,10 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
 def _widened(
     xp: Arrays, solids: list[Solid], frames: Sequence[SolidFrame], groups: Groups, seen: Mask
 ) -> list[Solid]:
-    """The same, of which those that intersect are met wherever they have to be.
+    """The same frames, as numpy's arrays, of which those that intersect are met wherever they have to be.
 
-    A group that is intersected with what stands before it has to be there, whatever cuts it: so what
-    intersects in it is met wherever the group may be. Elsewhere what came before ends with its ball. The
-    frames are arrays of numpy.
+    A group that is intersected with what stands before it has to be there, whatever cuts it: what intersects
+    in it is met wherever the group may be. Elsewhere what came before ends with its ball.
     """
     centres = np.array([np.asarray(xp.to_numpy(solid.centre), np.float64) for solid in solids])
     extents = np.array([solid.extent for solid in solids])[:, None]
@@ -332,12 +331,8 @@ def find_passes(
     limit: Array,
     tight: bool = True,
 ) -> tuple[Array, Passes]:
-    """Indices (k,) of rays that may meet something that draws, and the balls that these pass.
-
-    Args:
-        origin, origins: of all rays (3,), and behind the map of each object (3, N).
-        way, limit: unit directions (3, M), and where the rays end (M,).
-        tight: whether objects' boxes count too.
+    """Indices (k,) of rays that may meet something that draws, and the balls that these pass, boxes too if
+    ``tight``. Rays go from (3,), behind the objects' maps (3, N), along unit directions (3, M) up to a limit.
     """
     low, high, result = 0 * way[0], limit, []
     filled, drawn = xp.whole(low), low > 0
