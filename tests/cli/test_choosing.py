@@ -18,7 +18,7 @@ from scenelang.drawing.small import load_of
 from scenelang.output import frontier as frontier_file
 from scenelang.output.frontier import Cost
 from tests.cli.conftest import Folder
-from tests.measure.test_choose import frontier, point
+from tests.output.test_frontier import frontier, point
 
 
 def ladder() -> Frontier:
