@@ -331,11 +331,7 @@ def uses(deep: int, wide: int) -> str:
 def test_what_is_refused_before_it_is_read() -> None:
     rows: list[tuple[str | bytes, str, str]] = [
         (POINTS + "f" + " 1 2 3" * 400, ".obj", "a face of more than 1,000 corners"),
-        (
-            POINTS + "usemtl a\nusemtl b\n" * 5_001 + PLAIN,
-            ".obj",
-            "changes of material",
-        ),
+        (POINTS + "usemtl a\nusemtl b\n" * 5_001 + PLAIN, ".obj", "changes of material"),
         (POINTS + "o a\nf 1 3 2\n" * 10_001, ".obj", "more than 10,000 objects"),
         (glb(accessors=[{"count": 200_000_000, "sparse": {}}]), ".glb", "accessors of more than 40,000,000"),
         (glb(nodes=[{}] * 10_001), ".glb", "more than 10,000 nodes and primitives"),

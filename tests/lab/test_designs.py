@@ -12,12 +12,7 @@ import torch
 import scenelang as nsg
 from lab.designs.long import LongConfig, LongPhase, LongTraining, export_long, trained_model
 from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
-from lab.designs.students import (
-    LiftingConfig,
-    StreamingStudent,
-    StudentConfig,
-    make_student,
-)
+from lab.designs.students import LiftingConfig, StreamingStudent, StudentConfig, make_student
 from lab.designs.windows import draw, grid, maps, prefixes, windows
 from lab.sets.scenes import draw_scene
 from lab.training.scenes import GEOMETRIES

@@ -17,15 +17,7 @@ import scenelang as nsg
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, ParamError, Source, param_named
 from scenelang.output.animate import Progress
-from scenelang.output.sweep import (
-    MOST_SIDE,
-    Line,
-    TableError,
-    render_many,
-    rows_of,
-    values_of,
-    write_sheet,
-)
+from scenelang.output.sweep import MOST_SIDE, Line, TableError, render_many, rows_of, values_of, write_sheet
 
 TEXT = """\
 canvas(24, 16);
