@@ -24,7 +24,6 @@ from scenelang.inverse.search import Axis, Blur, Found, Knob, SearchBox, Target,
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source, rewritten
 from scenelang.language.parser import parse
-from scenelang.language.values import Vec, unpack
 
 SCENE = """\
 // where is it?
@@ -282,30 +281,19 @@ def problem(targets: dict[int, np.ndarray]) -> Together:
     return problems_of(moments, goals, space_of(evaluation), scene.canvas)[-1]
 
 
-def flat(level: float) -> np.ndarray:
-    return np.full((40, 40, 3), level)
-
-
-def test_a_target_out_of_focus_is_told_by_how_much() -> None:
-    """Whose noise is as large as the blur's error."""
-    for sigma in (0.0, 1.0, 2.0):
-        u, last = np.array([0.3]), problem({0: flat(1.0)})
-        pictures = last.pictures(u)
-        assert pictures is not None
-        seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
-        target = seen + np.random.default_rng(3).normal(0.0, 0.05, (40, 40, 3))
-        assert problem({0: target}).blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
-
-
-def test_what_is_left_is_noise_or_is_not() -> None:
-    """A blot of 3 x 3 pixels is enough."""
-    for blot, noise in ((0, True), (3, False)):
-        u, last = np.array([0.3]), problem({0: flat(1.0)})
-        pictures = last.pictures(u)
-        assert pictures is not None
-        target = pictures[0] + np.random.default_rng(3).normal(0.0, 0.03, (40, 40, 3))
+def test_blur_and_noise_are_told() -> None:
+    """Noise as large as the blur's error; a blot of 3 x 3 pixels is not noise."""
+    u, random = np.array([0.3]), np.random.default_rng(3)
+    pictures = problem({0: np.ones((40, 40, 3))}).pictures(u)
+    assert pictures is not None
+    for blot in (0, 3):
+        target = pictures[0] + random.normal(0.0, 0.03, (40, 40, 3))
         target[20 : 20 + blot, 30 : 30 + blot] = 0.5
-        assert problem({0: target}).noise(u) is noise
+        assert problem({0: target}).noise(u) is (blot == 0)
+    for sigma in (0.0, 1.0, 2.0):
+        seen = encoded(ndimage.gaussian_filter(decoded(pictures[0]), (sigma, sigma, 0), mode="nearest"))
+        target = seen + random.normal(0.0, 0.05, (40, 40, 3))
+        assert problem({0: target}).blur(pictures) == pytest.approx(sigma, abs=0.51 * sigma)
 
 
 def box(*wraps: bool) -> SearchBox:
@@ -348,15 +336,11 @@ square { scale(s); translate(x, 0); material flat { color(#000000); } }
 """
 
 
-def soft_problem(soft: bool) -> Problem:
-    source = Moment(Source(text=SourceFile("a.nsg", GROWS)).parsed(Diagnostics()))
-    white = Target(np.ones((32, 32, 3)), np.ones((32, 32)))
-    return Problem(source, space_of(source.evaluated({})[0]), white, (32, 32), soft=soft, samples="four")
-
-
 def test_covered_area_changes_as_the_square_does() -> None:
     """A square of radius s covers s² / 2 of the canvas, whose sides are 2; corners are cut a little."""
-    size, drawn = 0.2 + 0.52 * 0.6, soft_problem(True)
+    moment, size = Moment(Source(text=SourceFile("a.nsg", GROWS)).parsed(Diagnostics())), 0.2 + 0.52 * 0.6
+    white, space = Target(np.ones((32, 32, 3)), np.ones((32, 32))), space_of(moment.evaluated({})[0])
+    drawn = Problem(moment, space, white, (32, 32), soft=True, samples="four")
     low, high = (drawn.picture(np.array([0.43, 0.52 + step])) for step in (-0.02, 0.02))
     assert low is not None
     assert high is not None
@@ -384,29 +368,13 @@ def box_of(text: str = PARAMS, names: tuple[str, ...] = ()) -> SearchBox:
     return space_of(source(text).evaluated({})[0], names)
 
 
-def plain(value: object) -> object:
-    if isinstance(value, Vec):
-        return [plain(item) for item in value.items]
-    return value if isinstance(value, bool | str) else unpack(value)[0]
-
-
 def test_params_with_a_range_are_searched_unless_named() -> None:
     assert box_of().names == ("k", "a", "turn", "n", "word", "soft", "open")
     assert [axis.wraps for axis in box_of(names=("turn", "a")).axes] == [True, False]
     assert [axis.label for axis in box_of(names=("ink",)).axes] == ["ink.1", "ink.2", "ink.3"]
 
 
-def test_points_and_values_are_inverses() -> None:
-    space = box_of(names=EVERY)
-    evaluation = source().evaluated({})[0]
-    start = {knob.name: knob.value for knob in space.knobs}
-    again = space.values(space.point(start))
-    for name in EVERY:
-        slot = evaluation.context.scope.names[name].slot
-        assert plain(again[name]) == pytest.approx(plain(evaluation.context.env[slot]))
-
-
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_scene_is_written_with_what_was_found_and_nothing_else_changes(seed: int) -> None:
     rng, space = np.random.default_rng(seed), box_of(names=EVERY)
     u = rng.random(len(space.axes)) if seed else np.ones(len(space.axes))
@@ -418,9 +386,8 @@ def test_a_scene_is_written_with_what_was_found_and_nothing_else_changes(seed: i
     inks = np.array([axis.label.startswith("ink") for axis in space.axes])
     assert (gap[~inks] <= 1e-4).all()
     assert (gap[inks] <= 0.5 / 255 + 1e-9).all()
-    assert rewritten(parse(SourceFile("a.nsg", text), Diagnostics()), space.literals(space.point({}))).count(
-        "/* a number */"
-    )
+    again = parse(SourceFile("a.nsg", text), Diagnostics())
+    assert "/* a number */" in rewritten(again, space.literals(space.point({})))
     lines = zip(PARAMS.splitlines(), text.splitlines(), strict=True)
     assert [a.partition("=")[0] for a, _ in lines] == [b.partition("=")[0] for b in text.splitlines()]
     assert "deg" in literals["turn"]

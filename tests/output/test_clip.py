@@ -59,15 +59,6 @@ def test_imports_are_read_once(tmp_path: Path) -> None:
     assert tmp_path / "lib.nsg" in clip.wanted
 
 
-def test_a_mistake_in_one_frame_only() -> None:
-    clip = Clip(Source(text=SourceFile("a.nsg", HEAD + "square { scale(3 - frame); }")))
-    for frame in range(3):
-        clip.program(clip.shot(frame))
-    with pytest.raises(SceneError) as error:
-        clip.shot(3)
-    assert [d.code for d in error.value.diagnostics] == ["E0312"]
-
-
 def test_replays_see_the_place_they_stand_in() -> None:
     """A statement that stays is a mistake only beside what comes in a later frame."""
     for text in (

@@ -9,7 +9,6 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -61,35 +60,12 @@ def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
     assert moved.image.tobytes() == fresh.image.tobytes()
 
 
-def test_a_sequence(tmp_path: Path) -> None:
-    path = write(tmp_path)
-    made = nsg.animate(path, f"{tmp_path}/out/", size=SMALL, frames="1..3", threads=1)
-    assert [file.name for file in made.files] == ["a-0001.png", "a-0002.png", "a-0003.png"]
-    assert left(tmp_path) == ["out"]
-    assert sorted(os.listdir(tmp_path / "out")) == ["a-0001.png", "a-0002.png", "a-0003.png"]
-    for frame, file in zip(range(1, 4), made.files, strict=True):
-        scene = nsg.load(path, frame=frame).model_copy(update={"canvas": SMALL})
-        with Image.open(file) as image:
-            exact = nsg.render(scene, threads=1, device="cpu").to_uint8()
-            np.testing.assert_array_equal(np.asarray(image), exact)
-
-
 def test_equal_frames_are_drawn_once(tmp_path: Path) -> None:
     path = write(tmp_path, HEAD + DARK + "square { scale(frame % 3 == 1 ? 0.5 : 0.3); }")
     made = nsg.animate(path, tmp_path / "%d.png", size=SMALL)
     assert (made.frames, made.drawn) == (6, 2)
     data = [file.read_bytes() for file in made.files]
     assert data[0] == data[2] == data[3] == data[5] != data[1] == data[4]
-
-
-def test_other_processes_draw_the_same(tmp_path: Path) -> None:
-    path = write(tmp_path)
-    one = nsg.animate(path, tmp_path / "one-%d.png", size=SMALL, jobs=1)
-    two = nsg.animate(path, tmp_path / "two-%d.png", size=SMALL, jobs=2)
-    assert (one.jobs, two.jobs) == (1, 2)
-    for a, b in zip(one.files, two.files, strict=True):
-        assert a.read_bytes() == b.read_bytes()
-    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
 
 
 def test_other_processes_that_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

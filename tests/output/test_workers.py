@@ -335,24 +335,6 @@ def test_the_file_is_the_one_without_workers(
     assert Path("two.safetensors").read_bytes() == whole
 
 
-def test_errors_are_of_their_files_alone(folder: Path, address: str) -> None:
-    Path("bad.ply").write_text("no mesh")
-    Path("skin.png").unlink()
-    said: list[list[str]] = []
-    for where in (None, address):
-        said.append([])
-        with pytest.raises(nsg.FitError) as caught:
-            nsg.learn(
-                ["bad.ply", "gone.svg", "tent.obj"], f"{where is None}.safetensors",
-                steps=1, cluster=where, say=said[-1].append,
-            )  # fmt: skip
-        said[-1].append(str(caught.value))
-    assert sorted(said[0]) == sorted(said[1])
-    assert re.fullmatch(r"bad\.ply: damaged or not a mesh.*\ngone\.svg: no such file.*", said[1][-1])
-    assert any("`skin.png` not found beside it" in line for line in said[1])
-    assert Path("True.safetensors").read_bytes() == Path("False.safetensors").read_bytes()
-
-
 def backwards(
     address: str, function: Callable[..., Any], items: Iterable[tuple[int, Any]], libraries: tuple[str, ...]
 ) -> Iterator[tuple[int, Callable[[], Any]]]:
