@@ -235,15 +235,6 @@ def test_parts_lie_where_they_were_and_copies_share_a_shape(car: bytes) -> None:
     assert {part.color for part in found.group} == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
 
 
-def test_without_parts_the_whole_is_a_group_of_its_own(car: bytes) -> None:
-    solids, _ = read_solids(car, ".glb", {})
-    found = originals.solid_parts(solids, "car", "auto", False)
-    assert list(found.shapes) == ["car"]
-    assert found.group == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)  # of two colours
-    plain = originals.solid_parts([solid._replace(look=None) for solid in solids], "car", "auto", False)
-    assert plain.group == ()
-
-
 def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> None:
     (tmp_path / "car.glb").write_bytes(car)
     out = tmp_path / "zoo.safetensors"

@@ -69,9 +69,6 @@ def test_a_scene_covers_what_its_objects_do() -> None:
     ]
 
 
-KINDS = ("ggve", "gve11")
-
-
 def answered(numbers: list[Floats], p: Floats) -> Floats:
     """Distances (P,) at points (2, P), unit by unit."""
     w1, b1, w2, b2, w3, b3 = numbers

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import subprocess
+import weakref
+import zlib
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,28 +46,11 @@ def stripes(step: int, alpha: bool = False) -> Pixels:
     return np.dstack([pixels, cover])
 
 
-def noise(step: int) -> Pixels:
-    """More colours than a palette holds."""
-    return np.random.default_rng(step).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
-
-
-def gradient(step: int) -> Pixels:
-    """Smooth colours, 512 a picture, which move."""
-    x = np.arange(64)[None, :] * 4
-    y = np.arange(48)[:, None] * 5
-    return np.dstack([(x + 0 * y + 2 * step) % 256, (y + 0 * x) % 256, 128 + 0 * x + 0 * y]).astype(np.uint8)
-
-
 def film(folder: Path, pictures: list[Pixels], fps: float = 10, loop: bool = True) -> Film:
     """A film of pictures; equal ones share a file, as in the store."""
-    files: list[Path] = []
-    known: dict[bytes, Path] = {}
-    for index, picture in enumerate(pictures):
-        data = picture.tobytes()
-        if data not in known:
-            known[data] = folder / f"{index}.png"
-            Image.fromarray(picture).save(known[data])
-        files.append(known[data])
+    files = [folder / f"{zlib.crc32(picture.tobytes())}.png" for picture in pictures]
+    for file, picture in dict(zip(files, pictures, strict=True)).items():
+        Image.fromarray(picture).save(file)
     height, width, channels = pictures[0].shape
     return Film(files, fps, loop, (width, height), channels == 4)
 
@@ -103,7 +89,9 @@ def test_gif_is_exact_where_the_colours_fit(tmp_path: Path) -> None:
 
 def test_gif_of_many_colours(tmp_path: Path) -> None:
     """One palette for all is near to all; dithering makes means nearer still, pixels not."""
-    pictures = [gradient(step) for step in range(8)]
+    y, x = np.mgrid[:48, :64]
+    moving = [np.dstack([(4 * x + 2 * step) % 256, 5 * y, 0 * x + 128]) for step in range(8)]
+    pictures = [picture.astype(np.uint8) for picture in moving]  # smooth, of 3,072 colours each
     made = film(tmp_path, pictures)
     off = {}
     for dither in (False, True):
@@ -200,25 +188,17 @@ def test_webp_is_exact(tmp_path: Path, alpha: bool) -> None:
 
 def test_frames_are_read_one_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No encoder holds more than the two frames that it compares."""
-    import weakref
-
-    alive = most = 0
-    read = Film.read
+    most, read, refs = 0, Film.read, list[Any]()
 
     class Held(np.ndarray):  # type: ignore[type-arg]
         pass
 
     def watched(self: Film, file: Path) -> Pixels:
-        nonlocal alive, most
+        nonlocal most
         pixels = read(self, file).view(Held)
-        alive += 1
-        most = max(most, alive)
-        weakref.finalize(pixels, gone)
+        refs.append(weakref.ref(pixels))
+        most = max(most, sum(ref() is not None for ref in refs))
         return pixels
-
-    def gone() -> None:
-        nonlocal alive
-        alive -= 1
 
     monkeypatch.setattr(Film, "read", watched)
     made = film(tmp_path, [stripes(step % 11) for step in range(30)])

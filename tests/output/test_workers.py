@@ -79,11 +79,14 @@ distributed = pytest.importorskip("distributed")
 MOVING = HEAD + DARK + "canvas(24, 16); sphere { scale(0.6); } torus { rotate(0.2turn * u); }"
 
 
+def write(folder: Path, text: str) -> Path:
+    (folder / "a.nsg").write_text(text)
+    return folder / "a.nsg"
+
+
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    path = tmp_path / "a.nsg"
-    path.write_text(MOVING)
-    return path
+    return write(tmp_path, MOVING)
 
 
 def same(one: list[Path], two: list[Path]) -> bool:
@@ -101,8 +104,7 @@ def test_workers_draw_the_same_bytes(scene: Path, tmp_path: Path, address: str) 
 
 
 def test_outputs_and_bad_rows(tmp_path: Path, address: str) -> None:
-    path = tmp_path / "a.nsg"
-    path.write_text(SOLIDS)
+    path = write(tmp_path, SOLIDS)
     asked: dict[str, Any] = {"values": [{"x": 0.1}, {"x": 9}, {"x": -0.3}], "outputs": ("depth", "object")}
     one = nsg.render_many(path, tmp_path / "one", **asked)
     two = nsg.render_many(path, tmp_path / "two", **asked, cluster=address)
@@ -143,22 +145,20 @@ def at_half(act: Callable[[], object]) -> Callable[[Progress], None]:
     return report
 
 
-LARGE = "canvas(128, 128); param k = 0.5 in 0..1; smooth { star { twirl(k); } square { scale(0.5); } }"
+LARGE = "canvas(256, 256); param k = 0.5 in 0..1; smooth { star { twirl(k); } square { scale(0.5); } }"
 
 
 @pytest.mark.slow
 def test_a_worker_that_is_killed(tmp_path: Path) -> None:
-    path = tmp_path / "a.nsg"
-    path.write_text(LARGE)
-    asked: dict[str, Any] = {"grid": {"k": "../16"}}
+    path, grid = write(tmp_path, LARGE), {"k": "../16"}
     with started(tmp_path, 2) as (address, _):
         client = distributed.Client(address, set_as_default=False)
         first, *_ = client.run(os.getpid).values()
         kill = at_half(lambda: os.kill(first, signal.SIGKILL))
-        made = nsg.render_many(path, tmp_path / "out", **asked, cluster=address, progress=kill)
+        made = nsg.render_many(path, tmp_path / "out", grid=grid, cluster=address, progress=kill)
         assert len(client.scheduler_info()["workers"]) == 1
         client.close()
-    alone = nsg.render_many(path, tmp_path / "alone", **asked)
+    alone = nsg.render_many(path, tmp_path / "alone", grid=grid)
     assert made.made.drawn == 16
     assert same(alone.made.files, made.made.files)
 
@@ -166,17 +166,15 @@ def test_a_worker_that_is_killed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away(tmp_path: Path) -> None:
     """What is done stays; the same call, without a cluster this time, draws the rest."""
-    path = tmp_path / "a.nsg"
-    path.write_text(LARGE)
-    asked: dict[str, Any] = {"grid": {"k": "../16"}}
+    path, grid = write(tmp_path, LARGE), {"k": "../16"}
     with (
         started(tmp_path, 1) as (address, (scheduler, *_)),
         pytest.raises(nsg.RenderError, match="is gone; the same command goes on"),
     ):
-        nsg.render_many(path, tmp_path / "out", **asked, cluster=address, progress=at_half(scheduler.kill))
-    made = nsg.render_many(path, tmp_path / "out", **asked)
+        nsg.render_many(path, tmp_path / "out", grid=grid, cluster=address, progress=at_half(scheduler.kill))
+    made = nsg.render_many(path, tmp_path / "out", grid=grid)
     assert 8 <= made.made.resumed < 16
-    alone = nsg.render_many(path, tmp_path / "alone", **asked)
+    alone = nsg.render_many(path, tmp_path / "alone", grid=grid)
     assert same(alone.made.files, made.made.files)
 
 
@@ -258,7 +256,7 @@ def certificate(folder: Path, name: str) -> dict[str, str]:
 def test_only_who_has_the_certificate_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import dask
 
-    (tmp_path / "a.nsg").write_text(SCENE)
+    write(tmp_path, SCENE)
     variables, others = certificate(tmp_path, "ours"), certificate(tmp_path, "others")
     with started(tmp_path, 1, **variables) as (address, _):
         assert address.startswith("tls://127.0.0.1:")
