@@ -40,13 +40,8 @@ def fit_colours(
 ) -> Element:
     """Fit the smallest grid that gives a mesh the look in its file, or the best of at most `MOST_BYTES`.
 
-    Args:
-        mesh: with a look.
-        max_error: root mean square of channels off at the surface, 0 to 1; `NEAR` if left out.
-        budget_s: no further grid is begun after so many seconds.
-        steps: how many are tried at most, whatever the time.
-        about: what the element says of itself, beside its error.
-        report: called for each grid with nodes along an axis, bytes, and root mean square of channels off.
+    Errors are root mean squares of channels off at the surface, 0 to 1. No further grid is begun after so
+    many seconds or ``steps``. ``report`` is called with nodes along an axis, bytes and the error of each.
     """
     assert mesh.look is not None
     started, asked = time.monotonic(), max_error or NEAR

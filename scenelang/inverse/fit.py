@@ -65,12 +65,11 @@ def problems_of(
 
     def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
-        return Together(
-            [
-                Problem(each, space, goal, size, light=solid, soft=soft, samples=samples, levels=levels)
-                for each, goal in zip(moments, goals, strict=True)
-            ]
+        parts = (
+            Problem(each, space, goal, size, light=solid, soft=soft, samples=samples, levels=levels)
+            for each, goal in zip(moments, goals, strict=True)
         )
+        return Together(tuple(parts))
 
     result = [
         compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
@@ -86,9 +85,8 @@ def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]
         raise SceneError(moment.trouble)
     manifest = load_manifest(program.model)
     if manifest.renderer not in ("framed", "solid"):
-        raise FitError(
-            f"model `{manifest.name}` draws pictures of one size only, and fitting needs small ones"
-        )
+        fact = f"model `{manifest.name}` draws pictures of one size only"
+        raise FitError(f"{fact}, and fitting needs small ones")
     return manifest.renderer == "solid"
 
 
@@ -97,12 +95,7 @@ ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the err
 
 
 class Lens:
-    """Blur of a target, fitted with the values as one more number of the search.
-
-    Args:
-        problem: of the last size.
-        until: no descent starts after this time of `time.monotonic`.
-    """
+    """Blur of a target, fitted with the values as one more number of the search of the last size."""
 
     def __init__(self, problem: Together, space: SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
@@ -135,10 +128,8 @@ class Lens:
         best = place, Blur()
         if not sigma:
             return best
-        wide, start = (
-            SearchBox(self.space.knobs, Axis("blur", 0.0, WIDEST)),
-            np.append(place.point, sigma / WIDEST),
-        )
+        wide = SearchBox(self.space.knobs, Axis("blur", 0.0, WIDEST))
+        start = np.append(place.point, sigma / WIDEST)
         for light in ways:
             if time.monotonic() > self.until:
                 break

@@ -65,12 +65,9 @@ class _Parts(NamedTuple):
 
 
 class SoftPlane:
-    """Soft picture of a Program of the plane as a function of its numbers.
+    """Soft picture of a Program of the plane, without elements and textures, as a function of its numbers.
 
-    Args:
-        program: gives tokens and shapes; no object is an element or has a texture.
-        under: sRGB-encoded, behind what is transparent.
-        dtype: type of all computations.
+    The colour ``under`` is sRGB-encoded, behind what is transparent.
     """
 
     def __init__(
@@ -236,9 +233,6 @@ class Rates:
         """Derivatives (K, n) at a point, in shares of ranges, and of which axes (n,) they are known.
 
         Those of choices are not, nor those of axes along which objects come or go.
-
-        Args:
-            here: the point's Program.
         """
         base = numbers_of(here)
         result, known = np.zeros((len(base), len(u))), np.zeros(len(u), bool)

@@ -27,13 +27,9 @@ Corner = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 
 
 def corners(points: Points, side: int) -> list[Corner]:
-    """Nodes around points (M, d) of a grid over [-1, 1]^d, and their linear weights.
+    """Indices (M,) of flattened nodes and their linear weights (M,), for each corner of a point's cell.
 
-    Args:
-        side: nodes along an axis.
-
-    Returns:
-        Indices (M,) of flattened nodes and their weights (M,), for each corner of a cell.
+    The points are (M, d), the grid of ``side`` nodes along an axis is over [-1, 1]^d.
     """
     d = points.shape[1]
     place = (points + 1) * ((side - 1) / 2)
@@ -134,16 +130,11 @@ def fit(
     report: Callable[[Rung], None] = lambda rung: None,
     progress: Callable[[int, float], None] = lambda side, share: None,
 ) -> tuple[Element, list[Rung]]:
-    """The smallest element whose mean error is at most ``max_error``, or the nearest that was tried.
+    """The smallest element whose mean error, in leaf units, is at most asked, or the nearest that was tried.
 
-    Args:
-        max_error: in leaf units; `NEAR` if left out.
-        budget_s: no further pyramid is begun after so many seconds; one is tried in any case. Nor is one,
-            without ``steps``, that may end after `LONG_S` of processor time.
-        steps: how many are tried at most, whatever the time; the same number gives the same bytes.
-        about: facts of the element besides its figures.
-        report: called with each that was tried.
-        progress: called with nodes along an axis of what grows, and the share of it that is done.
+    No further pyramid is begun after so many seconds or ``steps``; the same number of steps gives the same
+    bytes. Without ``steps``, none is begun that may end after `LONG_S` of processor time. ``progress`` is
+    called with nodes along an axis of what grows, and the share of it that is done.
     """
     started, worked, spent = time.monotonic(), time.process_time(), 0.0
     long_s = max(LONG_S, budget_s) if budget_s < np.inf else LONG_S
@@ -184,11 +175,7 @@ def fit(
 
 
 def measured(element: Element, points: Points, normals: Points, thin: float = 0.0) -> Rung:
-    """Measure an element at points (M, d) of the true surface and their normals.
-
-    Args:
-        thin: share of the surface that is too thin for any grid, and has no points here.
-    """
+    """Measure an element at points (M, d) of a surface, of which a share ``thin`` has no points here."""
     grid = unpacked(element)
     drawn = GridShape(NUMPY, grid.reshape(-1), len(grid), grid.ndim)
     off, *slope = drawn.field(np.ascontiguousarray(points.T, np.float32), gradient=True)

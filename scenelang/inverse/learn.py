@@ -104,20 +104,14 @@ class _Job(NamedTuple):
     @property
     def terms(self) -> dict[str, Any]:
         """Arguments of the fitting functions."""
-        return {
-            "budget_s": self.end_s - time.monotonic(),
-            "steps": self.options.steps,
-            "about": self.about,
-        }
+        return {"budget_s": self.end_s - time.monotonic(), "steps": self.options.steps, "about": self.about}
 
 
 def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> bytes:
     """Make the elements of an original's bytes in the sandbox; returns the bytes of their file.
 
-    Args:
-        request: the ``suffix``, the ``name`` of the element, its facts (``about``), the ``options``, and
-            bytes of the ``files`` that the original names.
-        tell: called with ``say`` and a line, or with ``progress`` and its arguments.
+    The request has ``suffix``, ``name``, facts (``about``), ``options`` and bytes of the ``files`` that the
+    original names. ``tell`` is called with ``say`` and a line, or with ``progress`` and its arguments.
     """
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
@@ -148,7 +142,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
     def report(rung: Rung) -> None:
         job.say(
             f"  {rung.side:>4} a side {rung.bytes:>8,} bytes  error {rung.error:.5f}  "
-            f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°",
+            f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°"
         )
 
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
@@ -223,13 +217,10 @@ def learn_files(
     say: Callable[[str], None] = lambda line: None,
     progress: Progress = lambda what, done, total: None,
 ) -> list[Element]:
-    """Make files elements of the file ``out``, beside those that it holds.
+    """Make files elements of the file ``out``, beside those that it holds; called as `learn` is.
 
     The file is written after each element, whole or not at all. An element that it already holds of the same
     original and options is not made again. So the same call continues work that was interrupted.
-
-    Arguments and errors are those of `scenelang.learn`; ``progress`` is called with what is done, how much of
-    it, and all.
     """
     names = names_of(files, options, name)
     first = held = _writable(out)
@@ -335,7 +326,6 @@ def _writable(out: str | os.PathLike[str]) -> Zoo:
 
 
 def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
-    """Elements by their name and whether they are materials."""
     return {(element.name, element.material): element for element in zoo.elements}
 
 

@@ -42,7 +42,6 @@ class Moment(Record, frozen=False):
 
     @property
     def tree(self) -> tree.File:
-        """The parsed file."""
         assert self.source.tree is not None
         return self.source.tree
 
@@ -67,14 +66,11 @@ class Moment(Record, frozen=False):
 
 
 class Problem:
-    """Residuals of pictures of one size against the target.
+    """Residuals of pictures of one size (width, height) against the target.
 
-    Args:
-        canvas: width and height of the pictures.
-        light: true where pixels are means of linear light, as those of solids are.
-        soft: true gives outlines of the plane the width of a pixel; else they are sharp.
-        samples: samples of a pixel, as in `scenelang.render`; soft pictures take one.
-        levels: levels of the pyramid; 1 compares pixels alone, more also sense outlines that do not overlap.
+    With ``light`` pixels are means of linear light, as those of solids are. ``soft`` outlines of the plane
+    are as wide as a pixel, and take one sample. One level of the pyramid compares pixels alone; more also
+    sense outlines that do not overlap.
     """
 
     def __init__(
@@ -179,7 +175,6 @@ class Together:
         return None if result is None else self.residuals(result, self.parts[0].levels)
 
     def pixels(self, u: Point) -> Point | None:
-        """Residuals of pixels alone."""
         result = self.pictures(u)
         return None if result is None else self.residuals(result)
 
@@ -241,8 +236,7 @@ class Together:
         return result
 
     @property
-    def frames(self) -> int:
-        """Pictures that were drawn so far."""
+    def frames(self) -> int:  # drawn so far
         return sum(part.frames for part in self.parts)
 
 

@@ -34,16 +34,10 @@ sys.path[:] = json.loads(sys.argv[1])
 from scenelang.inverse import learn, sandbox
 sandbox.serve(learn.make)
 """
-_REFUSED: Final = (
-    "socket.connect",
-    "socket.getaddrinfo",
-    "socket.sendto",
-    "subprocess.",
-    "os.system",
-    "os.exec",
-)
+_SENDS: Final = ("socket.connect", "socket.getaddrinfo", "socket.sendto")
+_REFUSED: Final = (*_SENDS, "subprocess.", "os.system", "os.exec")
+# packages that make elements besides ours; other versions may give other bytes
 LIBRARIES: Final = ("contourpy", "libigl", "pillow", "scipy", "svgelements", "trimesh")
-"""Packages that make elements besides ours; other versions may give other bytes."""
 Hear = Callable[..., None]
 Asked = tuple[dict[str, Any], bytes]  # a request, and the bytes that it is about
 
@@ -63,14 +57,10 @@ class SandboxProcess:
             self._end()
 
     def __call__(self, request: Mapping[str, Any], data: bytes, hear: Mapping[str, Hear]) -> bytes:
-        """Send a request and bytes to the process; returns the bytes that it makes of them.
+        """Send a request, JSON but for bytes by name in ``files``; returns the bytes that are made of it.
 
-        Args:
-            request: JSON data; its ``cpu_s`` is the most processor time, and its ``files`` are bytes by name.
-            hear: functions that are called with the reports meanwhile, by the first word of a report.
-
-        Raises:
-            FitError: it cannot be made or takes more memory or time, or a library has failed.
+        ``hear`` has functions for the reports meanwhile, by their first word. Raises `FitError` where nothing
+        can be made, it takes more memory than allowed or processor time than ``cpu_s``, or a library fails.
         """
         if self._process is None:
             self._process = subprocess.Popen(

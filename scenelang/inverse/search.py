@@ -42,12 +42,7 @@ MOST_AXES: Final = 64
 
 
 class SearchBox:
-    """Box of the values of some params.
-
-    Args:
-        knobs: the params.
-        others: axes that belong to no param, behind theirs.
-    """
+    """Box of the values of some params, and of other axes behind theirs."""
 
     def __init__(self, knobs: Sequence[Knob], *others: Axis) -> None:
         self.knobs = tuple(knobs)
@@ -77,7 +72,6 @@ class SearchBox:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the params."""
         return tuple(knob.name for knob in self.knobs)
 
     def literals(self, u: Point) -> dict[str, str]:
@@ -86,7 +80,6 @@ class SearchBox:
         return {knob.name: written(knob, values[knob.name]) for knob in self.knobs}
 
     def point(self, values: Mapping[str, Any]) -> Point:
-        """The point of values."""
         result: list[float] = []
         for knob in self.knobs:
             value = values.get(knob.name, knob.value)
@@ -110,11 +103,7 @@ def _plain(value: Any) -> Any:
 
 
 def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> SearchBox:
-    """The box of a scene's params: those of ``names``, or all that have a range, without those of ``fixed``.
-
-    Raises:
-        FitError: there is no such param, or it has no values to search among.
-    """
+    """The box of params: those of ``names``, or all with a range, without ``fixed``; raises `FitError`."""
     try:
         named = [param_named(evaluation, name) for name in dict.fromkeys(names)]
         chosen = named or [stmt for stmt in params_of(evaluation).values() if stmt.range is not None]
@@ -132,8 +121,7 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
 
 
 Picture = npt.NDArray[np.float64]
-Given = npt.NDArray[np.floating] | str | os.PathLike[str]
-"""A picture as an argument."""
+Given = npt.NDArray[np.floating] | str | os.PathLike[str]  # a picture as an argument
 MOST_BYTES: Final = 64 << 20
 _ASPECT: Final = 0.02  # most relative difference of aspects, beyond which a picture shows another part
 WHITE: Final = (1.0, 1.0, 1.0)
@@ -178,11 +166,7 @@ class Blur(NamedTuple):
 
 
 def blurred(picture: Picture, blur: Blur, finer: int = 1) -> Picture:
-    """A picture (H, W, 3) after a blur, with its edges repeated outwards.
-
-    Args:
-        picture: of ``finer`` times as many pixels along each side as the result, which has their means.
-    """
+    """A picture (H, W, 3) after a blur, with its edges repeated; one pixel is the mean of ``finer`` ** 2."""
     sigma = blur.sigma * finer
     if sigma <= 0.0 and finer == 1:
         return picture
@@ -205,12 +189,7 @@ def target_of(
     crop: tuple[int, int, int, int] | None = None,
     under: tuple[float, float, float] = WHITE,
 ) -> Target:
-    """A target for scenes of a canvas; arguments and errors are those of `scenelang.fit`.
-
-    Args:
-        canvas: width and height of the scene, whose aspect the picture needs.
-        under: the colour behind what is transparent.
-    """
+    """A target for scenes of a canvas (width, height); arguments and errors are those of `scenelang.fit`."""
     result = over(_read(picture), under)
     weights = np.ones(result.shape[:2]) if mask is None else over(_read(mask), (0.0, 0.0, 0.0)).mean(2)
     if weights.shape != result.shape[:2]:
@@ -307,17 +286,13 @@ def slopes(
     free: npt.NDArray[np.bool_],
     fine: bool = False,
 ) -> Matrix:
-    """Derivatives (R, n) of residuals, by differences or reverse passes; columns of axes that are not free 0.
+    """Derivatives (R, n) of residuals (``at`` u), by differences or reverse passes; 0 of axes not free.
 
-    Args:
-        at: the residuals at u.
-        step: in shares of a range; away from an end.
-        fine: true takes central differences of `FINE` of the step.
+    The step is in shares of a range, away from an end; ``fine`` takes central differences of `FINE` of it.
     """
     result = np.zeros((len(at), len(u)))
-    by_passes = getattr(
-        residuals, "slopes", None
-    )  # (R, n), and a mask (n,) of the axes that it knows; or None
+    # gives (R, n), and a mask (n,) of the axes that it knows; or None
+    by_passes = getattr(residuals, "slopes", None)
     if np.count_nonzero(free) >= MANY and by_passes is not None and (exact := by_passes(u)) is not None:
         result, free = exact[0], free & ~exact[1]
     if fine and free.any() and (better := central(residuals, space, u, step * FINE, free)) is not None:
@@ -360,13 +335,10 @@ def descend(
     fine: bool = False,
     enough: float = _ENOUGH,
 ) -> Found | None:
-    """Follow the continuous axes down from a point; None where that has no picture.
+    """Follow the continuous axes down from a point, ``most`` steps; None where that has no picture.
 
-    Args:
-        step: of differences, in shares of a range.
-        most: number of steps at most.
-        fine: take central differences: twice the pictures, but they follow a narrow valley that others lose.
-        enough: least relative gain of a step; the first with less is the last.
+    Differences take a ``step`` in shares of a range; ``fine`` ones are central: twice the pictures, but they
+    follow a narrow valley that others lose. The first step of less relative gain than ``enough`` is the last.
     """
     at = residuals(u)
     if at is None:
@@ -457,12 +429,7 @@ def scanned(coarse: Residuals, space: SearchBox, known: Found) -> list[Found]:
 def look(
     coarse: Residuals, space: SearchBox, known: Sequence[Found], seed: int, until: float, report: Report
 ) -> list[Found]:
-    """Look around in small pictures and descend from the best places.
-
-    Args:
-        known: the start, of infinite cost, or the results of earlier rounds.
-        seed, until, report: as of `solve`.
-    """
+    """Look around in small pictures and descend from the best places, some of which may be known."""
     places = [*(one.point for one in known), *spread(space, LOOKS * (len(space.axes) + 1), seed)]
     seen: list[Found] = []
     for at, u in enumerate(places):
@@ -495,20 +462,12 @@ def solve(
     noise: Callable[[Found], bool] = lambda place: False,
     report: Report = lambda what, done, count: None,
 ) -> tuple[list[Found], bool]:
-    """Places with the nearest pictures, the best first.
+    """Distinct places with the nearest pictures, the best first, and whether the search converged by itself.
 
     Each round looks around, follows the best places down in the smallest pictures, and the best of these
-    through larger ones. It ends when a picture is near enough, when nothing but noise is left, or when a
-    round or two found none nearer.
-
-    Args:
-        problems: residuals at sizes from small to large, those of the last by pixels alone.
-        until: no new descent is begun after this time, as of `time.monotonic`.
-        near: sum of squares that is near enough.
-        noise: returns whether only noise is left at a place of the last size, so that none is nearer.
-
-    Returns:
-        Distinct places, none where no place has a picture, and whether the search converged by itself.
+    through larger ones. It ends when a picture is near enough (``near``, a sum of squares), when nothing but
+    ``noise`` is left, or when a round or two found none nearer. No descent is begun after the time ``until``.
+    ``problems`` are residuals at sizes from small to large, those of the last by pixels alone.
     """
     coarse, best, idle = problems[0], math.inf, 0
     low: list[Found] = []  # that came near in the smallest pictures

@@ -20,15 +20,7 @@ from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
-from scenelang.output.frames import (
-    Clip,
-    Film,
-    FrameRange,
-    Store,
-    Target,
-    find_target,
-    put_frame,
-)
+from scenelang.output.frames import Clip, Film, FrameRange, Store, Target, find_target, put_frame
 from scenelang.output.painting import Cluster, Drawable, Errand, Painter, Workers
 
 if TYPE_CHECKING:
@@ -64,8 +56,8 @@ class Progress:
 class RenderResult:
     """An animation that was written."""
 
-    files: list[Path]  # in order
-    frames: int  # number of frames
+    files: list[Path]
+    frames: int
     drawn: int = 0  # pictures that were drawn now; equal frames are drawn once
     resumed: int = 0  # pictures of a previous run, which was interrupted
     compile_s: float = 0.0  # time to evaluate and compile all frames
@@ -103,14 +95,9 @@ def make(
 ) -> RenderResult:
     """Draw frames and write them whole: nothing is put in place before all of it is there.
 
-    Drawn frames are cached in `Target.work`. If the run is interrupted, they stay there, and the same call
-    continues with those that are missing.
-
-    Args:
-        jobs, cluster, palette, dither, progress: as for `animate`, which raises the same.
-        strict: count warnings as errors.
-        beside: called with each frame before it is drawn; gives the further files of a sequence.
-        failed: called with a frame that has errors and is left out; by default such a frame ends the run.
+    Drawn frames are cached in `Target.work`: if the run is interrupted, the same call continues. Arguments
+    and errors are those of `animate`; ``strict`` counts warnings as errors, ``beside`` gives the further
+    files of a frame before it is drawn, and without ``failed`` a frame with errors ends the run.
     """
     place = output_place(target.path)
     if target.kind == "video":

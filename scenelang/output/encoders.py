@@ -51,10 +51,8 @@ def write_gif(
 ) -> None:
     """Encode a film; in transparent frames, pixels of less than half coverage are left out.
 
-    Args:
-        palette: ``"global"`` has one for all frames, ``"frame"`` one for each. ``"auto"`` takes the one
-            that is exact, and a global one where neither is, as it keeps still parts still.
-        dither: diffuse the errors of a palette over neighbouring pixels.
+    There is a palette for all frames, or one for each; ``"auto"`` takes the one that is exact, and a global
+    one where neither is, as it keeps still parts still. Dithering diffuses its errors over neighbours.
     """
     lengths = delays(len(film.files), film.fps, PER_SECOND, SHORTEST)
     most = 256 - 1  # one index is for pixels that are transparent or unchanged
@@ -126,9 +124,6 @@ def _frame(
             return now
         if not film.alpha:
             part = np.full((1, 1), clear, np.uint8)
-
-
-# ---------------------------------------------------------------- colours
 
 
 def packed(pixels: Pixels) -> npt.NDArray[np.uint32]:
@@ -343,8 +338,7 @@ def find_ffmpeg() -> str:
 
 @lru_cache(maxsize=1)
 def _encoders(ffmpeg: str) -> frozenset[str]:
-    command = [ffmpeg, "-hide_banner", "-encoders"]
-    done = run(command, capture_output=True, check=False, stdin=DEVNULL)
+    done = run([ffmpeg, "-hide_banner", "-encoders"], capture_output=True, check=False, stdin=DEVNULL)
     lines = done.stdout.decode(errors="replace").splitlines()
     return frozenset(words[1] for line in lines if len(words := line.split()) > 1)
 

@@ -118,8 +118,7 @@ Kind = Literal["sequence", "gif", "webp", "apng", "video"]
 
 _VIDEO: Final[dict[str, Kind]] = dict.fromkeys((".mp4", ".m4v", ".mov", ".mkv", ".webm"), "video")
 ENCODED: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
-PICTURES: Final = frozenset({".gif", ".webp", ".apng"})
-"""Suffixes of animations that hold a single picture as well."""
+PICTURES: Final = frozenset({".gif", ".webp", ".apng"})  # hold a single picture as well
 _NUMBER: Final = re.compile(r"%(0?\d{0,2})d")
 
 
@@ -175,9 +174,8 @@ def find_target(out: str, stem: str = "frame") -> Target:
     if is_pattern(out):
         bare = path.name.replace("%%", "")
         if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
-            raise TargetError(
-                f"`{path.name}` has more than one place for a number, or a stray `%` (write %%)"
-            )
+            fact = "has more than one place for a number, or a stray `%` (write %%)"
+            raise TargetError(f"`{path.name}` {fact}")
         try:
             image_format(path)
         except ValueError as error:
@@ -209,8 +207,7 @@ _FRAME: Final = re.compile(r"[0-9a-f]{40}(\.\w+){1,3}")
 _PASSING: Final = re.compile(r"film\.\w+|\.[0-9a-f]{40}(\.\w+){1,3}\.[0-9a-z]+\.part")
 """Names of files that a killed run left half-written."""
 Pixels = npt.NDArray[np.uint8]
-Box = tuple[int, int, int, int]
-"""left, top, right, bottom; the last two exclusive."""
+Box = tuple[int, int, int, int]  # left, top, right, bottom; the last two exclusive
 
 
 class Busy(RenderError):
@@ -378,10 +375,7 @@ class FixedFrames:
 class Clip:
     """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
 
-    Args:
-        source: the scene, one that is prepared, or its frames.
-        diagnostics: collects diagnostics of each frame; a mistake in any frame ends the clip.
-        fps: frames a second, instead of those of the first Scene's animation.
+    A mistake in any frame ends the clip. ``fps`` stands instead of those of the first Scene's animation.
     """
 
     def __init__(
@@ -392,17 +386,12 @@ class Clip:
         fps: float | None = None,
     ) -> None:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
-        self._evaluation: Evaluation | FixedFrames = (
-            source.evaluation(self.diagnostics, replays=True)
-            if isinstance(source, Source)
-            else FixedFrames(source, fps)
-            if isinstance(source, tuple)
-            else source
-        )
+        if isinstance(source, Source):
+            source = source.evaluation(self.diagnostics, replays=True)
+        self._evaluation = FixedFrames(source, fps) if isinstance(source, tuple) else source
         self._last: tuple[Shot, Program] | None = None
         self._memory: Memory | None = Memory()
-        self.wanted = self._evaluation.wanted
-        """All files that it imports, also those that do not exist."""
+        self.wanted = self._evaluation.wanted  # all files that it imports, also those that do not exist
 
     @cached_property
     def first(self) -> Shot:
@@ -411,12 +400,10 @@ class Clip:
 
     @property
     def animates(self) -> bool:
-        """True where the scene has ``animate(…)``."""
         return self._evaluation.animates
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Texts of its files."""
         return tuple(source.text for source in self._evaluation.sources)
 
     @property
@@ -427,7 +414,6 @@ class Clip:
 
     @property
     def frames(self) -> int:
-        """Number of frames, at least 1."""
         given = self._evaluation
         return len(given.scenes) if isinstance(given, FixedFrames) else self.animation.frames
 

@@ -60,12 +60,8 @@ class Cost:
     frame: NonNegativeFloat  # of any frame
     thousand_objects: NonNegativeFloat  # for each 1,000 objects
     megapixel: NonNegativeFloat  # for each million pixels of the canvas
-    # for each million pixels within objects' bounds, summed over objects; where nothing is skipped every
-    # object meets every pixel
-    megameeting: NonNegativeFloat
-    outline: (
-        NonNegativeFloat  # for each 1,000 pixels around those bounds, where pixels are sampled four times
-    )
+    megameeting: NonNegativeFloat  # for each million pixels within bounds (all of them if none is skipped)
+    outline: NonNegativeFloat  # for each 1,000 pixels around the bounds, where pixels take four samples
     spread: NonNegativeFloat  # 95 of 100 measured frames took at most this many times the sum
 
 
@@ -174,10 +170,7 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
 def refusal(point: Point, scene: Scene | None, program: Program, only: str | None = None) -> str | None:
     """Reason why a point cannot draw a scene; None if it can.
 
-    Args:
-        scene: None of a compiled program, which is drawn by its own model.
-        program: of the scene, for the model that it names.
-        only: the one model to choose.
+    A compiled ``program`` without its scene is drawn by its own model; ``only`` is the one model to choose.
     """
     if only is not None and point.model != only:
         return f"--model {only}"

@@ -274,7 +274,6 @@ class Cluster:
 
     @property
     def count(self) -> int:
-        """Number of workers."""
         return self._link.count
 
     @property

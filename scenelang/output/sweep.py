@@ -105,12 +105,9 @@ def rows_of(
     count: int | None = None,
     seed: int = 0,
 ) -> Rows:
-    """Rows of a grid and of random values.
+    """Rows of a grid, of values or of text as for `values_of`, and of random values.
 
-    Args:
-        grid: values of each param, or text as `values_of` takes it.
-        drawn: params with random values, each with a range, or empty text for its own.
-        count: number of rows; by default that of the grid.
+    Each param of ``drawn`` has a range, or empty text for its own. The count is by default that of the grid.
     """
     result: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
@@ -284,7 +281,6 @@ class Line(Record):
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Texts of all columns."""
         return (self.picture, *self.values, self.digest, self.error)
 
 
@@ -488,13 +484,9 @@ _WORTH: Final = 64  # pixels across from which on a picture is labelled
 def write_sheet(
     path: Path, folder: Path, names: Sequence[str], lines: Sequence[Line], across: int = 0
 ) -> int:
-    """Draw the pictures of ``lines`` in rows, over white, labelled where there is room; returns how many.
+    """Draw the pictures of ``lines``, ``across`` in a row or in a square, over white; returns how many.
 
-    Of more than `MOST_CELLS` as many are taken, evenly.
-
-    Args:
-        folder: of the pictures.
-        across: pictures in a row; by default as many as make a square.
+    They are labelled where there is room. Of more than `MOST_CELLS` as many are taken, evenly.
     """
     every = math.ceil(len(lines) / MOST_CELLS)
     lines = lines[::every]

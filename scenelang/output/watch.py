@@ -88,7 +88,6 @@ class Easel:
 
     @property
     def file(self) -> Path:
-        """The scene's file."""
         return Path(self.source.path or "")
 
     def draw(self, before: Stamps) -> Outcome:
@@ -157,9 +156,6 @@ class Easel:
         return clip
 
 
-# ---------------------------------------------------------------- waiting for changes
-
-
 def checking(before: Stamps) -> Callable[[object], None]:
     """Return a function to call now and then; it raises `Outdated` once files differ from ``before``."""
     looked = time.monotonic()
@@ -223,12 +219,10 @@ class Screen:
         self.shows = _find(show) if show != "never" and (self.terminal or show == "always") else None
 
     def clear(self) -> None:
-        """Clear a terminal's screen."""
         if self.terminal:
             self._write(_CLEAR)
 
     def say(self, line: str) -> None:
-        """Print a line."""
         self._write(line + "\n")
 
     def say_diagnostics(self, diagnostics: list[Diagnostic]) -> None:

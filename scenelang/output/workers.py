@@ -32,8 +32,7 @@ LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask k
 _LARGE: Final = "distributed.admin.large-graph-warning-threshold"  # bytes from which it warns
 WAIT_S: Final = 30.0  # longest wait for a scheduler to answer, and for workers
 _END_S: Final = 2.0  # longest wait for workers of this machine to end by themselves
-_HARMLESS: Final = ("python", "processor")
-"""Facts whose differences change pixels by 1/255 at most."""
+_HARMLESS: Final = ("python", "processor")  # their differences change pixels by 1/255 at most
 _NEEDED: Final = ("distributed", "numpy", "scenelang", "torch")
 K = TypeVar("K")
 T = TypeVar("T")
@@ -143,20 +142,12 @@ class Link:
 
 
 def by_workers(
-    address: str,
-    function: Callable[[T], R],
-    items: Iterable[tuple[K, T]],
-    libraries: tuple[str, ...] = (),
+    address: str, function: Callable[[T], R], items: Iterable[tuple[K, T]], libraries: tuple[str, ...] = ()
 ) -> Iterator[tuple[K, Callable[[], R]]]:
-    """Map one of our functions over items, by workers.
+    """Map one of our functions over named arguments, each taken when it can be sent, by workers of a `Link`.
 
-    Args:
-        address, libraries: as for `Link`, which raises the same.
-        items: arguments with their names; the next one is taken when it can be sent.
-
-    Yields:
-        Names in the order in which items are done, each with a function that returns the result or raises as
-        `Link.result`, to be called before the next name is taken.
+    Yields names in the order in which they are done, each with a function that returns the result or raises
+    as `Link.result`, to be called before the next name is taken.
     """
     link = Link(address, libraries)
     under_way: dict[Future[Any], K] = {}

@@ -18,7 +18,7 @@ from scenelang.drawing.small import load_of
 from scenelang.output import frontier as frontier_file
 from scenelang.output.frontier import Cost
 from tests.cli.conftest import Folder
-from tests.measure.test_choose import frontier, point
+from tests.output.test_frontier import frontier, point
 
 EXACT = replace(
     point("exact reference, 4 spp", 80, 0.0, backend="reference", model=None, renderer="reference"),

@@ -43,49 +43,11 @@ def here(drawn: Problem) -> Point:
     return drawn.space.point({})
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_slopes_are_what_differences_of_the_same_picture_are(name: str) -> None:
-    """All but some pixels on a kink of a decoder or a clamp, which lie between both ends of a difference."""
-    drawn = problem(SCENES[name])
-    program = drawn.program(here(drawn))
-    assert program is not None
-    rates, known = Rates(drawn.program, drawn.space).at(here(drawn), program)
-    assert known.all()
-    soft, base, step = SoftPlane(program, dtype=torch.float64), numbers_of(program), 1e-7
-    found = soft(base, rates)[1]
-    high, low = (
-        np.stack([soft(base + sign * rate, rates[:, :0])[0] for rate in rates.T], 3) for sign in (step, -step)
-    )
-    expected = (high - low) / (2 * step)
-    off = abs(found - expected) > 1e-6 * abs(expected).max((0, 1, 2))
-    assert off.mean() < 1e-3
-    assert (abs(expected).max((0, 1, 2)) > 0.1).all()
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_the_picture_is_that_of_the_soft_network(name: str) -> None:
-    drawn = problem(SCENES[name])
-    program = drawn.program(here(drawn))
-    assert program is not None
-    expected = draw_objects(softened(program.model, 2 / 40), program, samples="one", skip=False).image
-    found = SoftPlane(program, drawn.under)(numbers_of(program), np.zeros((len(numbers_of(program)), 0)))[0]
-    assert found == pytest.approx(over(expected, drawn.under), abs=2e-5)
-
-
-@pytest.mark.parametrize("inner", ["subtract { star; square { scale(x); } }", "star;"])
-@pytest.mark.parametrize("width", ["", "(k = 0.1 + x)"])
-def test_of_groups_and_cuts_of_a_width_there_are_no_slopes(inner: str, width: str) -> None:
-    drawn = problem(f"param x = 0.1 in 0.05..1; subtract{width} {{ square; {inner} }}")
-    assert (drawn.slopes(here(drawn)) is None) == (inner != "star;" or width != "")
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_residuals_change_as_their_slopes_say(name: str) -> None:
-    """From params on, through evaluation, compilation and the levels of the pyramid.
+def residuals_change(drawn: Problem) -> None:
+    """As slopes say: from params on, through evaluation, compilation and the levels of the pyramid.
 
     A decoder has kinks closer to each other than the ends of these differences.
     """
-    drawn = problem(SCENES[name])
     u = here(drawn)
     found = drawn.slopes(u)
     assert found is not None
@@ -103,6 +65,39 @@ def test_residuals_change_as_their_slopes_say(name: str) -> None:
     off = abs(found[0] - expected)
     assert np.linalg.norm(off) < 0.25 * np.linalg.norm(expected)
     assert (off > 0.02 * abs(expected).max(0)).mean() < 0.02
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_slopes_are_what_differences_of_the_same_picture_are(name: str) -> None:
+    """All but some pixels on a kink of a decoder or a clamp, which lie between both ends of a difference."""
+    drawn = problem(SCENES[name])
+    program = drawn.program(here(drawn))
+    assert program is not None
+    rates, known = Rates(drawn.program, drawn.space).at(here(drawn), program)
+    assert known.all()
+    soft, base, step = SoftPlane(program, dtype=torch.float64), numbers_of(program), 1e-7
+    found = soft(base, rates)[1]
+    high, low = (
+        np.stack([soft(base + sign * rate, rates[:, :0])[0] for rate in rates.T], 3) for sign in (step, -step)
+    )
+    expected = (high - low) / (2 * step)
+    off = abs(found - expected) > 1e-6 * abs(expected).max((0, 1, 2))
+    assert off.mean() < 1e-3
+    assert (abs(expected).max((0, 1, 2)) > 0.1).all()
+    picture = SoftPlane(program, drawn.under)(base, np.zeros((len(base), 0)))[0]
+    network = draw_objects(softened(program.model, 2 / 40), program, samples="one", skip=False).image
+    assert picture == pytest.approx(over(network, drawn.under), abs=2e-5)
+    residuals_change(drawn)
+
+
+def test_of_groups_and_cuts_of_a_width_there_are_no_slopes() -> None:
+    for width, inner, none in (
+        ("", "star;", False),
+        ("(k = 0.1 + x)", "star;", True),
+        ("", "subtract { star; square { scale(x); } }", True),
+    ):
+        drawn = problem(f"param x = 0.1 in 0.05..1; subtract{width} {{ square; {inner} }}")
+        assert (drawn.slopes(here(drawn)) is None) == none
 
 
 def test_params_that_move_different_numbers_are_compiled_together() -> None:

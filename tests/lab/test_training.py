@@ -1,4 +1,4 @@
-"""Training data against the slow oracle, and a loop that can be killed and go on."""
+"""Training data against the slow oracle, and loops that can be killed and go on."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from typing import Any
 import pytest
 import torch
 
-from lab.training.checkpoint import load_tensors, pack_training, unpack_training
-from lab.training.config import Phase, TrainConfig
+from lab.training.checkpoint import load_tensors
+from lab.training.config import Phase, SolidsConfig, TrainConfig
+from lab.training.leaves import half_rays
 from lab.training.loop import train
 from lab.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
-from scenelang.drawing.neural.load import load_model
+from lab.training.solids import fit_cell, fit_decoders, polish_decoders, train_solids
+from scenelang.drawing.neural.files import solid_arrays
+from scenelang.drawing.neural.load import Solids, load_model
 from scenelang.drawing.neural.network import FramedConfig
+from scenelang.drawing.solid.network import SolidConfig
 from tests.drawing import oracle
 
 WORDS = ("union", "smooth", "subtract", "intersect")
@@ -109,21 +113,6 @@ def test_a_killed_training_leaves_a_checkpoint_and_one_log(
     assert told(tmp_path / "parts") == told(tmp_path / "whole")
 
 
-def test_training_learns(tmp_path: Path) -> None:
-    """A few steps on the leaves already lower the loss by a third."""
-    config = TrainConfig(
-        model="shapes2d",
-        seed=0,
-        rate=0.01,
-        phases=(Phase(150, 0, 4),),
-        network=FramedConfig(),
-        scenes=SceneConfig(points=64),
-    )
-    losses: list[float] = []
-    train(config, tmp_path, report=lambda i, n, s, parts: losses.extend(parts.values()), report_every=25)
-    assert losses[-1] < losses[0] * 2 / 3
-
-
 def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     """Trained on the leaves alone, it draws with the colours and gates of the shipped one."""
     config = replace(
@@ -140,26 +129,41 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
 
-def test_a_fused_optimiser_goes_on_in_the_layout_of_its_parameters() -> None:
-    """Its averages are read as they lie, so they must lie as the parameters do."""
+TINY = SolidsConfig("solids3d", 3, 4, 4, 20, 4, SolidConfig(width=4, segment=4))
 
-    def made() -> tuple[torch.nn.Conv2d, torch.optim.Adam]:
-        torch.manual_seed(1)
-        network = torch.nn.Conv2d(3, 4, 3).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-        return network, torch.optim.Adam(network.parameters(), lr=0.1, fused=True)
 
-    def step(network: torch.nn.Conv2d, optimiser: torch.optim.Adam, seed: int) -> None:
-        x = torch.randn(2, 3, 5, 5, generator=torch.Generator().manual_seed(seed))
-        optimiser.zero_grad()
-        network(x).square().sum().backward()
-        optimiser.step()
+def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
+    told = []
+    assert not train_solids(TINY, tmp_path / "two", budget_s=1e-9)
+    while not train_solids(TINY, tmp_path / "two", budget_s=1e-3, report=lambda *a: told.append(a[:2])):
+        pass
+    assert train_solids(TINY, tmp_path / "one")
+    one, two = (
+        solid_arrays((tmp_path / name / "weights.safetensors").read_bytes(), 2, 2) for name in ("one", "two")
+    )
+    assert (one.codes == two.codes).all()
+    assert (one.decoder_w[1] == two.decoder_w[1]).all()
+    assert (one.segment_w[1] == two.segment_w[1]).all()
+    assert told[0] == (0, 32)
+    assert told[-1] == (32, 32)
+    with pytest.raises(ValueError, match="another configuration"):
+        train_solids(replace(TINY, seed=4), tmp_path / "one")
 
-    network, optimiser = made()
-    step(network, optimiser, 1)
-    packed = pack_training(network, optimiser, torch.Generator())
-    kept = {name: tensor.clone(memory_format=torch.contiguous_format) for name, tensor in packed.items()}
-    step(network, optimiser, 2)
-    other, again = made()
-    unpack_training(kept, other, again, torch.Generator())
-    step(other, again, 2)
-    assert torch.equal(other.weight, network.weight)
+
+def test_every_part_of_the_training_learns() -> None:
+    torch.manual_seed(1)
+    network, g = Solids(SolidConfig(width=8), 2, 2), torch.Generator().manual_seed(1)
+    assert fit_cell(network, 300, g) < fit_cell(Solids(SolidConfig(), 2, 2), 1, g) / 2
+    before = fit_decoders(network, 150, g)
+    assert before < 0.5 * fit_decoders(Solids(SolidConfig(width=8), 2, 2), 1, g)
+    first = polish_decoders(network, 1, g, 500)
+    last = polish_decoders(network, 12, g, 500)
+    assert all(last[leaf] < 0.5 * first[leaf] for leaf in first)
+
+
+def test_half_rays_are_as_long_in_a_sphere_as_in_closed_form() -> None:
+    told, length = half_rays("sphere", 500, torch.Generator().manual_seed(1))
+    p = torch.stack([told[0], 0 * told[0], told[1]])
+    ahead = (p * told[2:]).sum(0)
+    chord = (ahead.square() - p.square().sum(0) + 1).clip(0.0).sqrt() - ahead
+    assert (length - chord).abs().max() < 1e-4

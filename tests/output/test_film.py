@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import subprocess
+import weakref
+import zlib
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,27 +46,11 @@ def stripes(step: int, alpha: bool = False) -> Pixels:
     return np.dstack([pixels, cover])
 
 
-def noise(step: int) -> Pixels:
-    """More colours than a palette holds."""
-    return np.random.default_rng(step).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
-
-
-def gradient(step: int) -> Pixels:
-    """Smooth colours, 512 a picture, which move."""
-    x = np.arange(64)[None, :] * 4
-    y = np.arange(48)[:, None] * 5
-    return np.dstack([(x + 0 * y + 2 * step) % 256, (y + 0 * x) % 256, 128 + 0 * x + 0 * y]).astype(np.uint8)
-
-
 def film(folder: Path, pictures: list[Pixels], fps: float = 10, loop: bool = True) -> Film:
     """A film of pictures; equal ones share a file, as in the store."""
-    files: list[Path] = []
-    known: dict[bytes, Path] = {}
-    for index, picture in enumerate(pictures):
-        file = known.setdefault(picture.tobytes(), folder / f"{index}.png")
-        if not file.exists():
-            Image.fromarray(picture).save(file)
-        files.append(file)
+    files = [folder / f"{zlib.crc32(picture.tobytes())}.png" for picture in pictures]
+    for file, picture in dict(zip(files, pictures, strict=True)).items():
+        Image.fromarray(picture).save(file)
     height, width, channels = pictures[0].shape
     return Film(files, fps, loop, (width, height), channels == 4)
 
@@ -87,34 +74,24 @@ def played(file: Path, mode: str, fps: float, count: int) -> list[Pixels]:
     return [pictures[next(i for i, end in enumerate(ends) if moment < end)] for moment in moments]
 
 
-# ---------------------------------------------------------------- GIF
-
-
-@pytest.mark.parametrize("palette", ["auto", "global", "frame"])
-def test_gif_is_exact_where_the_colours_fit(tmp_path: Path, palette: Palette) -> None:
-    pictures = [stripes(step) for step in (0, 1, 2, 2, 5, 0)]
-    write_gif(film(tmp_path, pictures), tmp_path / "a.gif", quiet, palette=palette)
-    shown = played(tmp_path / "a.gif", "RGB", 10, 6)
-    for picture, expected in zip(shown, pictures, strict=True):
-        np.testing.assert_array_equal(picture, expected)
-
-
-def test_gif_has_a_palette_for_each_frame_where_only_that_is_exact(tmp_path: Path) -> None:
-    """Each has 200 colours of its own, all together have more than a palette."""
-    pictures = []
-    for step in range(4):
-        picture = stripes(0)
+def test_gif_is_exact_where_the_colours_fit(tmp_path: Path) -> None:
+    """In one palette, or, where each has 200 colours of its own, in one for each."""
+    alike, apart = [stripes(step) for step in (0, 1, 2, 2, 5, 0)], [stripes(0) for _ in range(4)]
+    for step, picture in enumerate(apart):
         picture.reshape(-1, 3)[:200, 0] = np.arange(200)
         picture.reshape(-1, 3)[:200, 2] = 40 * step
-        pictures.append(picture)
-    write_gif(film(tmp_path, pictures), tmp_path / "a.gif", quiet)
-    for picture, expected in zip(played(tmp_path / "a.gif", "RGB", 10, 4), pictures, strict=True):
-        np.testing.assert_array_equal(picture, expected)
+    palettes: tuple[Palette, ...] = ("auto", "global", "frame")
+    for pictures, palette in [*((alike, palette) for palette in palettes), (apart, "auto")]:
+        write_gif(film(tmp_path, pictures), tmp_path / "a.gif", quiet, palette=palette)
+        shown = played(tmp_path / "a.gif", "RGB", 10, len(pictures))
+        np.testing.assert_array_equal(shown, pictures)
 
 
 def test_gif_of_many_colours(tmp_path: Path) -> None:
     """One palette for all is near to all; dithering makes means nearer still, pixels not."""
-    pictures = [gradient(step) for step in range(8)]
+    y, x = np.mgrid[:48, :64]
+    moving = [np.dstack([(4 * x + 2 * step) % 256, 5 * y, 0 * x + 128]) for step in range(8)]
+    pictures = [picture.astype(np.uint8) for picture in moving]  # smooth, of 3,072 colours each
     made = film(tmp_path, pictures)
     off = {}
     for dither in (False, True):
@@ -127,13 +104,13 @@ def test_gif_of_many_colours(tmp_path: Path) -> None:
     assert off[True][1] < off[False][1]
 
 
-@pytest.mark.parametrize(("fps", "count"), [(24, 24), (30, 31), (7, 5), (60, 60), (0.5, 3)])
-def test_gif_is_as_long_as_it_should_be(tmp_path: Path, fps: float, count: int) -> None:
-    pictures = [stripes(step % 10) for step in range(count)]
-    write_gif(film(tmp_path, pictures, fps), tmp_path / "a.gif", quiet)
-    times = [duration for _, duration in decoded(tmp_path / "a.gif", "RGB")]
-    assert abs(sum(times) - 1000 * count / fps) <= 5
-    assert min(times) >= 20  # browsers slow down what is shorter
+def test_gif_is_as_long_as_it_should_be(tmp_path: Path) -> None:
+    for fps, count in ((24, 24), (30, 31), (7, 5), (60, 60), (0.5, 3)):
+        pictures = [stripes(step % 10) for step in range(count)]
+        write_gif(film(tmp_path, pictures, fps), tmp_path / "a.gif", quiet)
+        times = [duration for _, duration in decoded(tmp_path / "a.gif", "RGB")]
+        assert abs(sum(times) - 1000 * count / fps) <= 5
+        assert min(times) >= 20  # browsers slow down what is shorter
 
 
 def test_gif_leaves_out_what_is_transparent(tmp_path: Path) -> None:
@@ -171,11 +148,7 @@ def test_palettes_hold_small_coloured_things() -> None:
         assert away[index[y, x]] == away.min()
 
 
-# ---------------------------------------------------------------- APNG, WebP
-
-
-@pytest.mark.parametrize("alpha", [False, True])
-@pytest.mark.parametrize("fps", [10, 24, 29.97])
+@pytest.mark.parametrize(("alpha", "fps"), [(False, 10), (True, 29.97)])
 def test_apng_is_exact(tmp_path: Path, alpha: bool, fps: float) -> None:
     steps = (0, 1, 1, 5, 5, 5, 0)
     pictures = [stripes(step, alpha) for step in steps]
@@ -183,8 +156,7 @@ def test_apng_is_exact(tmp_path: Path, alpha: bool, fps: float) -> None:
         pictures[3][4] = (10, 20, 30, 77)
     write_apng(film(tmp_path, pictures, fps), tmp_path / "a.apng", quiet)
     shown = played(tmp_path / "a.apng", "RGBA" if alpha else "RGB", fps, len(steps))
-    for picture, expected in zip(shown, pictures, strict=True):
-        np.testing.assert_array_equal(picture, expected)
+    np.testing.assert_array_equal(shown, pictures)
     frames = list(decoded(tmp_path / "a.apng", "RGB"))
     assert len(frames) == 5 if alpha else 4
     exact = Fraction(1000) / Fraction(fps).limit_denominator(1000)
@@ -214,44 +186,25 @@ def test_webp_is_exact(tmp_path: Path, alpha: bool) -> None:
     assert sum(times) == round(5 * 1000 / 24)
 
 
-def test_one_frame(tmp_path: Path) -> None:
-    made = film(tmp_path, [stripes(0)])
-    for write, name in ((write_gif, "a.gif"), (write_apng, "a.apng"), (write_webp, "a.webp")):
-        write(made, tmp_path / name, quiet)
-        (only,) = [picture for picture, _ in decoded(tmp_path / name, "RGB")]
-        np.testing.assert_array_equal(only, stripes(0))
-
-
 def test_frames_are_read_one_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No encoder holds more than the two frames that it compares."""
-    import weakref
-
-    alive = most = 0
-    read = Film.read
+    most, read, refs = 0, Film.read, list[Any]()
 
     class Held(np.ndarray):  # type: ignore[type-arg]
         pass
 
     def watched(self: Film, file: Path) -> Pixels:
-        nonlocal alive, most
+        nonlocal most
         pixels = read(self, file).view(Held)
-        alive += 1
-        most = max(most, alive)
-        weakref.finalize(pixels, gone)
+        refs.append(weakref.ref(pixels))
+        most = max(most, sum(ref() is not None for ref in refs))
         return pixels
-
-    def gone() -> None:
-        nonlocal alive
-        alive -= 1
 
     monkeypatch.setattr(Film, "read", watched)
     made = film(tmp_path, [stripes(step % 11) for step in range(30)])
     for write, name in ((write_gif, "a.gif"), (write_apng, "a.apng"), (write_webp, "a.webp")):
         write(made, tmp_path / name, quiet)
     assert 0 < most <= 3
-
-
-# ---------------------------------------------------------------- video
 
 
 @pytest.fixture
@@ -289,13 +242,6 @@ def test_video_has_the_right_colours_and_time(tmp_path: Path, ffmpeg: str) -> No
     assert "yuv420p(tv, bt709" in said.stderr
     assert re.search(r"\b12 fps\b", said.stderr)
     assert "Duration: 00:00:01.67" in said.stderr
-
-
-def test_video_of_odd_sides(tmp_path: Path, ffmpeg: str) -> None:
-    write_video(film(tmp_path, [stripes(0), stripes(4)]), tmp_path / "a.mp4", quiet, suffix=".mp4")
-    shown = frames_of(ffmpeg, tmp_path / "a.mp4", (WIDTH + 1, HEIGHT + 1))
-    assert len(shown) == 2
-    assert np.abs(shown[0][:, -1].astype(int) - shown[0][:, -2]).max() <= 12
 
 
 def test_video_over_white_and_with_alpha(tmp_path: Path, ffmpeg: str) -> None:

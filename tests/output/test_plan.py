@@ -48,13 +48,6 @@ def test_counts_of_a_scene_by_hand() -> None:
     assert rows["drop_hidden"]["tokens"] == {"union": 2, "subtract": 1}
 
 
-def test_a_pass_that_changes_no_count_is_seen_to_work() -> None:
-    graphs: dict[str, Graph] = {}
-    compile_scene(nsg.loads("square { scale(0.5); twirl(0.1); }"), after=graphs.__setitem__)
-    changed = {row["stage"]: row["matrices"] for row in stages(graphs) if row["changed"]}
-    assert changed == {"fold_warps": 2}  # the deformation comes first now: as many matrices, others
-
-
 def test_cost_of_a_drawing() -> None:
     scene = nsg.loads("canvas(40, 30); chain { square { scale(0.5); } subtract star { scale(0.2); } }")
     program = compile_scene(scene)

@@ -1,14 +1,51 @@
-"""Frames and delays: ranges as in the language, and time that neither grows nor shrinks."""
+"""What names of outputs ask for; ranges of frames, and delays that neither grow nor shrink."""
 
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenelang.output.frames import FrameRange, FramesError, delays, runs
+from scenelang.output.frames import (
+    FrameRange,
+    FramesError,
+    TargetError,
+    delays,
+    find_target,
+    is_animation,
+    runs,
+)
+
+
+def test_suffixes_patterns_and_folders(tmp_path: Path) -> None:
+    for out, kind in (("a.gif", "gif"), ("a.WEBP", "webp"), ("a.apng", "apng"), ("a.webm", "video")):
+        found = find_target(str(tmp_path / out))
+        assert (found.kind, found.path) == (kind, tmp_path / out)
+        assert found.work.parent == tmp_path
+        assert found.work.name.startswith(".")
+    for pattern, name in (
+        ("f-%04d.png", "f-0012.png"),
+        ("%d.jpg", "12.jpg"),
+        ("100%%-%3d.png", "100%- 12.png"),
+    ):
+        found = find_target(str(tmp_path / pattern))
+        assert found.kind == "sequence"
+        assert found.file(12) == tmp_path / name
+    assert find_target(f"{tmp_path}/new/", "a%b").file(3) == tmp_path / "new/a%b-0003.png"
+    assert find_target(str(tmp_path), "a").file(12345) == tmp_path / "a-12345.png"
+
+
+def test_what_holds_no_animation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for out in ("a.png", "a", "a%d%d.png", "a%d.xyz", "%x-%d.png", "none/a.gif", "none/%d.png"):
+        with pytest.raises(TargetError):
+            find_target(out)
+    assert not is_animation("100%.png")
+    assert not is_animation("a%%d.png")
+    assert is_animation("a%%%d.png")
 
 
 def test_ranges() -> None:
@@ -50,8 +87,4 @@ def test_errors_of_delays_do_not_add_up(count: int, fps: float) -> None:
             assert abs(shown - (index + 1) * 100 / Fraction(fps)) <= Fraction(1, 2) or count == 1
     else:
         assert count < 3 or 0 in found
-
-
-def test_neighbours_that_are_equal_are_shown_once() -> None:
-    assert runs("aabca", [1, 2, 0, 3, 4]) == [("a", 3), ("c", 3), ("a", 4)]
-    assert runs("aba", [1, 0, 2]) == [("a", 3)]
+    assert runs("aabca", [1, 2, 0, 3, 4]) == [("a", 3), ("c", 3), ("a", 4)]  # neighbours are shown once

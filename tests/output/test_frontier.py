@@ -1,22 +1,25 @@
-"""The frontier: which points it keeps, what it promises, and what it chooses."""
+"""The frontier: its front, promises, costs of frames, and the choice of a point."""
 
 from __future__ import annotations
 
 import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import scenelang as nsg
+from lab.frontier.fit import fit_cost
 from lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
 from lab.frontier.record import Errors, Frontier, Point, Quality, Times, between, front
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.image import enlarged, from_samples
-from scenelang.drawing.small import Load
+from scenelang.drawing.small import Load, draw_small, load_of
 from scenelang.language.scene import Object, Scale, Scene, Twist
 from scenelang.output import frontier as shipped
 from scenelang.output.frontier import (
@@ -27,7 +30,9 @@ from scenelang.output.frontier import (
     error_scale,
     machine_scale,
     offers,
+    predicted_ms,
     refusal,
+    yardstick,
 )
 
 
@@ -75,8 +80,6 @@ def frontier(*points: Point) -> Frontier:
     )
 
 
-# ---------------------------------------------------------------- the front
-
 figures = st.lists(
     st.tuples(st.integers(1, 6).map(float), st.integers(0, 6).map(float)), min_size=0, max_size=12
 )
@@ -95,22 +98,11 @@ def test_the_front_is_what_brute_force_finds(points: list[tuple[float, float]]) 
     assert front(points) == [not beaten(i) for i in range(len(points))]
 
 
-def test_points_between_the_fastest_and_the_nearest_are_counted() -> None:
-    points = [point(n, ms, e) for n, ms, e in (("a", 1, 0.5), ("b", 2, 0.6), ("c", 3, 0.1), ("d", 9, 0.01))]
-    assert between([*points, point("slow", 20, 0.2), point("timed", 4, None)]) == 2
-
-
-# ---------------------------------------------------------------- promises
-
-
 def test_the_promise_is_a_high_order_statistic() -> None:
     for count, rank in ((39, 39), (40, 40), (79, 78), (100, 99), (1000, 976)):
         values = list(np.random.default_rng(count).permutation(count) + 1.0)
         assert promised(values) == rank
         assert rank == math.ceil(0.975 * (count + 1))
-
-
-def test_few_scenes_promise_more_than_their_worst() -> None:
     assert promised([0.1, 0.2]) == pytest.approx(0.3)
     assert margin(117) == FEW_MARGIN > margin(118) == MARGIN
 
@@ -124,19 +116,6 @@ def test_promises_are_kept_by_new_values_of_the_same_kind() -> None:
         kept.append(np.mean(rng.lognormal(0, 1.5, 200) <= promised(values.tolist())))
     assert np.mean(kept) >= 0.972
 
-
-def test_a_stated_speed_of_the_machine_is_taken() -> None:
-    assert machine_scale(frontier(), 2.5) == 2.5
-
-
-def test_smaller_canvases_and_more_objects_promise_less() -> None:
-    assert error_scale((256, 256), 1) == error_scale((1024, 300), 4) == 1.0
-    assert error_scale((128, 512), 4) == 2.0
-    assert error_scale((256, 256), 16) == 4.0
-    assert error_scale((64, 64), 8) == 8.0
-
-
-# ---------------------------------------------------------------- choosing
 
 LOAD = Load(2, 65536, 1e4, 100.0)
 LADDER = [point("fast", 2, 0.05), point("middle", 10, 0.01), point("slow", 50, 0.001), point("bad", 60, 0.02)]
@@ -159,6 +138,11 @@ def test_the_choice_is_the_cheapest_that_suffices() -> None:
         (Limits(20, 0.02), "middle"),
     ):
         assert chosen(limits) == name
+    wide = [replace(p, cost=Cost(p.ms.median, 0, 0, 0, 0, 4.0)) for p in LADDER]
+    assert chosen(Limits(30, None), wide) == "fast"
+    points = [point("a", 10, 0.0100), point("b", 40, 0.0099)]
+    assert chosen(Limits(100, None), points) == "a"  # nearly equal errors leave it to time
+    assert between([*LADDER, point("timed", 4, None)]) == 1
 
 
 @given(
@@ -182,27 +166,16 @@ def test_the_choice_is_what_brute_force_finds(
     assert figures[int(chosen(limits, points)[1:])] == best
 
 
-def test_a_slower_machine_and_a_larger_scene_choose_a_faster_way() -> None:
+def test_a_slower_machine_chooses_a_faster_way_and_a_larger_scene_too() -> None:
     assert chosen(Limits(30, None), scale=1.0) == "middle"
     assert chosen(Limits(30, None), scale=4.0) == "fast"
     per_object = [replace(p, cost=Cost(0, 1000 * p.ms.median, 0, 0, 0, 1.0)) for p in LADDER]
     assert chosen(Limits(30, None), per_object, load=Load(2, 65536, 0, 0)) == "middle"
     assert chosen(Limits(30, None), per_object, load=Load(12, 65536, 0, 0)) == "fast"
-
-
-def test_times_count_with_their_spread() -> None:
-    wide = [replace(p, cost=Cost(p.ms.median, 0, 0, 0, 0, 4.0)) for p in LADDER]
-    assert chosen(Limits(30, None), wide) == "fast"
-
-
-def test_nearly_equal_errors_leave_it_to_time() -> None:
-    points = [point("a", 10, 0.0100), point("b", 40, 0.0099)]
-    assert chosen(Limits(100, None), points) == "a"
-
-
-def test_many_objects_need_a_more_exact_way() -> None:
-    assert chosen(Limits(None, 0.02)) == "middle"
-    assert chosen(Limits(None, 0.02), load=Load(16, 65536, 1e4, 100.0)) == "slow"
+    assert chosen(Limits(None, 0.02), load=Load(16, 65536, 1e4, 100.0)) == "slow"  # more outlines
+    assert error_scale((256, 256), 1) == error_scale((1024, 300), 4) == 1.0
+    assert (error_scale((128, 512), 4), error_scale((64, 64), 8)) == (2.0, 8.0)
+    assert machine_scale(frontier(), yardstick()) > 0
 
 
 def test_what_nothing_draws_is_told_with_what_comes_nearest() -> None:
@@ -254,9 +227,6 @@ def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyP
     assert refusal(one, grey, program) == "model `shapes2d` draws only over white"
 
 
-# ---------------------------------------------------------------- the file
-
-
 def test_the_file_comes_back() -> None:
     made = frontier(*LADDER, point("timed", 5, None, cost=None, model=None))
     text = made.to_json()
@@ -269,27 +239,19 @@ def test_the_file_comes_back() -> None:
 
 def test_damaged_files_are_refused() -> None:
     """By what chooses where it reads the field, and by what knows all fields."""
-    own: list[tuple[str, object]] = [("format", 2), ("points", {}), ("points", [1]), ("yardstick_ms", None)]
-    own += [("yardstick_ms", "1"), ("set", 3)]
-    others: list[tuple[str, object]] = [("canvas", [256]), ("canvas", [0, 256]), ("canvas", [256, "256"])]
-    others += [("seed", -1), ("seed", True), ("converged", {"a": "b"}), ("machine", 3), ("unknown", 1)]
-    of_point = [("samples", "two"), ("backend", "x"), ("cost", [1]), ("offered", 1), ("model", 3)]
-    of_point += [("flip", {"mean": 0, "p95": 0, "bound": -1, "worst": 0})]
-    cases = [((), key, value, {Frontier, shipped.Frontier}) for key, value in own]
-    cases += [(("points", 1), key, value, {Frontier, shipped.Frontier}) for key, value in of_point]
-    cases += [((), key, value, {Frontier}) for key, value in others]
-    cases += [(("points", 1), "ms", value, {Frontier}) for value in (None, {"median": 1})]
-    for path, key, value, by in cases:
-        told = part = json.loads(frontier(*LADDER).to_json())
-        for at in path:
-            part = part[at]
-        part[key] = value
-        data = json.dumps(told).encode()
-        for reader in by:
-            with pytest.raises(ValueError, match="frontier"):
-                reader.from_json(data)
-        if shipped.Frontier not in by:
-            shipped.Frontier.from_json(data)
+    own: dict[str, list[Any]] = {"format": [2], "points": [{}, [1]], "yardstick_ms": [None, "1"], "set": [3]}
+    others = {"canvas": [[256], [0, 256], [256, "256"]], "seed": [-1, True], "machine": [3], "unknown": [1]}
+    of_point = {"samples": ["two"], "backend": ["x"], "cost": [[1]], "offered": [1], "flip": [{"bound": -1}]}
+    for fields, chosen_by in ((own, True), (of_point, True), (others, False), ({"ms": [None]}, False)):
+        for key, value in ((key, value) for key, values in fields.items() for value in values):
+            told = json.loads(frontier(*LADDER).to_json())
+            (told["points"][1] if fields is of_point or key == "ms" else told)[key] = value
+            data = json.dumps(told).encode()
+            for reader in (Frontier, *[shipped.Frontier] * chosen_by):
+                with pytest.raises(ValueError, match="frontier"):
+                    reader.from_json(data)
+            if not chosen_by:
+                shipped.Frontier.from_json(data)
 
 
 def test_enlarging_keeps_flat_colours_and_corners() -> None:
@@ -301,3 +263,79 @@ def test_enlarging_keeps_flat_colours_and_corners() -> None:
     assert (wide[:, 0] == 0).all()
     assert (wide[:, -1] == 1).all()
     assert enlarged(small, (8, 8)) is small
+
+
+def test_cost_is_found_again() -> None:
+    rng = np.random.default_rng(3)
+    true = Cost(2.0, 30.0, 40.0, 90.0, 0.5, 1.0)
+    loads = [
+        Load(int(n), int(p), float(m), float(o))
+        for n, p, m, o in zip(
+            rng.integers(1, 60, 50),
+            rng.integers(1 << 12, 1 << 20, 50),
+            rng.uniform(0, 2e6, 50),
+            rng.uniform(0, 9e3, 50),
+            strict=True,
+        )
+    ]
+    found = fit_cost(loads, [predicted_ms(true, load, True) for load in loads], True)
+    for load in loads:
+        assert predicted_ms(found, load, True) == pytest.approx(predicted_ms(true, load, True), rel=1e-4)
+    assert found.spread == pytest.approx(1.0, abs=1e-4)
+
+
+def test_no_coefficient_is_negative_and_the_spread_covers() -> None:
+    rng = np.random.default_rng(4)
+    loads = [Load(int(n), 65536, float(n) * 9000, float(n) * 100) for n in rng.integers(1, 9, 80)]
+    ms = [10 - 0.5 * load.objects + rng.uniform(0, 4) for load in loads]  # faster with more objects
+    cost = fit_cost(loads, ms, True)
+    terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
+    assert min(terms) >= 0
+    under = [
+        t <= predicted_ms(cost, load, True) * cost.spread * 1.0001 for load, t in zip(loads, ms, strict=True)
+    ]
+    assert np.mean(under) >= 0.95
+
+
+def test_a_fixed_canvas_costs_by_objects_alone() -> None:
+    loads = [Load(n, 1 << 16, 1e5, 500.0) for n in range(1, 9)]
+    cost = fit_cost(loads, [5.0 + 2 * n for n in range(1, 9)], True, fixed=True)
+    assert cost.megapixel == cost.megameeting == cost.outline == 0
+    assert predicted_ms(cost, Load(100, 1 << 16, 0, 0), True) == pytest.approx(205, rel=0.01)
+
+
+def test_one_canvas_tells_nothing_of_a_constant() -> None:
+    """A way that was measured on one canvas alone is taken to grow with the pixels."""
+    loads = [Load(n, 1 << 16, 0.0, 0.0) for n in (1, 2, 3, 4, 2, 3)]
+    cost = fit_cost(loads, [100.0 + 50 * load.objects for load in loads], False)
+    large = predicted_ms(cost, Load(2, 1 << 18, 0.0, 0.0), False)
+    assert large == pytest.approx(4 * predicted_ms(cost, loads[1], False))
+    assert predicted_ms(cost, loads[1], False) == pytest.approx(200, rel=0.02)
+
+
+def test_the_load_of_a_scene_is_its_bounds_within_the_canvas() -> None:
+    text = "canvas(200, 100); square { scale(0.1); } square { scale(0.5); translate(2, 0); }"
+    program = compile_scene(nsg.loads(text))
+    load = load_of(program)
+    assert (load.objects, load.pixels) == (2, 20_000)
+    boxes = program.bounds * 50  # half of the shorter side
+    inside = [
+        (min(b[2], 100) - max(b[0], -100)) * (min(b[3], 50) - max(b[1], -50)) for b in boxes.astype(float)
+    ]
+    assert load.meetings == pytest.approx(sum(inside), rel=1e-6)
+    assert load.meetings < 2 * 20_000
+
+
+def test_the_load_of_solids_is_counted_by_a_small_picture() -> None:
+    """What a pixel takes does not change with the canvas; a solid takes less than mist, and than two."""
+    loads = {}
+    for text in ("sphere { }", "sphere { material volumetric; }", "sphere { } torus { translate(0, 1, 1); }"):
+        for side in (64, 128):
+            program = compile_scene(nsg.loads(f"canvas({side}, {side}); {text}"))
+            loads[text, side] = load = load_of(program)
+            drawn = draw_small(program, samples="one")
+            assert load.meetings == pytest.approx(drawn.pairs, rel=0.35)
+            assert load.outline == load.meetings / side
+            assert load.pixels == side * side
+    ball, mist, both = (load.meetings for (_, side), load in loads.items() if side == 128)
+    assert ball < min(both, mist)
