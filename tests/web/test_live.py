@@ -25,7 +25,7 @@ from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.parser import parse
 from scenelang.language.reports import SceneError
-from scenelang.language.scene import Camera, Scene
+from scenelang.language.scene import Camera
 from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
 from scenelang.language.words import FUNCTIONS
 from scenelang.web.arrays import rows_of, stage_of
@@ -226,31 +226,21 @@ def test_scenes_of_documentation_and_conformance_suite(viewer_page: Any) -> None
     assert refused >= 5  # by passes, not by the evaluator
 
 
-def any_scene(seed: int) -> Scene:
-    """A tree with groups in groups, and blends of several widths."""
-    return random_set_scene(np.random.default_rng(seed), SETS["trees"])
-
-
-def test_random_trees_of_the_plane(viewer_page: Any) -> None:
-    makers = (full_scene, blob_scene, any_scene)
-    scenes = [(f"{make.__name__}({n})", make(n).to_nsg()) for make in makers for n in range(60)]
-    good, refused = agree(viewer_page, (SourceFile(*scene) for scene in scenes), model="shapes2d")
-    assert good > 120
-    assert refused >= 2  # as the model lacks room
-
-
-def test_random_solids(viewer_page: Any) -> None:
-    """With eyes inside what is opaque, in holes, in mist, and outside."""
-    scenes = []
+def test_random_scenes(viewer_page: Any) -> None:
+    """Groups in groups, blends of several widths; eyes inside what is opaque, in holes, in mist."""
+    flat, solid = [], []
     for n in range(60):
         rng = np.random.default_rng(n)
         scene = random_solid(rng, SOLID_SETS[("trees", "mixed", "trees", "deformed")[n % 4]])
         eye = tuple(rng.uniform(-0.7, 0.7, 3).tolist())
-        scene = scene.model_copy(update={"camera": Camera(eye, (9.0, 0.5, 0.0))})
-        scenes.append(SourceFile(str(n), scene.to_nsg()))
-    good, refused = agree(viewer_page, scenes)
-    assert good > 25
-    assert refused >= 2
+        solid.append(scene.model_copy(update={"camera": Camera(eye, (9.0, 0.5, 0.0))}))
+        tree = random_set_scene(np.random.default_rng(n), SETS["trees"])
+        flat += [full_scene(n), blob_scene(n), tree]
+    for scenes, least, inputs in ((flat, 120, {"model": "shapes2d"}), (solid, 25, {})):
+        texts = (SourceFile(str(n), scene.to_nsg()) for n, scene in enumerate(scenes))
+        good, refused = agree(viewer_page, texts, **inputs)
+        assert good > least
+        assert refused >= 2  # as the model lacks room
 
 
 DEEP = "module m(n) { intersect { square; union { if (n > 1) { m(n - 1); } triangle; star; } } } m(n);"
