@@ -96,8 +96,7 @@ def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]
 
 def paints_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
     """Entries of a view's ``paints`` for the materials among elements; raises as `shapes_of`."""
-    worn = [element for element in elements if element.material]
-    return [(_picture if element.form == "picture" else _colours)(element, store) for element in worn]
+    return [_paint(element, store) for element in elements if element.material]
 
 
 def _shape(element: Element, store: Store) -> dict[str, Any]:
@@ -129,29 +128,17 @@ def bounds_of(element: Element) -> tuple[float, float, float]:
     return max(result[0], 1.0), max(result[1], 1.0), max(result[2], 2.0**0.5)
 
 
-def _picture(element: Element, store: Store) -> dict[str, Any]:
+def _paint(element: Element, store: Store) -> dict[str, Any]:
+    if element.form != "picture":
+        parts = {"kind": "colours", "sides": element.sides, "steps": store.add(_steps(element))}
+        return {"name": element.name, **parts, "fineness": element.sizes[1]}
     try:
         colours = texels(element)
     except TensorError as error:
         raise ProgramError(str(error)) from None
     high, wide = element.sizes
-    return {
-        "name": element.name,
-        "kind": "picture",
-        "wide": wide,
-        "high": high,
-        "texels": store.add(np.rint(colours * 255).astype(np.uint8).reshape(-1)),
-    }
-
-
-def _colours(element: Element, store: Store) -> dict[str, Any]:
-    return {
-        "name": element.name,
-        "kind": "colours",
-        "sides": element.sides,
-        "steps": store.add(_steps(element)),
-        "fineness": element.sizes[1],
-    }
+    data = store.add(np.rint(colours * 255).astype(np.uint8).reshape(-1))
+    return {"name": element.name, "kind": "picture", "wide": wide, "high": high, "texels": data}
 
 
 def _steps(element: Element) -> npt.NDArray[np.int8]:

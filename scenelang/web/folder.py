@@ -87,11 +87,7 @@ class Folder:
         if not fits(name):
             raise Refused(f"`{repr(name[:80])[1:-1]}` is not the name of a scene in this folder")
         path = self.path / name
-        try:
-            inside = path.resolve().is_relative_to(self.path)
-        except (OSError, RuntimeError):
-            inside = False
-        if not inside:
+        if not self.holds(str(path)):
             raise Refused(f"`{name}` lies outside the folder")
         return path
 

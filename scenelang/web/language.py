@@ -24,10 +24,6 @@ _LENGTH: Final = re.compile(rb"Content-Length: *(\d{1,9})\r\n", re.IGNORECASE)
 _REFUSED: Final = -32602  # the protocol's InvalidParams
 
 
-class Elsewhere(ValueError):
-    """A message names a file outside the folder."""
-
-
 async def serve_language(socket: WebSocket, folder: Folder) -> None:
     """Pass messages between a page and a process of its own, until one side ends."""
     await socket.accept()
@@ -84,9 +80,7 @@ async def _down(stream: asyncio.StreamReader, socket: WebSocket) -> None:
 def checked(message: Any, folder: Folder) -> dict[str, Any]:
     """A message of the page, with the folder and the root of this server.
 
-    Raises:
-        Elsewhere: it names a file outside the folder.
-        ValueError: it is not a message of the protocol.
+    Raises ValueError where it is not one of the protocol, or names a file outside the folder.
     """
     if not isinstance(message, dict):
         raise ValueError("not a message")
@@ -102,7 +96,7 @@ def checked(message: Any, folder: Folder) -> dict[str, Any]:
     if method == "workspace/didChangeConfiguration" and isinstance(params, dict):
         return {**message, "params": {"settings": _settings(params.get("settings"), folder)}}
     if method == "workspace/didChangeWorkspaceFolders":
-        raise Elsewhere("the folder is the one that was opened")
+        raise ValueError("the folder is the one that was opened")
     _check_places(params, folder)
     return message
 
@@ -115,12 +109,12 @@ def _settings(given: Any, folder: Folder) -> dict[str, Any]:
 
 
 def _check_places(value: Any, folder: Folder) -> None:
-    """Raise `Elsewhere` where a text under a key that ends in ``uri`` leads out of the folder."""
+    """Raise ValueError where a text under a key that ends in ``uri`` leads out of the folder."""
     for key, inner in value.items() if isinstance(value, dict) else ():
         if key.lower().endswith("uri") and isinstance(inner, str):
             place = to_fs_path(inner) if inner[:5].lower() == "file:" else None
             if inner[:5].lower() == "file:" and not (place and folder.holds(place)):
-                raise Elsewhere("a file outside the folder")
+                raise ValueError("a file outside the folder")
     for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _check_places(inner, folder)
 

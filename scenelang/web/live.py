@@ -120,14 +120,8 @@ class Play:
             log.warning("unsaved text is not kept: %s", error)
 
 
-FILES: Final = {
-    "png": "image/png",
-    "gif": "image/gif",
-    "webp": "image/webp",
-    "apng": "image/apng",
-    "html": "text/html",
-    "nsg": "text/plain",
-}
+FILES: Final = {kind: f"image/{kind}" for kind in ("png", "gif", "webp", "apng")}
+FILES.update(html="text/html", nsg="text/plain")
 LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
 FILE_S: Final = 3600.0
 KEEP_S: Final = 0.5  # between two times that an unsaved text is stored

@@ -81,7 +81,7 @@ def _gates(paint: int, kind: int) -> str:
 
     parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
     head = "(int at, float d, float before)"
-    return "".join(_function(f"float {name}{head}", [largest(*lines)]) for name, lines in parts.items())
+    return "".join(f"float {name}{head} {{\n  {largest(*lines)}\n}}\n" for name, lines in parts.items())
 
 
 def _decoders(decoders: Sequence[Smooth], sloped: bool) -> str:
@@ -139,7 +139,3 @@ def _back(column: np.ndarray, name: str) -> str:
 
 def _four(numbers: np.ndarray) -> str:
     return f"vec4({', '.join(f'{number:.9g}' for number in numbers)})"
-
-
-def _function(head: str, lines: Sequence[str]) -> str:
-    return "\n".join([f"{head} {{", *(f"  {line}" for line in lines), "}", ""])

@@ -30,14 +30,12 @@ class Server:
         self.origin = self.url.rsplit("/", 2)[0]
 
     def connect(self, name: str, **options: Any) -> ClientConnection:
-        """A websocket."""
         options = {"origin": self.origin, "max_size": None, "proxy": None, **options}
         socket: ClientConnection = connect(f"{self.url.replace('http', 'ws', 1)}{name}", **options)
         return socket
 
     @contextlib.contextmanager
     def page(self) -> Iterator[Page]:
-        """A page that is open."""
         with self.connect("live") as socket:
             yield Page(socket)
 
@@ -48,26 +46,21 @@ class Server:
         self.end(signal.SIGTERM)  # which does nothing to one that has ended
 
     def end(self, how: int = signal.SIGINT) -> int:
-        """End it; the exit code."""
         self.process.send_signal(how)
         self.process.communicate(timeout=WAIT_S)
         return self.process.returncode
 
 
 class Page:
-    """What says messages and is told some."""
-
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.told: list[dict[str, Any]] = []
         self.files = self.until("files")
 
     def say(self, kind: str, **message: Any) -> None:
-        """Send a message."""
         self.socket.send(json.dumps({"kind": kind, **message}))
 
     def hear(self) -> dict[str, Any]:
-        """The next message."""
         self.told.append(json.loads(self.socket.recv(WAIT_S)))
         return self.told[-1]
 
@@ -86,25 +79,21 @@ class Page:
         return text
 
     def draw(self, id: int | str, file: str, by: str = "network", **wishes: Any) -> None:
-        """Ask for a picture."""
         self.say("draw", id=id, file=file, by=by, **{"params": {}, "frame": 0, "size": [64, 48], **wishes})
 
 
 def children(pid: int) -> set[int]:
-    """Processes that a process has started and that are there."""
     found = subprocess.run(["ps", "-eo", "pid=,ppid=,comm="], capture_output=True, text=True, check=True)
     rows = [line.split(None, 2) for line in found.stdout.splitlines()]
     return {int(child) for child, parent, name in rows if int(parent) == pid and name != "ps"}
 
 
 def below(pid: int) -> set[int]:
-    """Processes that a process and those below it have started and that are there."""
     found = children(pid)
     return found.union(*map(below, found))
 
 
 def is_there(pid: int) -> bool:
-    """Whether a process runs."""
     with contextlib.suppress(FileNotFoundError, ProcessLookupError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False

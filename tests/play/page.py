@@ -11,16 +11,9 @@ from tests.browser import watched
 from tests.play.client import Server
 
 PATIENCE_MS = 20_000
-"""How long anything is waited for; most takes milliseconds."""
 
 
 class Page:
-    """The page of a server, as its user has it.
-
-    Args:
-        page: of Playwright.
-    """
-
     def __init__(self, page: Any) -> None:
         self.page = page
         page.set_default_timeout(PATIENCE_MS)
@@ -37,7 +30,6 @@ class Page:
         return found
 
     def text(self) -> str:
-        """What is in the editor, where it is short."""
         return "\n".join(self.page.locator(".cm-line").all_inner_texts()).replace("\n\n", "\n")
 
     def has(self, piece: str) -> None:

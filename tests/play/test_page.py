@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+import scenelang as nsg
+from tests.browser import watched
 from tests.play.client import Server
 from tests.play.page import Page, opened
 
@@ -212,3 +214,32 @@ def test_the_picture_is_downloaded(page: Page) -> None:
     assert download.value.suggested_filename == "a.png"
     data = Path(download.value.path()).read_bytes()
     assert data[16:24] == (40).to_bytes(4, "big") * 2
+
+
+STATEMENTS = Path(__file__).parents[2] / "scenelang/web/editor/statements.js"
+LINE = "camera(eye = [9, 8, 7], target = [1, 0.5, 0], fov = 20deg);"
+TEXTS = (
+    "",
+    "sphere;",
+    "/* camera(; */ nsg 1; // camera(eye = [0, 0, 1]);\n// at the end\nsphere;\n",
+    'nsg 1;\nparam a = "camera();";\nsphere;\n',
+    "nsg 1;\ncamera(\n  eye = [0, 0, 5], /* here ) */\n  fov = 30deg\n);\nsphere;\n",
+    "nsg 1; camera(eye = [0, 0, 5]); sphere;",
+    "nsg 1;\n// 😀 \u202e\nbackground(#fff);\nsphere;\n",
+)
+
+
+def test_the_camera_of_a_text_is_written(chromium: Any) -> None:
+    """A camera's line goes where it counts, and nothing else moves."""
+    script = """([text, line]) => {
+      const { from, to, insert } = settled(text, "camera", line);
+      return text.slice(0, from) + insert + text.slice(to ?? from);
+    }"""
+    with watched(chromium) as page:
+        page.add_script_tag(content=STATEMENTS.read_text("utf-8").replace("\nexport ", "\n"))
+        for text in TEXTS:
+            after = page.evaluate(script, [text, LINE])
+            assert nsg.loads(f"{after}sphere;").camera.eye == pytest.approx((9, 8, 7)), text
+            assert page.evaluate(script, [after, LINE]) == after, "writing it again changes nothing"
+            for kept in re.findall(r"//.*|sphere.*|param.*|background.*", text):
+                assert kept in after, text

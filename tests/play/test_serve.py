@@ -1,15 +1,16 @@
-"""Who may ask, and from the command line: ports, addresses, Ctrl-C, and nothing that stays."""
+"""Who may ask; ports, addresses and Ctrl-C; the editor that is served is what its lock file says."""
 
 from __future__ import annotations
 
 import asyncio
+import json
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
-import urllib.error
-import urllib.request
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -25,12 +26,13 @@ from starlette.websockets import WebSocket
 
 import scenelang as nsg
 from scenelang.cli.main import cli
+from scenelang.web import server as serving
 from scenelang.web.server import HEADERS, PORT, Guard, is_loopback, listen, policy
 from tests.play.client import Server, below, is_there
 from tests.play.conftest import SQUARE
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_it_ends_with_all_its_processes(tmp_path: Path, how: signal.Signals) -> None:
     (tmp_path / "a.nsg").write_text(SQUARE)
     with Server(tmp_path, tmp_path / ".state") as server, server.page() as page, server.connect("lsp"):
@@ -40,7 +42,7 @@ def test_it_ends_with_all_its_processes(tmp_path: Path, how: signal.Signals) -> 
         processes = below(server.process.pid)
         assert len(processes) >= 5  # of both pools one, what forks them, and language servers
         code = server.end(how)
-    assert code == {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}[how]
+    assert code == {signal.SIGINT: 130, signal.SIGKILL: -9}[how]
     while any(map(is_there, processes)):
         time.sleep(0.05)
     assert [path.name for path in tmp_path.iterdir() if path.name != ".state"] == ["a.nsg"]
@@ -69,47 +71,31 @@ def test_what_cannot_be_served(tmp_path: Path) -> None:
         assert (found.exit_code, message in found.output) == (2, True), found.output
 
 
-def test_a_scene_that_is_not_there_is_made(tmp_path: Path) -> None:
+def test_a_scene_that_is_not_there_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "serve", lambda *_, **__: None)
     new = tmp_path / "new.nsg"
-    with Server(new, tmp_path / ".state"):
-        assert [d.severity for d in nsg.check(new)] == []
+    assert CliRunner().invoke(cli, ["play", str(new)]).output.startswith("Made ")
+    assert not [*nsg.check(new)]
     new.write_text("star;")
-    with Server(new, tmp_path / ".state"):
-        assert new.read_text() == "star;"
+    assert CliRunner().invoke(cli, ["play", str(new)]).exit_code == 0
+    assert new.read_text() == "star;"
 
 
-@pytest.mark.parametrize("missing", ["starlette", "uvicorn", "watchfiles", "pygls"])
-def test_what_is_missing_is_told(missing: str) -> None:
-    code = f"import sys; sys.modules['{missing}'] = None\nfrom scenelang.cli.main import main\nmain(['play'])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "pip install 'scenelang[play]'" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-
-
-def test_files_of_the_package_and_no_others(server: Server) -> None:
-    """Static files: the page's and the viewer's, whatever else a path says."""
-
-    def get(path: str) -> int:
-        try:
-            with urllib.request.urlopen(f"{server.url}{path}") as answer:
-                return int(answer.status)
-        except urllib.error.HTTPError as error:
-            with error:
-                return error.code
-
-    assert get("static/viewer/gl.js") == get("static/codemirror.js") == 200
-    for path in (
-        *(
-            "static/../app.py",
-            "static/%2e%2e/app.py",
-            "static/viewer/../view.py",
-            "static/viewer/%2e%2e%2fa.py",
-        ),
-        *("static//etc/passwd", "static/..%5capp.py", "static/web", "static/", "static/.", "static/viewer"),
-        *("static/play.js%00.py", "static/viewer/gl.js/x", "app.py", "download", "download?key=", "live"),
-    ):
-        assert get(path) in (403, 404, 405), path
+def test_what_is_missing_is_told() -> None:
+    names = ["starlette", "uvicorn", "watchfiles", "pygls"]
+    code = f"""
+import contextlib, sys
+from scenelang.cli.main import main
+for name in {names}:
+    sys.modules[name] = None
+    with contextlib.suppress(SystemExit):
+        main(["play"])
+    del sys.modules[name]
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    lines = done.stderr.splitlines()
+    assert [line.split()[3].split(".")[0].rstrip(":") for line in lines] == names, lines
+    assert all("pip install 'scenelang[play]'" in line for line in lines)
 
 
 TOKEN, HERE = "t" * 43, "127.0.0.1:8766"
@@ -239,8 +225,30 @@ def test_the_page_can_load_nothing_from_elsewhere() -> None:
     assert parts["script-src"] == "'self'"
     assert parts["connect-src"] == f"'self' ws://{HERE}"
     assert "unsafe" not in policy("abc", HERE)
-
-
-def test_what_is_loopback() -> None:
     assert all(map(is_loopback, ("127.0.0.1", "localhost", "127.9.9.9")))
     assert not any(map(is_loopback, ("0.0.0.0", "8.8.8.8")))
+
+
+ROOT = Path(__file__).parents[2]
+SOURCE, WEB = ROOT / "editors/playground", ROOT / "scenelang/web/editor"
+
+
+def test_the_bundle_is_made_of_the_locked_packages() -> None:
+    head, _, code = (WEB / "codemirror.js").read_text("utf-8").partition(" */\n")
+    said = dict(line.split() for line in head.splitlines()[1:])
+    for name in ("package-lock.json", "codemirror.js"):
+        assert said.pop(name) == sha256((SOURCE / name).read_bytes()).hexdigest(), "run build.mjs again"
+    assert said.pop("code") == sha256(code.encode()).hexdigest(), "the bundle was changed by hand"
+    locked = json.loads((SOURCE / "package-lock.json").read_text("utf-8"))["packages"]
+    assert said == {name: locked[f"node_modules/{name}"]["version"] for name in said}
+    assert said.keys() >= {*re.findall(r'from "(.+)"', (SOURCE / "codemirror.js").read_text("utf-8"))}
+    licences = (WEB / "codemirror.LICENSE.txt").read_text("utf-8")
+    assert all(f"{name} {number} (MIT)" in licences for name, number in said.items())
+    assert licences.count("Permission is hereby granted") == len(said)
+
+
+def test_scenes_to_start_from_are_the_examples() -> None:
+    shipped = sorted((WEB / "examples").glob("*.nsg"))
+    assert shipped
+    for path in shipped:
+        assert path.read_bytes() == (ROOT / "examples" / path.name).read_bytes()
