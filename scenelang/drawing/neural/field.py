@@ -141,7 +141,7 @@ class Field:
         lines, bias, candidate, bump = (part[shown].T for part in rounded(cells, self.network.config.state))
         lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
         table = Cell(lines * scale, bias, candidate, bump[0] / scale)
-        opened = Cell(0 * lines, 0 * bias + 1, candidate, 0 * bump[0])
+        opened = Cell(np.zeros_like(lines), np.ones_like(bias), candidate, np.zeros_like(bump[0]))
         host = [np.concatenate(pair, -1).astype(np.float32) for pair in zip(table, opened, strict=True)]
         self._opened = len(kinds)
         self._table = Cell(*(xp.array(part, self.like) for part in host))
@@ -342,12 +342,12 @@ class Field:
     def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
         """Prove the pictures of blocks whose pairs' distances lie within ``rise`` of ``middle``."""
         objects = meetings.pairs.object
-        rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
-        distance = Interval(middle - rise, middle + rise)
         cell = self.cells(objects)
         dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
         colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
         with np.errstate(all="ignore"):
+            rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
+            distance = Interval(middle - rise, middle + rise)
             nest = nesting(meetings, self.groups)
             return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, self.joins())
 
