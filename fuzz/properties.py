@@ -24,7 +24,6 @@ PROPERTIES: Final[tuple[Property, ...]] = (
     values.scenes_survive_all_their_forms,
     values.programs_stay_in_their_files_and_can_be_drawn,
     values.networks_of_any_size_load_as_they_were_saved,
-    values.manifests_of_any_names_and_ranges_are_read,
     values.diagnostics_of_any_text_render,
 )
 EXAMPLES: Final = 50

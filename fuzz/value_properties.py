@@ -1,4 +1,4 @@
-"""Properties of whole values that are drawn: Scenes, Programs, weights, manifests, diagnostics."""
+"""Properties of whole values that are drawn: Scenes, Programs, weights, diagnostics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.oracles import check_diagnostics
 from fuzz.target import hold, load_target
-from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.program import WIDTH, Place, Program, ProgramError, parse_program, program_bytes
 from scenelang.compiler.weights import load_codes
 from scenelang.drawing.how import RenderError
@@ -23,7 +22,7 @@ from scenelang.language.pages import CODES
 from scenelang.language.scene import Scene
 from tests.strategies import scenes
 
-# ---------------------------------------------------------------- Scenes, Programs, weights, manifests
+# ---------------------------------------------------------------- Scenes, Programs, weights
 
 
 @drawn(scenes)
@@ -125,40 +124,6 @@ def networks_of_any_size_load_as_they_were_saved(data: st.DataObject) -> None:
     plain[name].view(-1)[0] = data.draw(_ENTRIES)
     header = {"format": 1, "config": {"network": {"code": 4, "material_code": 12, **sizes}}}
     load_target("weights").check(save(plain, {"scenelang": json.dumps(header)}))
-
-
-_WORDS: Final = st.lists(
-    st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True), max_size=5, unique=True
-)
-
-
-@drawn(st.data())
-def manifests_of_any_names_and_ranges_are_read(data: st.DataObject) -> None:
-    """A manifest of allowed values is read, and scenes compile or are refused with it."""
-    shipped = load_manifest("shapes2d")
-    materials = data.draw(_WORDS.filter(bool))
-    line = st.text(st.characters(categories=("L", "N", "P")), min_size=1, max_size=9).filter(str.isprintable)
-    span = st.tuples(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9)).map(sorted)
-    dimension = data.draw(st.sampled_from([2, 3]))
-    leaves = list(shipped.geometries) if dimension == 2 else ["sphere", "torus"]
-    told = {
-        "format": 1,
-        "name": data.draw(line.filter(lambda name: name[0] != "." and not set(name) & set('"\\/:'))),
-        "summary": data.draw(line),
-        "dimension": dimension,
-        "renderer": "framed",
-        "lifting": "exact",
-        "geometries": data.draw(_WORDS | st.just(leaves)),
-        "materials": materials,
-        "limits": data.draw(
-            st.dictionaries(st.sampled_from(["inner_warps", "outer_warps", "canvas"]), st.integers(0, 2))
-        ),
-        "trained": data.draw(st.dictionaries(st.sampled_from(["objects", "twirl", "bend", "scale"]), span)),
-        "measured": data.draw(st.dictionaries(line.filter(lambda key: key != "stability"), st.integers())),
-    }
-    text = json.dumps(told)
-    hold(Manifest.from_json(text).name == told["name"], "manifests are read")
-    load_target("weights").check(text.encode())
 
 
 # ---------------------------------------------------------------- diagnostics of any text

@@ -1,4 +1,4 @@
-"""Any bytes as the weights of a model, or as its manifest where they begin with a brace."""
+"""Any bytes as the weights of a model."""
 
 from __future__ import annotations
 
@@ -7,65 +7,31 @@ import warnings
 from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
-from pathlib import Path
-from random import Random
 from unittest.mock import patch
 
 import numpy as np
 import torch
 from safetensors.torch import save
 
-from fuzz import tensors, trees
-from fuzz.oracles import check_diagnostics
+from fuzz import tensors
 from fuzz.target import Target, hold
 from scenelang.compiler import weights
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.manifest import ROOT, Manifest, load_manifest
-from scenelang.compiler.passes import check_scene
+from scenelang.compiler.manifest import ROOT, load_manifest
 from scenelang.compiler.program import ProgramError
 from scenelang.compiler.weights import ModelError, codes_of, open_weights, read_facts
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.load import Framed, Model, load_network
 from scenelang.drawing.torch_backend import draw_program
-from scenelang.language.diagnostics import Diagnostics, SourceFile
-from scenelang.language.evaluation import Source, loads
+from scenelang.language.evaluation import loads
 from scenelang.language.reports import SceneError
 
 MODEL = "shapes2d"
 SCENE = """canvas(8, 6);
 chain { square { bend(0.3); rotate(20deg); } smooth star { translate(0.2, 0.1); twirl(1); } }"""
-WORDS = """nsg 1;
-chain { square { twirl(3); scale(9); } subtract star { material flat { color(#d33); hue(9deg); } } }"""
 
 
 def check(data: bytes) -> None:
-    """Read as what the first byte says."""
-    if data[:1] == b"{":
-        _check_manifest(data)
-    else:
-        _check_weights(data)
-
-
-def _check_manifest(data: bytes) -> None:
-    """A manifest or a ValueError; scenes meet every name and limit in it."""
-    try:
-        manifest = Manifest.from_json(data.decode("utf-8", "surrogateescape"))
-    except ValueError:
-        return
-    told = {**asdict(manifest), "format": 1}
-    hold(Manifest.from_json(json.dumps(told)) == manifest, "manifest to JSON and back")
-    for text in (SCENE, WORDS, f'model "{MODEL}"; star {{ }}'):
-        found = Diagnostics()
-        scene, spans = Source(text=SourceFile("fuzz.nsg", text)).scene(found)
-        if scene is not None:
-            try:
-                check_scene(scene, spans, found, manifest, None)
-            except SceneError as error:
-                check_diagnostics(error.diagnostics, None)
-        check_diagnostics(list(found), None)
-
-
-def _check_weights(data: bytes) -> None:
     """Codes, facts and network, or ModelError; what loads is saved, loaded again and drawn with."""
     manifest = load_manifest(MODEL)
     _facts(data)
@@ -117,11 +83,6 @@ def _shipped() -> bytes:
 
 
 @cache
-def _manifest() -> bytes:
-    return (Path(ROOT) / MODEL / "manifest.json").read_bytes()
-
-
-@cache
 def _small() -> bytes:
     """A network of the smallest sizes, so that most of a file is header."""
     from scenelang.drawing.neural.load import Framed
@@ -137,40 +98,23 @@ def _small() -> bytes:
 
 
 def seeds() -> list[bytes]:
-    """The shipped weights, a small network, and the shipped manifest."""
-    manifest = trees.load(_manifest())
-    short = {**manifest, "measured": {}, "trained": {"objects": [1, 2], "twirl": [-1, 1], "scale": [0.5, 1]}}
-    solids = {**short, "dimension": 3, "transforms": ["twist", "displace", "scale", "twirl"]}
-    written = [trees.dump(value) for value in (short, solids, {**short, "limits": {}}, {"format": 1})]
-    return [_small(), _shipped(), _manifest(), *written, b"", b"{", b"\0" * 8]
-
-
-def mutate(data: bytes, generator: Random) -> bytes:
-    """A change of the manifest's tree, or of the weights' file at any level."""
-    if data[:1] != b"{":
-        return tensors.mutate(data, generator)
-    if generator.random() < 0.1:
-        return trees.flip(data, generator)
-    try:
-        return trees.dump(trees.mutate(trees.load(data), generator))
-    except (ValueError, RecursionError):
-        return trees.flip(data, generator)
+    """A small network and the shipped weights."""
+    return [_small(), _shipped(), b"", b"{", b"\0" * 8]
 
 
 def dictionary() -> list[bytes]:
-    """Words of the headers and of manifests."""
+    """Words of the headers."""
     words = "format config network code decoder_width dtype shape data_offsets F32 F16 __metadata__ scenelang"
-    return tensors.quoted(" ".join((*asdict(load_manifest(MODEL)), words, "codes material_codes")))
+    return tensors.quoted(f"{words} codes material_codes")
 
 
 TARGET = Target(
     name="weights",
-    summary="any bytes are the weights of a network or a ModelError, or a manifest or a ValueError; what "
-    "loads is saved and loaded unchanged, draws finite numbers, and no scene makes a manifest raise "
-    "anything else",
+    summary="any bytes are the weights of a network or a ModelError; what loads is saved and loaded "
+    "unchanged and draws finite numbers",
     check=check,
     seeds=seeds,
-    mutate=mutate,
+    mutate=tensors.mutate,
     dictionary=dictionary,
     most_bytes=32_768,
 )

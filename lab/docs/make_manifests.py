@@ -65,7 +65,7 @@ def text(data: dict[str, Any]) -> str:
 def main() -> None:
     for name in available():
         path, made = ROOT / name / "manifest.json", text(manifest(name))
-        Manifest.from_json(made)  # before it is written
+        Manifest.from_json(made.encode())  # before it is written
         if "--check" not in sys.argv:
             path.write_text(made, "utf-8")
         elif path.read_text("utf-8") != made:

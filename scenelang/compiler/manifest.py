@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from scenelang.assets.files import note_input, read_json, read_regular
+from scenelang.assets.files import note_input, read_json
 
 ROOT = Path(__file__).parent / "models"
-MOST: Final = 1e300  # bound of the numbers in ranges
-_MOST_BYTES: Final = 1 << 20
-OPTIONAL: Final = ("set", "sizes", "white", "any_blend")
 ALIASES: Final = {"textures2d": "shapes2d"}
 """Earlier names of models, which scenes, Programs and commands may go on to use."""
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 """The model of scenes of a dimension that name none."""
-_LIMITS: Final = {"canvas": 8192, "inner_warps": 2, "outer_warps": 3}
-"""Limits that a model may have: the largest canvas of all, and what the exact lifting has room for."""
-_RANGES: Final = {
-    "objects", "smooth", "twirl", "bend", "twist", "scale", "thin", "blend", "displace", "frequency",
-    "thickness", "width", "texels",
-}  # fmt: skip
 _DRAWN: Final = {
     "framed": ("element of the plane", "texture"),
     "solid": ("element of space", "texture", "colouring of space"),
@@ -69,24 +59,22 @@ class Manifest:
     any_blend: bool = False
 
     @staticmethod
-    def from_json(text: str | bytes) -> Manifest:
-        """Read a manifest; raises ValueError for other JSON, and for missing, unknown or wrong fields."""
-        text = text.encode("utf-8") if isinstance(text, str) else text
-        if len(text) > _MOST_BYTES:
-            raise ValueError(f"a manifest of more than {_MOST_BYTES:,} bytes")
-        data = read_json(text)
-        if not isinstance(data, dict) or data.pop("format", None) != 1:
-            raise ValueError("not a model manifest of format 1")
-        if wrong := {*data, *OPTIONAL} ^ _KINDS.keys():
-            raise ValueError(f"fields missing or unknown: {', '.join(sorted(wrong))}")
-        data.setdefault("set", data["name"])
-        for key, value in data.items():
-            if not _KINDS[key](value):
-                raise ValueError(f"field `{key}` does not hold what it should")
-        lists = {key: tuple(data[key]) for key in ("geometries", "materials")}
-        trained = {key: (float(low), float(high)) for key, (low, high) in data["trained"].items()}
-        sizes = tuple((width, height) for width, height in data.get("sizes", ()))
-        return Manifest(**{**data, **lists, "trained": trained, "sizes": sizes})
+    def from_json(data: bytes) -> Manifest:
+        """Read a manifest; raises ValueError for what is not one of format 1, or lacks a part."""
+        try:
+            read = read_json(data)
+            if read.pop("format") != 1:
+                raise ValueError("another format")
+            changed = {
+                "set": read.get("set", read["name"]),
+                "geometries": tuple(read["geometries"]),
+                "materials": tuple(read["materials"]),
+                "trained": {key: (float(low), float(high)) for key, (low, high) in read["trained"].items()},
+                "sizes": tuple((width, height) for width, height in read.get("sizes", ())),
+            }
+            return Manifest(**{**read, **changed})
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"not a model manifest of format 1: {error}") from error
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -97,68 +85,6 @@ class Manifest:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
         value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)
         return float(value)
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str) and value != "" and value.isprintable()
-
-
-def _is_name(value: Any) -> bool:
-    """Names of models and sets name files too."""
-    return _is_text(value) and len(value) <= 100 and value[0] != "." and not set(value) & set('"\\/:')
-
-
-def _is_word(value: Any) -> bool:
-    return isinstance(value, str) and value.isascii() and value.isidentifier()
-
-
-def _are_words(value: Any) -> bool:
-    return isinstance(value, list) and all(map(_is_word, value)) and len(set(value)) == len(value)
-
-
-def _is_pair(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(type(v) in (int, float) for v in value)
-
-
-def _is_range(value: Any) -> bool:
-    """Two numbers that float64 holds, the lower first."""
-    return _is_pair(value) and bool(-MOST <= value[0] <= value[1] <= MOST)
-
-
-def _is_size(value: Any) -> bool:
-    """Two sides in pixels."""
-    return _is_pair(value) and all(type(v) is int and 1 <= v <= 8192 for v in value)
-
-
-def _are(holds: Callable[[Any, Any], bool]) -> Callable[[Any], bool]:
-    """A check that a value is an object and that each entry passes ``holds``."""
-    return lambda value: isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
-
-
-def _is_figure(key: str, value: Any) -> bool:
-    """Check a measurement: sets are objects of figures, the stability suite has a line for each quantity."""
-    if key == "sets":
-        return _are(lambda _, v: isinstance(v, dict) and _is_range([0, v.get("flip", 1)]))(value)
-    return key != "stability" or _are(lambda _, v: _is_text(v))(value)
-
-
-_KINDS: Final[dict[str, Callable[[Any], bool]]] = {
-    "name": _is_name,
-    "summary": _is_text,
-    "dimension": lambda value: type(value) is int and value in (2, 3),
-    "renderer": _is_word,
-    "lifting": _is_word,
-    "geometries": _are_words,
-    "materials": lambda value: _are_words(value) and len(value) > 0,
-    "limits": _are(lambda key, v: type(v) is int and 0 <= v <= _LIMITS.get(key, -1)),
-    "trained": _are(lambda key, v: key in _RANGES and _is_range(v)),
-    "measured": _are(_is_figure),
-    "set": _is_name,
-    "sizes": lambda value: isinstance(value, list) and all(map(_is_size, value)),
-    "white": lambda value: type(value) is bool,
-    "any_blend": lambda value: type(value) is bool,
-}
-"""The check of each field."""
 
 
 _FILE: Final = "manifest.json"
@@ -187,9 +113,9 @@ def load_manifest(name: str) -> Manifest:
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
     known = _READ.get(path)
     if known is None or known[0] != stamp:
-        result = Manifest.from_json(read_regular(path, _MOST_BYTES))
+        result = Manifest.from_json(path.read_bytes())
         if result.name != name:
-            raise ValueError(f"the manifest of `{name}` calls itself `{result.name[:40]}`")
+            raise ValueError(f"the manifest of `{name}` calls itself `{result.name}`")
         known = _READ[path] = stamp, result
     note_input(os.fspath(path))
     return known[1]

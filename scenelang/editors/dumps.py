@@ -8,7 +8,6 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, fields
-from functools import partial
 from importlib.resources import files
 from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
@@ -452,13 +451,13 @@ def scene_schema() -> dict[str, Any]:
     return head | described
 
 
-def _written(name: str) -> dict[str, Any]:
-    return json.loads(files("scenelang").joinpath(f"editors/schemas/{name}.json").read_text("utf-8"))  # type: ignore[no-any-return]
+def diagnostics_schema() -> dict[str, Any]:
+    """The schema of the output of ``scenelang check --format json``."""
+    path = files("scenelang").joinpath("editors/schemas/diagnostics.json")
+    return json.loads(path.read_text("utf-8"))  # type: ignore[no-any-return]
 
 
 SCHEMAS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
     "scene": scene_schema,
-    "diagnostics": partial(_written, "diagnostics"),
-    "manifest": partial(_written, "manifest"),
+    "diagnostics": diagnostics_schema,
 }
-"""Schemas of a Scene, of the output of ``scenelang check --format json`` and of a model's manifest."""

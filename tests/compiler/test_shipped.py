@@ -10,11 +10,31 @@ from lab.docs.make_textures import drawn
 from scenelang.assets.picture import pixels
 from scenelang.assets.zoo import TEXTURES_FILE, load_textures
 from scenelang.compiler.compile import compile_scene
-from scenelang.compiler.manifest import available, load_manifest
+from scenelang.compiler.manifest import ROOT, Manifest, available, load_manifest
 from scenelang.drawing.torch_backend import draw_program, open_model
 from scenelang.language.words import TEXTURES
 
 MODELS = [name for name in available() if load_manifest(name).dimension == 2]
+
+
+def test_manifests() -> None:
+    for name in available():
+        manifest = load_manifest(name)
+        assert manifest.name == name
+        assert manifest.limits.keys() <= {"canvas", "inner_warps", "outer_warps"}, name
+        assert all(low <= high for low, high in manifest.trained.values()), name
+
+
+def test_damaged_manifests() -> None:
+    data = (ROOT / "shapes2d" / "manifest.json").read_bytes()
+    changes = (
+        (b'"format": 1', b'"format": 2'),
+        (b'"renderer"', b'"drawer"'),
+        (b'"twirl": [', b'"twirl": [1, '),
+    )
+    for damaged in (b"", b"[]", b"\xff", data[:-100], *(data.replace(*change) for change in changes)):
+        with pytest.raises(ValueError, match="not a model manifest of format 1"):
+            Manifest.from_json(damaged)
 
 
 @pytest.mark.parametrize("name", MODELS)

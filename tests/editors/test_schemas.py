@@ -5,8 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import random
-from contextlib import nullcontext
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import scenelang as nsg
-from scenelang.compiler.manifest import ROOT, Manifest
 from scenelang.editors.dumps import SCHEMAS, scene_schema
 from scenelang.language.machine import render_json
 from scenelang.language.scene import to_readable_json
@@ -116,21 +113,6 @@ AGREED = [
 def test_schema_and_reader_agree() -> None:
     for text, good in AGREED:
         assert SCENE.is_valid(json.loads(text)) == reads(json.loads(text)) == good, text
-
-
-def test_schema_and_reader_agree_on_manifests() -> None:
-    schema = SCHEMAS["manifest"]()
-    assert {field.name for field in fields(Manifest)} | {"format"} == set(schema["properties"])
-    for path in ROOT.glob("*/manifest.json"):
-        Draft202012Validator(schema).validate(json.loads(path.read_text("utf-8")))
-    good: list[dict[str, object]] = [{}, {"set": "shapes2d", "sizes": [[128, 96], [64, 64]], "white": True}]
-    bad: list[dict[str, object]] = [{"sizes": [size]} for size in ([0, 64], [64], [64, 8193])]
-    bad += [{"white": 1}, {"set": 1}, {"a": 1}]
-    for change in [*good, *bad]:
-        data = {**json.loads((ROOT / "shapes2d" / "manifest.json").read_text("utf-8")), **change}
-        assert Draft202012Validator(schema).is_valid(data) == (change in good), change
-        with nullcontext() if change in good else pytest.raises(ValueError, match=r"."):
-            Manifest.from_json(json.dumps(data))
 
 
 def test_diagnostics_are_valid() -> None:

@@ -13,8 +13,8 @@ from scenelang.cli.say import put_out
 @click.command("schema")
 @options.choice(
     "--kind",
-    words="scene diagnostics manifest",
-    help="Schema of scenes as JSON, of what `check --format json` prints, or of a model's manifest.",
+    words="scene diagnostics",
+    help="Schema of scenes as JSON, or of what `check --format json` prints.",
 )
 @options.out
 def command(kind: str, out: str | None) -> None:
