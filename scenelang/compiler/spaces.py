@@ -114,10 +114,7 @@ class Ground(Record):
 
 
 class Stage(Record):
-    """All of a 3D scene that is not an object; the ground fades into the sky's ``horizon``.
-
-    Where it is ``transparent`` the sky is not drawn and the picture has alpha.
-    """
+    """A 3D scene without its objects; the ground fades into ``horizon``, ``transparent`` draws no sky."""
 
     camera: Camera = Camera()
     light: Light = Light()

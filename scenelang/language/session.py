@@ -77,10 +77,7 @@ class Definition(Record, frozen=False):
 
 
 class Binding(Record, frozen=False):
-    """Meaning of a name.
-
-    Its value: a `Definition`, an imported file, a Scene's name of an element, or that of a constant ``let``.
-    """
+    """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 
     kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
     span: Span | None = None  # None for the language's own names

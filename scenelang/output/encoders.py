@@ -186,10 +186,7 @@ class Census:
 
 
 class Mapper:
-    """Pictures to indices of a palette (K, 3): exact where the colour is in it, the nearest otherwise.
-
-    If asked, the error is dithered over neighbouring pixels (Floyd and Steinberg 1976).
-    """
+    """Pictures to nearest indices of a palette (K, 3); if asked, dithered (Floyd and Steinberg 1976)."""
 
     def __init__(self, colours: Colours, dither: bool) -> None:
         self.colours, self.dither = colours, dither

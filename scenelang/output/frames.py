@@ -166,10 +166,7 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder, whose files start with ``stem``.
-
-    Raises `TargetError` where it is none of these.
-    """
+    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder of ``stem``s; else raise `TargetError`."""
     path = Path(out)
     if is_pattern(out):
         bare = path.name.replace("%%", "")
@@ -373,10 +370,7 @@ class FixedFrames:
 
 
 class Clip:
-    """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
-
-    A mistake in any frame ends the clip. ``fps`` stands instead of those of the first Scene's animation.
-    """
+    """A scene evaluated and compiled by frames, or Scenes as frames; a mistake in any frame ends it."""
 
     def __init__(
         self,

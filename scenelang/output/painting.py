@@ -65,10 +65,7 @@ class Painter:
     load_s: float = 0.0  # time of loading torch
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`.
-
-        Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
-        """
+        """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`."""
         program, place = None, "cpu"
         if self.how.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})

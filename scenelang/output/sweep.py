@@ -105,10 +105,7 @@ def rows_of(
     count: int | None = None,
     seed: int = 0,
 ) -> Rows:
-    """Rows of a grid, of values or of text as for `values_of`, and of random values.
-
-    Each param of ``drawn`` has a range, or empty text for its own. The count is by default that of the grid.
-    """
+    """Rows of a grid, by default as many, and random values of ``drawn``: a range, or "" for its own."""
     result: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
         stmt = param_named(evaluation, name)
