@@ -68,7 +68,6 @@ class Look(Record):
 
     @property
     def moved(self) -> Rows:
-        """The map that moves its texture."""
         return composed(self.texture)
 
 
@@ -160,7 +159,6 @@ class Leaf(Record):
     _key = attrgetter("geometry", "look", "moves", "span")
 
     def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
-        """The same object with another look or other moves."""
         return Leaf(self.geometry, look, moves, self.span, self.number, None if self.notes is None else {})
 
     def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
@@ -173,7 +171,6 @@ class Leaf(Record):
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """The steps of its moves."""
         return tuple([move.step for move in self.moves])
 
 
@@ -231,7 +228,6 @@ class Graph(Record):
     elements: dict[str, Element] = field(default_factory=dict)
 
     def rooted(self, root: Fold) -> Graph:
-        """The same scene with another root."""
         return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
 
     def rows(self) -> list[Row]:

@@ -217,7 +217,6 @@ def _check(kind: str, layers: tuple[tuple[Doubles, Doubles], ...], width: int, s
 
 
 def step_numbers(step: Step) -> tuple[str, list[float]]:
-    """The encoder of a step and its input."""
     if isinstance(step, Affine):
         a, b, c, d, e, f, g, h, i, j, k, l = step.rows  # noqa: E741
         return "affine", [a, b, c, d, e, f, g, h, i, j, k, l, 0.0, 0.0, 0.0, 1.0]

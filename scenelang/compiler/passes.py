@@ -394,7 +394,6 @@ def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
 
 
 def _in_sight(box: Box, graph: Graph) -> bool:
-    """True where something in a box may be seen."""
     if (stage := graph.stage) is None:
         return overlap(box, graph.window())
     eye, (forward, right, up) = stage.camera.eye, stage.camera.axes()

@@ -196,7 +196,6 @@ def cover_of(leaf: Leaf, space: Space) -> Cover | None:
 
 
 def covered(box: Box, covers: list[Cover]) -> bool:
-    """True where a box lies inside one of some covers."""
     left, bottom, right, top, near, far = box
     depths = (near,) if near == far else (near, far)
     corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]

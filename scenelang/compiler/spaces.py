@@ -147,7 +147,6 @@ _PARTS: dict[str, type[Record]] = {"camera": Camera, "light": Light, "ground": G
 
 
 def _read(name: str, value: object) -> Any:
-    """A field of a stage or of one of its parts."""
     if name in _PARTS:
         if value is None:
             return None

@@ -108,7 +108,6 @@ def inverted(rows: Rows) -> Rows:
 
 
 def translation(x: float, y: float, z: float = 0.0) -> Rows:
-    """A shift by (x, y, z)."""
     return (1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z)
 
 

@@ -54,7 +54,6 @@ class Source(Record):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Values for params."""
         return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
 
     def parsed(self, diagnostics: Diagnostics) -> Source:
@@ -92,7 +91,6 @@ class Source(Record):
 
 
 def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) -> None:
-    """Report that a file is not text."""
     diagnostics.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
 
 
@@ -316,7 +314,6 @@ class Knob(Record):
 
     @property
     def name(self) -> str:
-        """As the scene has it."""
         return self.stmt.name.text
 
 

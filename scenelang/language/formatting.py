@@ -287,7 +287,6 @@ class Layout:
         self.doubtful = False  # at what only the builder of the tree can refuse
 
     def word(self, token: int) -> Part:
-        """A token with what stands around it."""
         text = self.text[self.starts[token] : self.ends[token]]
         note = self.notes.get(token)
         if note is None:

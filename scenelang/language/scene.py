@@ -115,7 +115,6 @@ class Elements(Frozen):
 
     @staticmethod
     def of(name: str, path: str, zoo: Zoo) -> Elements:
-        """A file that has been read."""
         elements = Elements(name, path, zoo.digest)
         elements._zoo = zoo
         return elements
@@ -159,7 +158,6 @@ class Brought(Record):
 
     @staticmethod
     def of(files: tuple[Elements, ...]) -> Brought:
-        """All elements of files."""
         zoos = [(file.name, file.zoo) for file in files if file.zoo is not None]
         return Brought(
             {f"{name}.{key}": element for name, zoo in zoos for key, element in zoo.geometries.items()},
@@ -318,7 +316,6 @@ class Scene(Frozen):
 
 
 def _stated(name: str | None, value: Any) -> str:
-    """A value of the stage as text."""
     if name == "color":
         return rgb(value)
     if isinstance(value, tuple):

@@ -68,7 +68,6 @@ class RenderResult:
     keys: list[str] = field(default_factory=list)  # digest of each frame's inputs; empty where left out
 
     def lines(self) -> list[str]:
-        """Report of the run, line by line."""
         each = 1000 / max(1, self.frames)
         asked = f" ({self.asked} asked for; more than frames or cores do not help)" if self.asked else ""
         return [

@@ -162,7 +162,6 @@ class Census:
 
     @property
     def fits(self) -> bool:
-        """True where one palette holds all colours."""
         return not self.thinned and len(self.colours) <= self.most
 
     def choose(self) -> Colours:
@@ -257,7 +256,6 @@ def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
 
 
 def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
-    """The chunks of a picture."""
     data = io.BytesIO()
     Image.fromarray(pixels).save(data, "PNG")
     raw, at, result = data.getvalue(), len(SIGNATURE), []

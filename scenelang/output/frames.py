@@ -48,8 +48,6 @@ class FramesError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FrameRange:
-    """A requested range of frames."""
-
     first: int = 0  # from 0
     last: int | None = None  # the last one; None for that of the animation
 
@@ -135,13 +133,11 @@ class Target:
     pattern: str = ""  # name of each file of a sequence, with `%04d` for its number
 
     def file(self, frame: int) -> Path:
-        """The file of a frame of a sequence."""
         parts = self.pattern.split("%%")
         filled = [_NUMBER.sub(lambda match: f"{frame:{match[1] or 'd'}}", part) for part in parts]
         return self.path / "%".join(filled)
 
     def there(self) -> list[Path]:
-        """Existing files of a sequence, of any number."""
         number = 1_234_567_890
         head, tail = self.file(number).name.split(str(number))
         named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
@@ -245,7 +241,6 @@ class Store:
         self._lock.close()
 
     def file(self, key: str) -> Path:
-        """Path of the frame of a key."""
         return self.folder / f"{key}{self.suffix}"
 
     def beside(self, key: str, number: int, suffix: str) -> Path:
@@ -334,8 +329,6 @@ STILL = Animation(seconds=1.0, fps=1.0)
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One frame."""
-
     number: int  # from 0
     scene: Scene  # evaluated
     spans: SpanMap  # where its nodes were written
@@ -343,8 +336,6 @@ class Shot:
 
 @dataclass(frozen=True, slots=True)
 class FixedFrames:
-    """Frames that are Scenes already."""
-
     scenes: tuple[Scene, ...]  # at least one
     fps: float | None = None  # frames a second; None for those of the first scene's animation
     wanted: tuple[Path, ...] = ()

@@ -83,8 +83,6 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """Points of one run."""
-
     __pydantic_config__ = _STRICT
     set: str  # the scenes' set
     yardstick_ms: NonNegativeFloat  # time of `yardstick` on the measured machine
@@ -228,7 +226,6 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
 
 
 def _lacks(offer: Offer, limits: Limits) -> str:
-    """Limits that an offer exceeds, in words."""
     slow = limits.ms is not None and offer.ms > limits.ms
     wrong = limits.flip is not None and offer.flip > limits.flip
     return " and ".join(["too slow"] * slow + ["not exact enough"] * wrong)

@@ -82,7 +82,6 @@ class Link:
 
     @property
     def count(self) -> int:
-        """Number of workers a few seconds ago."""
         known: int = self._client._scheduler_identity.get("n_workers", 0)  # asking would wait for an answer
         return known or self._first
 
