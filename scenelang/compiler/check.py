@@ -48,17 +48,10 @@ def check_frames(
     every: bool = False,
     after: After | None = None,
 ) -> tuple[int, int]:
-    """Check further frames of an animation whose first frame has been run.
+    """Check further frames of an animation of which frame 0, with the scene ``first``, has been run.
 
-    They share the limits of one frame: where these are met, the rest is left out.
-
-    Args:
-        evaluation: has run frame 0, whose scene is ``first``, None if it has errors.
-        diagnostics: those of the evaluation; receives what frame 0 did not have, with the frame's number.
-        every: check all frames, instead of the second, the middle and the last one.
-
-    Returns:
-        The number of frames that have been checked, and of those that were to be.
+    They share the limits of one frame; where these are met, the rest is left out. Returns how many were
+    checked, and how many were to be: the second, the middle and the last, or ``every`` one.
     """
     count, looked, last, memory = evaluation.frames, 1, first, Memory()
     chosen = range(1, count) if every else sorted({1, count // 2, count - 1} - {0, count})
@@ -91,11 +84,7 @@ def check_evaluated(
 ) -> int:
     """Run all checks that follow evaluation; the number of frames left out, beyond the limits of one scene.
 
-    Args:
-        tree: the syntax tree of its text; None for JSON.
-        evaluation: has run one frame, the first unless ``frames`` is ``"one"``; None for JSON.
-        scene: the result of the evaluation, None if it has errors.
-        diagnostics: those of the evaluation; receives the others.
+    Tree and evaluation are None for JSON, the scene is None if it has errors.
     """
     left = 0
     if scene is not None:
@@ -143,12 +132,7 @@ def check_text(
     all_frames: bool = False,
     name: str = "<text>",
 ) -> Diagnostics:
-    """All diagnostics of scene text, as `check`. Imports are looked for in ``root`` alone.
-
-    Args:
-        text: the scene.
-        name: its name in diagnostics.
-    """
+    """All diagnostics of scene text, called ``name`` there; as `check`, but imports come from ``root``."""
     source = Source(text=SourceFile(name, text), params=params, model=model, root=root)
     return _look(source, all_frames)
 
@@ -161,11 +145,7 @@ def fix_text(
     root: str | os.PathLike[str] | None = None,
     name: str = "<text>",
 ) -> tuple[str, Diagnostics]:
-    """Scene text after all safe fixes, and what is left, as ``scenelang check --fix`` has them.
-
-    Args:
-        text, params, model, root, name: as for `check_text`.
-    """
+    """Scene text after the safe fixes of ``scenelang check --fix``, and what is left; as `check_text`."""
 
     def look(texts: Mapping[str, str]) -> Iterable[tuple[str | None, Diagnostic]]:
         text = SourceFile(name, texts[name])

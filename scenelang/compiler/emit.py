@@ -55,7 +55,6 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
 
 
 def tokens_of(rows: list[Row]) -> npt.NDArray[np.int8]:
-    """Tokens (N,) of the rows of a stream."""
     return np.array([TOKENS[r.op] | BEGINS * r.begins | r.ends << ENDS for r in rows], dtype=np.int8)
 
 
@@ -148,7 +147,6 @@ def _bounds(graph: Graph) -> npt.NDArray[np.float32]:
 
 
 def places_of(spans: list[Span | None]) -> tuple[Place | None, ...]:
-    """The places of spans in their files."""
     known: dict[tuple[str, int, int] | None, Place | None] = {None: None}
     keys = [None if span is None else (span.source.name, span.start, span.end) for span in spans]
     for key, span in zip(keys, spans, strict=True):

@@ -19,19 +19,14 @@ Points = Any  # an array (d, …), or a sequence of d coordinates
 
 
 class Geometry(Record):
-    """A leaf, which lies within the unit disc or ball of its own space.
+    """A leaf within the unit disc or ball of its space; ``distance`` of points (d, …) is exact and signed.
 
-    Args:
-        distance: exact signed distance, negative inside, of points (d, …).
-        inner: radius of a disc or ball about the origin that lies within it; 0 where there is none.
-        slopes: in space: the distance and its gradient (4, …) at points (3, …).
-        surface: in space: points (3, …) of its surface from two coordinates (2, …) in [0, 1).
-        half: in space: half the sides of a box about the origin that contains it.
-        thickness: in space: its least thickness.
-        sectors: in the plane, of a shape of dihedral symmetry: order n, direction of a vertex, outer radius,
-            and the radius at half a sector, where the edge from the vertex ends (an edge midpoint, for the
-            star an inner vertex).
-        corners: in the plane: corners of a convex polygon around it; empty for the unit disc.
+    A disc or ball of radius ``inner``, 0 for none, about the origin lies within it. In space ``slopes`` are
+    the distance and its gradient (4, …), ``surface`` gives points (3, …) from two coordinates in [0, 1),
+    ``half`` is half the sides of a box around it, ``thickness`` its least thickness. In the plane ``sectors``
+    of a shape of dihedral symmetry are its order n, direction of a vertex, outer radius, and the radius at
+    half a sector, where the edge from the vertex ends (for the star an inner vertex); ``corners`` are those
+    of a convex polygon around it, none for the unit disc.
     """
 
     distance: Callable[[Points], Array]
@@ -59,13 +54,9 @@ def namespace(x: Array) -> Any:
 
 
 def sector_distance(p: Points, n: Array, phase: Array, outer: Array, inner: Array) -> Array:
-    """Signed distance, negative inside, to a shape of dihedral symmetry: one segment bounds half a sector.
+    """Signed distance of points (2, …) to a shape of dihedral symmetry with such `Geometry.sectors`.
 
     A point is folded into the half sector; by symmetry the nearest boundary point lies in it too.
-
-    Args:
-        p: points in leaf units, (2, …).
-        n, phase, outer, inner: `Geometry.sectors`, numbers or arrays that broadcast against a coordinate.
     """
     x, y = p
     xp = namespace(x)
@@ -86,12 +77,7 @@ def sector_distance(p: Points, n: Array, phase: Array, outer: Array, inner: Arra
 def _sectored(
     n: int, phase: float, edge: float, inner: float | None = None, corners: tuple[Corner, ...] = ()
 ) -> Geometry:
-    """A shape of dihedral symmetry and outer radius 1, by default with a vertex at +y.
-
-    Args:
-        n, phase, edge: `Geometry.sectors` without the outer radius.
-        inner, corners: instead of ``edge`` and the corners of a vertex at +y, where these round otherwise.
-    """
+    """A shape of dihedral symmetry and outer radius 1, by default with corners of a vertex at +y."""
     turns = [math.tau * k / n for k in range(n)]
     return Geometry(
         lambda p: sector_distance(p, n, phase, 1.0, edge),

@@ -40,15 +40,10 @@ ColourStep = tuple[str, *tuple[float, ...]]
 
 
 class Look(Record):
-    """The material of an object.
+    """The material of an object: how it is lit, and the colour as written that operations start from.
 
-    Args:
-        material: the way it is lit: flat, diffuse or volumetric.
-        colours: operations on its colour, the first written first.
-        rgb: the colour that the operations start from, in [0, 1], as written (sRGB in 2D): white, or their
-            result where the look has been folded.
-        element: the texture whose colours the operations start from instead.
-        texture: moves of the texture over the leaf's x and y, the first written first.
+    ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture (``element``) stand
+    instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was written first first.
     """
 
     material: str
@@ -73,7 +68,6 @@ class Look(Record):
 
     @property
     def moved(self) -> Rows:
-        """The map that moves its texture."""
         return composed(self.texture)
 
 
@@ -150,13 +144,9 @@ class Move(Record):
 
 
 class Leaf(Record):
-    """One object: a leaf geometry of a model, its look and its moves.
+    """One object: a leaf geometry, its look and its moves, nearest the leaf first; ``number`` is from 1.
 
-    Args:
-        moves: steps into the parent's space, nearest the leaf first.
-        number: of the object in the scene as written, from 1; not part of the value.
-        notes: a cache for a leaf that stays from frame to frame of an animation; None for a leaf that is
-            used once. It is not part of the value.
+    ``notes`` is a cache for a leaf that stays from frame to frame, else None. Neither is part of the value.
     """
 
     geometry: str
@@ -169,7 +159,6 @@ class Leaf(Record):
     _key = attrgetter("geometry", "look", "moves", "span")
 
     def changed(self, look: Look, moves: tuple[Move, ...]) -> Leaf:
-        """The same object with another look or other moves."""
         return Leaf(self.geometry, look, moves, self.span, self.number, None if self.notes is None else {})
 
     def noted(self, key: object, make: Callable[[Leaf], T]) -> T:
@@ -182,7 +171,6 @@ class Leaf(Record):
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """The steps of its moves."""
         return tuple([move.step for move in self.moves])
 
 
@@ -200,10 +188,7 @@ class Link(Record):
 
 
 class Fold(Record):
-    """Children folded from the left, with moves nearest the leaf first; without links the empty set.
-
-    ``kind`` is the word it was written with: ``scene``, ``group``, ``chain`` or a boolean.
-    """
+    """Children folded from the left, then moves in order; ``kind`` is ``scene``, or the word as written."""
 
     kind: str
     links: tuple[Link, ...]
@@ -215,14 +200,10 @@ Node = Leaf | Fold
 
 
 class Row(NamedTuple):
-    """A leaf of a stream.
+    """A leaf of a stream, joined to what stands before it by ``op``, of width ``k`` as written or 0.
 
-    Args:
-        op: joins it to what stands before it in its group; of the first leaf of a group it joins that.
-        k: the width of that as written, 0 where none was.
-        begins: whether it is the first leaf of a group.
-        ends: number of groups that end behind it.
-        cuts: whether it, or a group around it, is cut out of something.
+    The first leaf of a group ``begins`` it, and its op joins the group; ``ends`` counts the groups that end
+    behind it. ``cuts`` says whether it, or a group around it, is cut out of something.
     """
 
     op: Combine
@@ -234,13 +215,9 @@ class Row(NamedTuple):
 
 
 class Graph(Record):
-    """A whole scene as a graph for one model.
+    """A whole scene as a graph for one model; ``root`` is a fold of kind ``scene``.
 
-    Args:
-        root: the top level, a fold of kind ``scene``; after `flatten` folds within it are groups of a stream.
-        background: colour in [0, 1] as written, or None for transparency.
-        stage: of a scene of solids, None in the plane.
-        elements: geometries that users brought, by name.
+    After `flatten` folds within it are groups of a stream. The background is in [0, 1] as written, or None.
     """
 
     root: Fold
@@ -251,7 +228,6 @@ class Graph(Record):
     elements: dict[str, Element] = field(default_factory=dict)
 
     def rooted(self, root: Fold) -> Graph:
-        """The same scene with another root."""
         return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
 
     def rows(self) -> list[Row]:
@@ -352,14 +328,8 @@ class Later(Record):
 
     Two folds whose distances at a point are equal, or both at a level or above, are after a `smooth` equal,
     or both at that level less its width or above; a union, a cut and an intersection keep the level. What is
-    cut out changes distances inside the picture, which blends see.
-
-    Args:
-        total: the sum of their widths, as a multiple of `BLEND`.
-        widest: the widest of them, world units; 0 for none.
-        count: the number of them.
-        inside: whether one of them sees distances inside what it blends.
-        everywhere: whether a row matters wherever its leaf is.
+    cut out changes distances inside the picture, which blends see (``inside``). The ``total`` of the widths
+    is a multiple of `BLEND`, the ``widest`` in world units; ``everywhere``: as far as its leaf.
     """
 
     total: float = 0.0

@@ -159,7 +159,6 @@ def felt(groups: Groups, widths: Floats) -> Felt:
 
 
 def _felt_flat(tokens: Index, widths: Floats) -> Felt:
-    """`felt` of a stream without groups, all rows at once."""
     cuts = tokens == INTERSECT
     if not widths.any():
         none = np.zeros(len(tokens))

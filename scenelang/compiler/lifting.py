@@ -59,17 +59,10 @@ class Parts(NamedTuple):
 
 
 class Layout:
-    """The places of the parts in the vectors of a dimension.
+    """The places of the parts in vectors of a dimension d, from the sizes of all, in order.
 
-    Args:
-        dimension: d.
-        sizes: of all parts, in their order; ``colour`` counts its whole matrix, ``free`` is no part.
-
-    Attributes:
-        places: of each part, a slice or an index.
-        geometry: count of the numbers, from the first, of the way to the leaf and the displacement.
-        outer, inner: the most warps of the two groups.
-        identity: the frame of no map.
+    ``colour`` counts its whole matrix, ``free`` is no part. ``geometry`` counts the numbers of the way to the
+    leaf and the displacement; ``outer`` and ``inner`` are the most warps of the two groups.
     """
 
     def __init__(self, dimension: int, **sizes: int) -> None:
@@ -151,12 +144,7 @@ def lift_colours(
     layout: Layout = PLANE_LAYOUT,
     moved: Sequence[Rows] = (),
 ) -> np.ndarray:
-    """Vectors (N, 64) in float64 of materials.
-
-    Args:
-        colours: factors of the albedo, (r, g, b) in [0, 1].
-        moved: maps of the plane that move their textures; by default none.
-    """
+    """Vectors (N, 64) in float64 of materials: colours (r, g, b) in [0, 1], and maps that move textures."""
     count = len(colours)
     texture = [PLANE_LAYOUT.identity] * count  # textures lie in a plane
     for at, map in enumerate(moved):
@@ -176,12 +164,9 @@ MATERIAL_INPUTS = {"color": 3}
 
 @dataclass(frozen=True, slots=True)
 class Lifting:
-    """Vectors and encoders of a model, as its weights file holds them, in float64.
+    """A model's codes of geometries (G, d_g) and materials (K, d_m), in the manifest's order, and encoders.
 
-    Args:
-        codes: (G, d_g), one row a geometry of the manifest, in its order.
-        material_codes: (K, d_m), one row a material.
-        encoders: kind of transformation to its three layers, each (weight (out, in), bias (out,)).
+    All is float64. An encoder, of a kind of transformation, is three layers: weight (out, in), bias (out,).
     """
 
     codes: Doubles
@@ -232,7 +217,6 @@ def _check(kind: str, layers: tuple[tuple[Doubles, Doubles], ...], width: int, s
 
 
 def step_numbers(step: Step) -> tuple[str, list[float]]:
-    """The encoder of a step and its input."""
     if isinstance(step, Affine):
         a, b, c, d, e, f, g, h, i, j, k, l = step.rows  # noqa: E741
         return "affine", [a, b, c, d, e, f, g, h, i, j, k, l, 0.0, 0.0, 0.0, 1.0]

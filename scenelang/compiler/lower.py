@@ -114,12 +114,7 @@ def lower(
     diagnostics: Diagnostics,
     memory: Memory | None = None,
 ) -> Graph:
-    """The graph of a scene for one model; what the model does not have is reported and left out.
-
-    Args:
-        spans: where nodes were written; None for a scene that did not come from text.
-        memory: of the previous frame; holds this one afterwards.
-    """
+    """The graph of a scene for one model, without what the model does not have, which is reported."""
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
     for word in STAGE if manifest.dimension == 2 else ():
         if (stated := getattr(scene, word)) != "default":

@@ -143,10 +143,8 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form; the scale of an object is each of the two stretches of its
-    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest; the
-    texels of a texture are counted where they are densest, of a solid at its centre.
-
-    Before: STREAM. After: unchanged.
+    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest; texels
+    are counted where they are densest, of a solid at its centre. Before: STREAM. After: unchanged.
     """
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
@@ -340,10 +338,7 @@ _TESTS: Final = 20_000
 
 
 def check_seen(graph: Graph, context: Context) -> Graph:
-    """Warn where the picture provably shows nothing but the background, or one object without a texture.
-
-    Before: STREAM. After: unchanged.
-    """
+    """Warn where the picture provably shows only background or one plain object. STREAM is unchanged."""
     rows = graph.rows()
     if not context.whole or not rows:
         return graph
@@ -399,7 +394,6 @@ def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:
 
 
 def _in_sight(box: Box, graph: Graph) -> bool:
-    """True where something in a box may be seen."""
     if (stage := graph.stage) is None:
         return overlap(box, graph.window())
     eye, (forward, right, up) = stage.camera.eye, stage.camera.axes()
@@ -486,19 +480,10 @@ def check_scene(
     without: Collection[str] = (),
     memory: Memory | None = None,
 ) -> Graph:
-    """Lower a scene, run all passes in order and verify the graph after each. No numpy is imported.
+    """Lower a scene, run the passes and verify the graph after each: the stream, sound without errors.
 
-    Args:
-        spans: where its nodes were written, None if it did not come from text.
-        after: called with ``"lower"`` and each pass's name and the graph it left.
-        without: names of `OPTIONAL` passes to leave out.
-        memory: as for `lower`.
-
-    Returns:
-        The stream; it stands for the scene only if no error was reported.
-
-    Raises:
-        ValueError: a pass that others need is to be left out.
+    ``after`` is called with ``"lower"`` and each pass's name and the graph it left; ``without`` names
+    `OPTIONAL` passes, else ValueError is raised. No numpy is imported.
     """
     if not OPTIONAL.issuperset(without):
         raise ValueError(f"passes that cannot be left out: {', '.join(sorted(set(without) - OPTIONAL))}")

@@ -237,11 +237,7 @@ class Program:
             )
 
     def save(self, path: str | Path) -> None:
-        """Write to a file, whole or not at all; the same Program gives the same bytes.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
+        """Write to a file, whole or not at all, equal bytes for equal Programs; raises OSError."""
         write_output(path, program_bytes(self))
 
 

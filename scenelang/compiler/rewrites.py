@@ -58,9 +58,7 @@ def drop_empty(graph: Graph, context: Context) -> Graph:
     """Drop empty folds, and replace folds with one child by that child.
 
     A fold without links is the empty set, at distance +infinity. A union, `smooth` or subtraction with it
-    changes nothing; subtracting from it or intersecting it leaves it empty. All of it is exact, colours too.
-
-    Before: any graph. After: COMPOSITE.
+    changes nothing; subtracting from it or intersecting it leaves it empty. After: COMPOSITE.
     """
 
     def fold(node: Fold, children: list[Node | None]) -> Node | None:
@@ -103,10 +101,7 @@ def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[L
 
 
 def drop_unseen(graph: Graph, context: Context) -> Graph:
-    """Drop rows that provably have no effect on the picture, and rows that have none without them.
-
-    Before: STREAM. After: STREAM; the reference image keeps every pixel.
-    """
+    """Drop rows that provably have no effect on the picture, and rows that then have none; STREAM stays."""
     window, space = graph.window(), graph.space
 
     def seen(fold: Fold, later: Later) -> tuple[Link, ...]:
@@ -159,7 +154,6 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
 
     A row's effect stays within its leaf, and there the later union alone decides. A blend uses distances, so
     rows before the last blend stay, and groups with blends. A leaf drawn twice in one place is covered too.
-
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
     space = graph.space
@@ -202,7 +196,6 @@ def cover_of(leaf: Leaf, space: Space) -> Cover | None:
 
 
 def covered(box: Box, covers: list[Cover]) -> bool:
-    """True where a box lies inside one of some covers."""
     left, bottom, right, top, near, far = box
     depths = (near,) if near == far else (near, far)
     corners = [(x, y, z) for x in (left, right) for y in (bottom, top) for z in depths]
@@ -287,8 +280,6 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
     """Append to each leaf's moves those of all folds around it, from the inside out.
 
     Moves that do nothing vanish and neighbouring affine maps compose, so that chains stay short at any depth.
-    A leaf's world distance is defined by its whole chain, so only the place of the chain changes.
-
     Before: any graph. After: AT_LEAVES, MERGED.
     """
     stack = [_Open(graph.root, graph.root.moves)]
@@ -341,9 +332,7 @@ def fold_looks(graph: Graph, context: Context) -> Graph:
 
 
 def fold_warps(graph: Graph, context: Context) -> Graph:
-    """Merge warps, moving them towards the leaf past rotations, reflections and uniform scales.
-
-    A learned lifting knows no merged ones: for it identities alone are dropped.
+    """Merge warps, past rotations, reflections and uniform scales; a learned lifting drops identities alone.
 
     Before: AT_LEAVES. After: MERGED, NO_IDENTITIES, and chains are in the form of `chain.normal`.
     """

@@ -114,10 +114,7 @@ class Ground(Record):
 
 
 class Stage(Record):
-    """All of a 3D scene that is not an object; the ground fades into the sky's ``horizon``.
-
-    Where it is ``transparent`` the sky is not drawn and the picture has alpha.
-    """
+    """A 3D scene without its objects; the ground fades into ``horizon``, ``transparent`` draws no sky."""
 
     camera: Camera = Camera()
     light: Light = Light()
@@ -150,7 +147,6 @@ _PARTS: dict[str, type[Record]] = {"camera": Camera, "light": Light, "ground": G
 
 
 def _read(name: str, value: object) -> Any:
-    """A field of a stage or of one of its parts."""
     if name in _PARTS:
         if value is None:
             return None

@@ -108,7 +108,6 @@ def inverted(rows: Rows) -> Rows:
 
 
 def translation(x: float, y: float, z: float = 0.0) -> Rows:
-    """A shift by (x, y, z)."""
     return (1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z)
 
 
@@ -118,10 +117,7 @@ def scaling(x: float, y: float, z: float = 1.0) -> Rows:
 
 
 def rotation(angle_rad: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rows:
-    """A counter-clockwise turn about ``axis`` (any length but 0), seen from its tip.
-
-    Source: Rodrigues' rotation formula.
-    """
+    """A counter-clockwise turn about ``axis`` (any length but 0) seen from its tip; Rodrigues' formula."""
     c, s = cos(angle_rad), sin(angle_rad)
     x, y, z = axis
     if x == 0.0 and y == 0.0:

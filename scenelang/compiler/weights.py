@@ -33,13 +33,10 @@ class ModelError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Codes:
-    """The learned codes that a Program carries, and which weights they belong to.
+    """The learned codes that a Program carries, by names of leaves and materials.
 
-    Args:
-        geometry: leaf name to code, 4 numbers; of a learned lifting the whole vector.
-        material: material name to code, 12 numbers, or 2 in space; likewise.
-        digest: SHA-256 of the weights file, hex.
-        lifting: the encoders of a learned lifting.
+    Geometries have 4 numbers, materials 12, or 2 in space; of a learned lifting these are whole vectors.
+    ``digest`` is the SHA-256 of the weights file, hex.
     """
 
     geometry: dict[str, tuple[float, ...]]

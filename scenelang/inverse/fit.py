@@ -394,7 +394,6 @@ def fit(
 
 
 def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[Scene]:
-    """The scenes of places that have one."""
     for u in way:
         with suppress(SceneError):
             yield moment.evaluated(space.values(u))[1]

@@ -65,10 +65,7 @@ class _Parts(NamedTuple):
 
 
 class SoftPlane:
-    """Soft picture of a Program of the plane, without elements and textures, as a function of its numbers.
-
-    The colour ``under`` is sRGB-encoded, behind what is transparent.
-    """
+    """Soft picture of a plain Program of the plane by its numbers, over the sRGB-encoded colour ``under``."""
 
     def __init__(
         self, program: Program, under: tuple[float, float, float] = WHITE, dtype: torch.dtype = torch.float32

@@ -27,10 +27,7 @@ Corner = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 
 
 def corners(points: Points, side: int) -> list[Corner]:
-    """Indices (M,) of flattened nodes and their linear weights (M,), for each corner of a point's cell.
-
-    The points are (M, d), the grid of ``side`` nodes along an axis is over [-1, 1]^d.
-    """
+    """Flat indices and linear weights (M,) of nodes at each corner of the cells of points in [-1, 1]^d."""
     d = points.shape[1]
     place = (points + 1) * ((side - 1) / 2)
     cell = np.clip(place.astype(np.int64), 0, side - 2)
@@ -189,10 +186,7 @@ def measured(element: Element, points: Points, normals: Points, thin: float = 0.
 
 
 def _lost(drawn: GridShape, side: int, points: Points) -> float:
-    """Share of points (M, d) of a surface within a cell of which nothing is inside.
-
-    An edge that is rounded has an inside that near; a fin that fell between the nodes has none.
-    """
+    """Share of surface points (M, d) with nothing inside within a cell, such as a fin between the nodes."""
     ways = np.array([*product((-1, 0, 1), repeat=drawn.d)], float)
     ways *= 2 / (side - 1) / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1)
     left = points

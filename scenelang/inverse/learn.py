@@ -170,7 +170,6 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
 
 
 def _colours(shape: Mesh, name: str, job: _Job) -> Element:
-    """The material of a mesh."""
     element = fit_colours(
         shape,
         name,
@@ -186,7 +185,6 @@ def _colours(shape: Mesh, name: str, job: _Job) -> Element:
 
 
 def _texture(data: bytes, name: str, job: _Job) -> Element:
-    """The element of a picture."""
     result = outline.read_picture(data, job.options.texels)
     job.say(f"{name}: {', '.join(result.notes)}")
     element, tried = outline.fit_picture(

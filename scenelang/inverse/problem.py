@@ -105,10 +105,7 @@ class Problem:
         return over(draw_small(program, samples=self.samples, threads=1).image, self.under)
 
     def finer(self) -> Problem:
-        """The same whose pictures, of the plane, have twice as many pixels along each side.
-
-        Pixels of the plane are means of sRGB, those of solids of light.
-        """
+        """The same with pictures, of the plane, of twice as many pixels along each side, as means of sRGB."""
         larger = copy.copy(self)
         larger.frames = 0
         if not self.light:
@@ -210,10 +207,7 @@ class Together:
         return f" of frame {self.parts[at].moment.frame}" * (len(gaps) > 1), gaps[at]
 
     def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
-        """Return whether the remaining difference after a blur is like noise.
-
-        Means of noise over 8 x 8 pixels have a 64th of its variance.
-        """
+        """Test for noise alone after a blur: its means over 8 x 8 pixels have a 64th of its variance."""
         pixels = means = 0.0
         for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
             left = np.square(part.residuals(blurred(picture, blur), LEVELS))

@@ -262,10 +262,7 @@ class Found(Record):
 
 
 def spread(space: SearchBox, count: int, seed: int) -> Iterator[Point]:
-    """Points all over the box: the generalised golden ratio's sequence, moved by a seed.
-
-    Source: Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
-    """
+    """Points all over the box, moved by a seed: the generalised golden ratio's sequence (Roberts 2018)."""
     n = len(space.axes)
     phi = 2.0  # becomes the root of x^(n + 1) = x + 1, the golden ratio for n = 1
     for _ in range(50):
@@ -286,10 +283,7 @@ def slopes(
     free: npt.NDArray[np.bool_],
     fine: bool = False,
 ) -> Matrix:
-    """Derivatives (R, n) of residuals (``at`` u), by differences or reverse passes; 0 of axes not free.
-
-    The step is in shares of a range, away from an end; ``fine`` takes central differences of `FINE` of it.
-    """
+    """Derivatives (R, n) of residuals (``at`` u), 0 of axes not free; steps are in shares of a range."""
     result = np.zeros((len(at), len(u)))
     # gives (R, n), and a mask (n,) of the axes that it knows; or None
     by_passes = getattr(residuals, "slopes", None)
@@ -402,10 +396,7 @@ def apart(space: SearchBox, places: list[Found], most: int) -> list[Found]:
 
 
 def scanned(coarse: Residuals, space: SearchBox, known: Found) -> list[Found]:
-    """The best other valley along each axis through a known place.
-
-    In a picture of several things one may still be wrong while the others are right already.
-    """
+    """The best other valley along each axis: one of several things may be wrong while others are right."""
     result: list[Found] = []
     for axis in range(len(space.axes)):
         count = SCANS if space.smooth[axis] else min(SCANS, int(space.most[axis]) + 1)

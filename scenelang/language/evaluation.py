@@ -34,20 +34,12 @@ from scenelang.language.words import STAGE
 
 
 class Source(Record):
-    """A scene as text and what holds for it from outside; one of the first three is enough.
+    """A scene as text and what holds for it from outside; path, text or tree is enough.
 
-    Args:
-        path: the file, as a user wrote it; imports are found from there.
-        text: what the file holds, or a text that is in no file.
-        tree: the text, parsed.
-        params: values for params: text as after ``-D NAME=``, or Python values. `Defines` may be shared by
-            several evaluations; the caller then reports what none of them used.
-        model: name of the model to use, instead of the one that the file names; the Scene names it then.
-        root: folder that imports cannot leave; by default that of ``path``.
-        size: canvas in pixels (width, height), instead of the scene's.
-        fps: frames a second, instead of those that ``animate`` names: the seconds stay, so that there are
-            seconds × fps frames, and t and u follow.
-        texts: what imported files hold, by their resolved paths, instead of what is on the disk.
+    ``params`` are text as after ``-D NAME=`` or Python values; `Defines` may be shared by evaluations, whose
+    caller reports unused ones. The model and size (pixels) stand instead of the file's, and so does ``fps``,
+    which keeps the seconds. Imports cannot leave ``root``, by default the path's folder; ``texts`` has what
+    imported files hold, by resolved path, instead of the disk.
     """
 
     path: str | os.PathLike[str] | None = None
@@ -62,14 +54,10 @@ class Source(Record):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Values for params."""
         return dict((self.params.values if isinstance(self.params, Defines) else self.params) or {})
 
     def parsed(self, diagnostics: Diagnostics) -> Source:
-        """The same with its text and tree; mistakes of the syntax are reported once, here.
-
-        Raises OSError where the file cannot be opened, and SceneError where it is not text.
-        """
+        """The same with text and tree; reports syntax errors once. Raises OSError, SceneError if not text."""
         if self.tree is not None:
             return self
         text = self.text
@@ -103,22 +91,14 @@ class Source(Record):
 
 
 def report_unreadable(name: str, error: Unreadable, diagnostics: Diagnostics) -> None:
-    """Report that a file is not text."""
     diagnostics.add(error.code, f"cannot read `{name}`: {error}", Span(SourceFile(name, ""), 0, 0))
 
 
 class Evaluation:
     """A file prepared once, to be run for any number of frames; the first with a mistake reports it.
 
-    Args:
-        source: the scene; its text is parsed.
-        frame: the first frame that is run, from 0.
-        replays, watch: see `Session`.
-
-    Attributes:
-        wanted: all files that it imports, also those that are not there.
-        sources: the text of the file and of all that it imports.
-        context: its names, and the values they had in the last run.
+    The parsed source is run from ``frame`` on; for ``replays`` and ``watch`` see `Session`. All files that it
+    imports are ``wanted``, also absent ones, and ``sources`` are texts. ``context`` has its names.
     """
 
     def __init__(
@@ -280,12 +260,7 @@ def loads(
     name: str = "<text>",
     **values: Any,
 ) -> Scene:
-    """Read scene text; as `load`. Imports are found in ``root`` and refused without it.
-
-    Args:
-        text: the scene.
-        name: what diagnostics call it.
-    """
+    """Read scene text, called ``name`` in messages; as `load`, but imports are refused without ``root``."""
     diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
     source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
@@ -339,7 +314,6 @@ class Knob(Record):
 
     @property
     def name(self) -> str:
-        """As the scene has it."""
         return self.stmt.name.text
 
 

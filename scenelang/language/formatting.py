@@ -287,7 +287,6 @@ class Layout:
         self.doubtful = False  # at what only the builder of the tree can refuse
 
     def word(self, token: int) -> Part:
-        """A token with what stands around it."""
         text = self.text[self.starts[token] : self.ends[token]]
         note = self.notes.get(token)
         if note is None:
@@ -647,18 +646,10 @@ def _significant(tokens: Tokens) -> list[str]:
 
 
 def format_range(text: str, start: int, end: int, *, name: str = "<text>") -> tuple[int, int, str]:
-    """Lay out the statements of the file's top level that a range touches, and nothing else.
+    """Lay out the statements of the file's top level that a range, in code points, touches.
 
-    Args:
-        text: the whole text.
-        start, end: the range, in code points.
-        name: what errors call the text.
-
-    Returns:
-        Start and end of what to replace, and the text to put there; an empty range where nothing changes.
-
-    Raises:
-        SceneError: the text has syntax errors, in the range or elsewhere.
+    Returns start and end of what to replace, and the text to put there: an empty range where nothing changes.
+    Raises `SceneError` for syntax errors anywhere; they call the text ``name``.
     """
     result = format_text(text, name=name)
     strays = Diagnostics()

@@ -193,7 +193,6 @@ class Frozen(BaseModel):
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
-        """Arguments by their names."""
         names = cls._names()
         if len(args) > len(names):
             takes = f"at most {len(names)}: {', '.join(names)}" if names else "none"

@@ -115,7 +115,6 @@ class Elements(Frozen):
 
     @staticmethod
     def of(name: str, path: str, zoo: Zoo) -> Elements:
-        """A file that has been read."""
         elements = Elements(name, path, zoo.digest)
         elements._zoo = zoo
         return elements
@@ -126,11 +125,7 @@ class Elements(Frozen):
         return self._zoo
 
     def group(self, name: str) -> Group | Object:
-        """A ready group: its parts in their places and looks; of one part that alone.
-
-        Raises:
-            KeyError: the file has no such group, or has not been read.
-        """
+        """A ready group: its parts in places and looks, or its one part; raises KeyError if there is none."""
         if self.zoo is None:
             raise KeyError(f"`{self.path}` has not been read")
         objects = objects_of(self.zoo, self.name, name)
@@ -163,7 +158,6 @@ class Brought(Record):
 
     @staticmethod
     def of(files: tuple[Elements, ...]) -> Brought:
-        """All elements of files."""
         zoos = [(file.name, file.zoo) for file in files if file.zoo is not None]
         return Brought(
             {f"{name}.{key}": element for name, zoo in zoos for key, element in zoo.geometries.items()},
@@ -240,11 +234,7 @@ class Scene(Frozen):
         return super()._arranged(args, data)
 
     def sized(self, size: tuple[int, int]) -> Scene:
-        """The same scene on a canvas of that width and height in pixels.
-
-        Raises:
-            ValueError: not two numbers from 1 to 8192.
-        """
+        """The same scene on a canvas of width and height in pixels; raises ValueError but for 1 to 8192."""
         return self.model_copy(update={"canvas": Scene(canvas=size).canvas})
 
     def of_model(self, model: str | None) -> Scene:
@@ -309,13 +299,8 @@ class Scene(Frozen):
     def from_json(cls, text: str | bytes, root: str | os.PathLike[str] | None = None) -> Scene:
         """Read JSON; like `model_validate_json`, and for scenes of any depth.
 
-        Args:
-            text: the JSON.
-            root: the folder of its files of elements, which are not read without it.
-
-        Raises:
-            SceneError: text that is not JSON, not a Scene, or has elements that cannot be read; it names each
-                place.
+        Files of elements are read from the folder ``root`` alone. Raises `SceneError`, which names each
+        place, for text that is not JSON, not a Scene, or has elements that cannot be read.
         """
         if isinstance(text, bytes):
             try:
@@ -331,7 +316,6 @@ class Scene(Frozen):
 
 
 def _stated(name: str | None, value: Any) -> str:
-    """A value of the stage as text."""
     if name == "color":
         return rgb(value)
     if isinstance(value, tuple):

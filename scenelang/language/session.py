@@ -57,7 +57,6 @@ class Slots(Record, frozen=False):
     size: int = 1
 
     def add(self) -> int:
-        """A new slot."""
         self.size += 1
         if self.root is not None:
             self.root.append(UNBOUND)
@@ -77,10 +76,7 @@ class Definition(Record, frozen=False):
 
 
 class Binding(Record, frozen=False):
-    """Meaning of a name.
-
-    Its value: a `Definition`, an imported file, a Scene's name of an element, or that of a constant ``let``.
-    """
+    """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 
     kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
     span: Span | None = None  # None for the language's own names
@@ -104,14 +100,12 @@ class Scope(Record, frozen=False):
     later: dict[str, Span] = field(default_factory=dict)  # names that a later line of this block defines
 
     def outwards(self) -> Iterator[Scope]:
-        """This block, and those around it."""
         scope: Scope | None = self
         while scope is not None:
             yield scope
             scope = scope.parent
 
     def find(self, name: str) -> Binding | None:
-        """Binding of ``name`` here."""
         return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
@@ -192,7 +186,6 @@ class Session(Record, frozen=False):
         return Halt()
 
     def tick(self, steps: int, span: Span) -> None:
-        """Count evaluation steps."""
         self.steps += steps
         if self.steps > MAX_STEPS:
             raise self.halt("E0322", f"more than {MAX_STEPS:,} evaluation steps", span)
@@ -303,7 +296,6 @@ class Loader(Record, frozen=False):
         return path, self.zoos.get(path) or self.parsed[path]
 
     def _locate(self, text: str, importer: Path | None) -> Path:
-        """The place of a file of the library, or inside the root."""
         if library.is_reserved(text):
             shipped = library.find(text)
             if shipped is None:
@@ -329,7 +321,6 @@ class Loader(Record, frozen=False):
         return path
 
     def _read(self, path: Path, written: tree.String, session: Session) -> None:
-        """Read a file, if it has not been read."""
         text, span = written.value, written.span
         if path in self.parsed or path in self.zoos:
             return

@@ -21,8 +21,6 @@ BLEND: Final = 0.15
 
 
 class Word(Record):
-    """A word of the language."""
-
     name: str
     head: str  # how it is written, as in a reference
     text: str  # what it means, in Markdown

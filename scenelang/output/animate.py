@@ -68,7 +68,6 @@ class RenderResult:
     keys: list[str] = field(default_factory=list)  # digest of each frame's inputs; empty where left out
 
     def lines(self) -> list[str]:
-        """Report of the run, line by line."""
         each = 1000 / max(1, self.frames)
         asked = f" ({self.asked} asked for; more than frames or cores do not help)" if self.asked else ""
         return [
@@ -93,11 +92,10 @@ def make(
     failed: Failed | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> RenderResult:
-    """Draw frames and write them whole: nothing is put in place before all of it is there.
+    """Draw frames and write them whole, with arguments and errors as of `animate`.
 
-    Drawn frames are cached in `Target.work`: if the run is interrupted, the same call continues. Arguments
-    and errors are those of `animate`; ``strict`` counts warnings as errors, ``beside`` gives the further
-    files of a frame before it is drawn, and without ``failed`` a frame with errors ends the run.
+    Drawn frames stay in `Target.work` until the same call continues. ``strict`` counts warnings as errors,
+    ``beside`` gives further files of a frame; without ``failed`` a frame with errors ends the run.
     """
     place = output_place(target.path)
     if target.kind == "video":

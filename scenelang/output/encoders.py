@@ -162,7 +162,6 @@ class Census:
 
     @property
     def fits(self) -> bool:
-        """True where one palette holds all colours."""
         return not self.thinned and len(self.colours) <= self.most
 
     def choose(self) -> Colours:
@@ -186,10 +185,7 @@ class Census:
 
 
 class Mapper:
-    """Pictures to indices of a palette (K, 3): exact where the colour is in it, the nearest otherwise.
-
-    If asked, the error is dithered over neighbouring pixels (Floyd and Steinberg 1976).
-    """
+    """Pictures to nearest indices of a palette (K, 3); if asked, dithered (Floyd and Steinberg 1976)."""
 
     def __init__(self, colours: Colours, dither: bool) -> None:
         self.colours, self.dither = colours, dither
@@ -260,7 +256,6 @@ def _pieces(count: int, fps: float) -> Iterator[tuple[int, int]]:
 
 
 def _png(pixels: Pixels) -> list[tuple[bytes, bytes]]:
-    """The chunks of a picture."""
     data = io.BytesIO()
     Image.fromarray(pixels).save(data, "PNG")
     raw, at, result = data.getvalue(), len(SIGNATURE), []

@@ -48,8 +48,6 @@ class FramesError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FrameRange:
-    """A requested range of frames."""
-
     first: int = 0  # from 0
     last: int | None = None  # the last one; None for that of the animation
 
@@ -135,13 +133,11 @@ class Target:
     pattern: str = ""  # name of each file of a sequence, with `%04d` for its number
 
     def file(self, frame: int) -> Path:
-        """The file of a frame of a sequence."""
         parts = self.pattern.split("%%")
         filled = [_NUMBER.sub(lambda match: f"{frame:{match[1] or 'd'}}", part) for part in parts]
         return self.path / "%".join(filled)
 
     def there(self) -> list[Path]:
-        """Existing files of a sequence, of any number."""
         number = 1_234_567_890
         head, tail = self.file(number).name.split(str(number))
         named = re.compile(rf"{re.escape(head)}\d+{re.escape(tail)}")
@@ -166,10 +162,7 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder, whose files start with ``stem``.
-
-    Raises `TargetError` where it is none of these.
-    """
+    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder of ``stem``s; else raise `TargetError`."""
     path = Path(out)
     if is_pattern(out):
         bare = path.name.replace("%%", "")
@@ -248,7 +241,6 @@ class Store:
         self._lock.close()
 
     def file(self, key: str) -> Path:
-        """Path of the frame of a key."""
         return self.folder / f"{key}{self.suffix}"
 
     def beside(self, key: str, number: int, suffix: str) -> Path:
@@ -337,8 +329,6 @@ STILL = Animation(seconds=1.0, fps=1.0)
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One frame."""
-
     number: int  # from 0
     scene: Scene  # evaluated
     spans: SpanMap  # where its nodes were written
@@ -346,8 +336,6 @@ class Shot:
 
 @dataclass(frozen=True, slots=True)
 class FixedFrames:
-    """Frames that are Scenes already."""
-
     scenes: tuple[Scene, ...]  # at least one
     fps: float | None = None  # frames a second; None for those of the first scene's animation
     wanted: tuple[Path, ...] = ()
@@ -373,10 +361,7 @@ class FixedFrames:
 
 
 class Clip:
-    """A scene to be evaluated and compiled frame by frame, or Scenes that are its frames.
-
-    A mistake in any frame ends the clip. ``fps`` stands instead of those of the first Scene's animation.
-    """
+    """A scene evaluated and compiled by frames, or Scenes as frames; a mistake in any frame ends it."""
 
     def __init__(
         self,

@@ -83,8 +83,6 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """Points of one run."""
-
     __pydantic_config__ = _STRICT
     set: str  # the scenes' set
     yardstick_ms: NonNegativeFloat  # time of `yardstick` on the measured machine
@@ -109,10 +107,7 @@ def frontier_path(model: str) -> Path:
 
 
 def load_frontier(model: str) -> Frontier | None:
-    """The shipped frontier of the set that a model belongs to, None where there is none.
-
-    Raises `ValueError` where it is damaged, `KeyError` where there is no such model.
-    """
+    """The shipped frontier of a model's set, or None; raises ValueError if damaged, KeyError for no model."""
     if model not in available():
         raise KeyError(model)
     try:
@@ -168,10 +163,7 @@ def error_scale(canvas: tuple[int, int], objects: int) -> float:
 
 
 def refusal(point: Point, scene: Scene | None, program: Program, only: str | None = None) -> str | None:
-    """Reason why a point cannot draw a scene; None if it can.
-
-    A compiled ``program`` without its scene is drawn by its own model; ``only`` is the one model to choose.
-    """
+    """Reason why a point cannot draw a scene, or its ``program``; ``only`` is the one model to choose."""
     if only is not None and point.model != only:
         return f"--model {only}"
     if point.model is not None and point.model not in available():
@@ -234,7 +226,6 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
 
 
 def _lacks(offer: Offer, limits: Limits) -> str:
-    """Limits that an offer exceeds, in words."""
     slow = limits.ms is not None and offer.ms > limits.ms
     wrong = limits.flip is not None and offer.flip > limits.flip
     return " and ".join(["too slow"] * slow + ["not exact enough"] * wrong)
@@ -264,10 +255,7 @@ def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:
 
 
 def yardstick() -> float:
-    """Milliseconds of a fixed piece of work like that of a frame, on one core: small products, cosines, sums.
-
-    The ratio of two machines' yardsticks is what times are scaled by. Takes about 50 ms.
-    """
+    """Milliseconds of fixed work like a frame's on one core; their ratio scales the times of machines."""
     import torch
 
     g = torch.Generator().manual_seed(1)

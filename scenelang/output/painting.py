@@ -43,8 +43,6 @@ _version = lru_cache(version)
 
 @dataclass(frozen=True, slots=True)
 class Drawable:
-    """A frame ready to be drawn."""
-
     number: int  # from 0
     key: str  # digest of all that determines its pixels
     shot: Shot  # the frame
@@ -65,10 +63,7 @@ class Painter:
     load_s: float = 0.0  # time of loading torch
 
     def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
-        """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`.
-
-        Torch draws animations; numpy draws solids, and a small picture by itself (``single``).
-        """
+        """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`."""
         program, place = None, "cpu"
         if self.how.backend == "reference":
             scene = shot.scene.model_copy(update={"animation": None})
@@ -217,7 +212,6 @@ class Workers:
             self._free.put(process)
 
     def close(self) -> None:
-        """Stop the processes."""
         for future in self._waiting:
             future.cancel()
         for process in self._all:
@@ -278,13 +272,11 @@ class Cluster:
 
     @property
     def waiting(self) -> int:
-        """Frames that were submitted and are not known to be done."""
         while self._under_way and self._link.ready:
             self._receive()
         return len(self._batch) + sum(map(len, self._under_way.values()))
 
     def submit(self, program: Program, errand: Errand) -> None:
-        """Have a Program drawn to files; waits while many are under way. Raises as `take`."""
         self._batch.append((program_bytes(program), errand))
         large = sum(len(data) for data, _ in self._batch) > MOST_BYTES
         if large or len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
@@ -298,7 +290,6 @@ class Cluster:
         self._receive()
 
     def close(self) -> None:
-        """Cancel pending frames."""
         self._link.close()
 
     def _receive(self) -> None:

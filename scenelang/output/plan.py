@@ -37,11 +37,7 @@ def token_counts(tokens: Iterable[int]) -> dict[str, int]:
 
 
 def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
-    """Sizes after ``lower`` and each pass, and whether the pass changed anything.
-
-    Each affine map and deformation is one of the ``matrices`` of the lifting; ``tokens`` are children of
-    folds by the word that joins them.
-    """
+    """Sizes after ``lower`` and each pass, and whether it changed anything; each move is a matrix."""
     out: list[dict[str, Any]] = []
     before: Graph | None = None
     for name, graph in graphs.items():
@@ -100,10 +96,7 @@ def choice(scene: Scene, chosen: str, asked: bool) -> dict[str, Any]:
 
 
 def reference_of(scene: Scene, manifest: Manifest, *, per_side: int = 2, spans: Spans | None = None) -> Image:
-    """The exact picture of a scene over its background, with a model's geometries and materials.
-
-    ``per_side`` is the number of samples along each side of a pixel; 2 is the definition.
-    """
+    """The exact picture of a scene over its background; ``per_side`` samples along each side of a pixel."""
     graph = lower(scene, manifest, spans, Diagnostics())
     if not graph.elements:
         return reference_image(graph, per_side=per_side)

@@ -68,7 +68,6 @@ class Rows(Record):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the params, in the order of columns."""
         if self.given:
             return tuple(dict.fromkeys(name for row in self.given for name in row))
         return (*self.grid, *(knob.name for knob in self.random))
@@ -105,10 +104,7 @@ def rows_of(
     count: int | None = None,
     seed: int = 0,
 ) -> Rows:
-    """Rows of a grid, of values or of text as for `values_of`, and of random values.
-
-    Each param of ``drawn`` has a range, or empty text for its own. The count is by default that of the grid.
-    """
+    """Rows of a grid, by default as many, and random values of ``drawn``: a range, or "" for its own."""
     result: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
         stmt = param_named(evaluation, name)
@@ -165,7 +161,6 @@ def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[s
 
 
 def _spread(evaluation: Evaluation, stmt: tree.Param, match: re.Match[str]) -> Iterator[str]:
-    """The values of a range."""
     first, without, last, parts, step = match.groups()
     low, high, unit = _ends(evaluation, stmt, first, last)
     knob = _knob(evaluation, stmt, low, high)
@@ -217,7 +212,6 @@ def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tu
 
 
 def _number(evaluation: Evaluation, stmt: tree.Param, text: str) -> Any:
-    """The value of a literal of the kind of a param."""
     value, like = literal(text.strip(), evaluation.context), _default(evaluation, stmt)
     if value.__class__ is float and (value == 0.0 or unpack(like)[1] == "time"):
         value = pack(value, unpack(like)[1])
@@ -233,7 +227,6 @@ def _default(evaluation: Evaluation, stmt: tree.Param) -> Any:
 
 
 def _text(knob: Knob, value: Any) -> str:
-    """A value as ``-D`` takes it."""
     return value if isinstance(value, str) else written(knob, value, _DIGITS)
 
 
@@ -272,8 +265,6 @@ class TableError(ValueError):
 
 
 class Line(Record):
-    """One row of a table."""
-
     picture: str  # name of its file; empty where there is none
     values: tuple[str, ...]  # text of each param's value, in order; empty for its default
     digest: str = ""  # of all that determines the picture; empty before it is drawn, or where it is not
@@ -344,7 +335,6 @@ def _typed(texts: Sequence[str]) -> tuple[Sequence[Any], str]:
 
 
 def _value(text: str) -> tuple[Any, str]:
-    """Value of a text, and its unit."""
     if text in ("", "true", "false"):
         return (None if not text else text == "true"), ""
     if (one := _NUMBER.fullmatch(text)) is not None:
@@ -459,7 +449,6 @@ class SweepTable:
         self.clip.mend()
 
     def _adopt(self, frame: Drawable, store: Store) -> None:
-        """Reuse the files of an existing picture."""
         file, stored = self.target.file(frame.number), store.file(frame.key)
         files = {output_file(stored, name): output_file(file, name) for name in self.outputs} | {stored: file}
         if all(path.is_file() for path in files.values()):
@@ -643,7 +632,6 @@ def render_many(
 
 
 def _target(out: str, stem: str) -> Target:
-    """Files of the pictures; raises `TargetError`."""
     if is_pattern(out):
         return find_target(out)
     path = Path(out)

@@ -44,14 +44,10 @@ class GivenUp(RenderError):
 
 
 class Link:
-    """Connection to workers that give the results of this machine.
+    """Connection to workers whose results are those of this machine; raises `RenderError` for any failure.
 
-    Args:
-        address: of the scheduler, such as ``tcp://host:8786``, or ``"local"``: a worker for each core of this
-            machine, which nobody else reaches; ``"local:8787"`` has dask's dashboard on that port.
-        libraries: packages whose versions must agree, besides those that draw.
-
-    Raises `RenderError` without dask, scheduler or worker, or where a worker would give other results.
+    The address is a scheduler's, or ``"local"``, a worker for each core here, ``"local:8787"`` with a
+    dashboard. Versions of ``libraries`` must agree, besides those that draw.
     """
 
     def __init__(self, address: str, libraries: tuple[str, ...] = ()) -> None:
@@ -86,7 +82,6 @@ class Link:
 
     @property
     def count(self) -> int:
-        """Number of workers a few seconds ago."""
         known: int = self._client._scheduler_identity.get("n_workers", 0)  # asking would wait for an answer
         return known or self._first
 
@@ -168,10 +163,7 @@ def by_workers(
 
 
 class _Local:
-    """A scheduler in this process and a worker for each core, reachable from this machine alone.
-
-    Workers are plain processes: those that dask starts by itself run an embedder's main module again.
-    """
+    """A scheduler in this process, reachable from this machine alone, and a plain process for each core."""
 
     def __init__(self, address: str) -> None:
         from distributed import LocalCluster
