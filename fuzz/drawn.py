@@ -20,16 +20,10 @@ class Property:
 
     @property
     def name(self) -> str:
-        """The function's name."""
         return self.function.__name__
 
     def run(self, examples: int, number: int | None = None) -> None:
-        """Hold it to so many examples.
-
-        Args:
-            examples: at most so many.
-            number: seed of the examples; without one they are the same each time.
-        """
+        """Hold it to so many examples: the same each time, or others of a seed ``number``."""
 
         @settings(
             max_examples=examples,

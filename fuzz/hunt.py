@@ -1,6 +1,6 @@
-"""Hunting for slow input: pumps of 100 KB, each in a process of its own whose processor time is bounded.
+"""Hunting for slow input: random pumps of 100 KB, each in a process whose processor time is bounded.
 
-What coverage is followed by says nothing about time, so no fuzzer drives this: pumps are drawn at random.
+Coverage, which fuzzers follow, says nothing about time.
 """
 
 from __future__ import annotations
@@ -26,13 +26,7 @@ _NOTED_S: Final = 0.15
 
 
 def hunt(minutes: float, findings: Path, seed: int = 1) -> int:
-    """Read pumps, first those that thought found, until the time is over; the exit status.
-
-    Args:
-        minutes: wall time.
-        findings: folder that takes what is slow.
-        seed: of what is drawn.
-    """
+    """Read pumps, known ones first, for so long, and write slow ones into ``findings``; the exit status."""
     known, end_s = pumps.seeds(), time.monotonic() + 60 * minutes
     for read in pumps.READERS.values():
         read("")  # what is imported at the first reading is no part of any

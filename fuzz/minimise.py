@@ -31,13 +31,7 @@ def failure_of(target: Target, data: bytes) -> str | None:
 
 
 def minimise(data: bytes, shows: Callable[[bytes], bool], tries: int = 3000) -> bytes:
-    """A smaller input that shows the same: pieces are left out, large ones first.
-
-    Args:
-        data: shows it.
-        shows: whether an input does.
-        tries: inputs to try at most.
-    """
+    """A smaller input that still ``shows`` the same: pieces are left out, large ones first."""
     size = max(1, len(data) // 2)
     while size and tries > 0:
         at, smaller = 0, False

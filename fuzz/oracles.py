@@ -41,12 +41,7 @@ def check_tree(tree: nodes.File, source: SourceFile) -> bool:
 
 
 def check_diagnostics(found: Sequence[Diagnostic], texts: Iterable[SourceFile] | None) -> None:
-    """Codes are known, places lie inside their text, edits do not overlap, and every format renders.
-
-    Args:
-        found: the diagnostics.
-        texts: the files that they may be in; None for any.
-    """
+    """Codes are known, places lie inside their ``texts``, edits do not overlap, and every format renders."""
     known = None if texts is None else list(texts)
     for d in found:
         hold(d.code in CODES, "codes are listed", d.code)
@@ -65,11 +60,7 @@ def check_diagnostics(found: Sequence[Diagnostic], texts: Iterable[SourceFile] |
 
 
 def check_compiling(scene: Scene) -> bytes | None:
-    """A Scene compiles to a Program that reads back from its bytes, or is refused with sound diagnostics.
-
-    Returns:
-        The Program's bytes.
-    """
+    """The bytes of a Scene's Program, which reads back, or none if it is refused with sound diagnostics."""
     try:
         program = compile_scene(scene)
     except SceneError as error:

@@ -29,15 +29,10 @@ NUMBER: Final = "¤"
 
 @dataclass(frozen=True, slots=True)
 class Pump:
-    """``head``, ``unit`` as often as it takes, ``close`` as often as that, ``tail``.
+    """``head``, ``unit`` as often as it takes, ``close`` as often as that, ``tail``."""
 
-    Args:
-        reader: a key of `READERS`.
-        unit: the piece; each `NUMBER` in it becomes a number that differs.
-    """
-
-    reader: str
-    unit: str
+    reader: str  # a key of `READERS`
+    unit: str  # each `NUMBER` in it becomes a number that differs
     head: str = ""
     close: str = ""
     tail: str = ""

@@ -28,12 +28,7 @@ PROPERTIES: Final = "properties"
 
 
 class Failure(AssertionError):
-    """An oracle does not hold.
-
-    Args:
-        oracle: which one, in a few words that are the same whatever the input.
-        detail: what was found this time.
-    """
+    """An oracle, named alike whatever the input, does not hold; ``detail`` says what was found."""
 
     def __init__(self, oracle: str, detail: object = "") -> None:
         super().__init__(f"{oracle}: {detail}" if detail != "" else oracle)
@@ -48,27 +43,16 @@ def hold(truth: object, oracle: str, detail: object = "") -> None:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One thing that is fuzzed.
-
-    Args:
-        name: as on the command line.
-        summary: what is fuzzed and what must hold, one sentence for the table.
-        check: one run over any bytes; whatever it raises is a finding.
-        seeds: sound and unsound inputs to start from.
-        mutate: a mutation that knows the structure of the input.
-        dictionary: byte strings that belong together, for atheris's own mutations.
-        most_bytes: longest input.
-        runs: how many uses of the library one input stands for, which together may take as much longer.
-    """
+    """One thing that is fuzzed."""
 
     name: str
-    summary: str
-    check: Callable[[bytes], None] = field(repr=False)
+    summary: str  # what is fuzzed and what must hold, one sentence
+    check: Callable[[bytes], None] = field(repr=False)  # one run; what it raises is a finding
     seeds: Callable[[], list[bytes]] = field(repr=False)
-    mutate: Callable[[bytes, Random], bytes] = field(repr=False)
-    dictionary: Callable[[], list[bytes]] = field(repr=False, default=list)
+    mutate: Callable[[bytes, Random], bytes] = field(repr=False)  # knows the structure of the input
+    dictionary: Callable[[], list[bytes]] = field(repr=False, default=list)  # for atheris
     most_bytes: int = 4096
-    runs: int = 1
+    runs: int = 1  # uses of the library that an input stands for
 
 
 def load_target(name: str) -> Target:

@@ -155,7 +155,6 @@ def encode(text: str) -> bytes:
 
 
 def seeds() -> list[bytes]:
-    """Seed inputs."""
     return [encode(text) for text in texts()]
 
 

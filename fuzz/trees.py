@@ -26,13 +26,7 @@ def dump(value: Any) -> bytes:
 
 
 def mutate(value: Any, generator: Random, others: tuple[Any, ...] = ()) -> Any:
-    """A copy with one change somewhere.
-
-    Args:
-        value: any JSON value.
-        generator: random numbers.
-        others: values whose parts may be put in.
-    """
+    """A copy of a JSON value with one change somewhere, perhaps a part of ``others`` put in."""
     value = copy.deepcopy(value)
     places = _places(value)
     if not places:

@@ -44,11 +44,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def command_line(argv: Sequence[str]) -> str:
-    """A command as one types it, without where it reads and writes: ``python -m lab eval shapes2d``.
-
-    Args:
-        argv: as in `sys.argv`, where the laboratory names itself ``python -m lab``.
-    """
+    """The command as one types it, without where it reads and writes: ``python -m lab eval shapes2d``."""
     first = argv[0] if argv[0].startswith("python -m ") else Path(argv[0]).name
     return " ".join([first, *map(shlex.quote, _figures(argv[1:]))])
 

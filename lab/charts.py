@@ -15,11 +15,7 @@ TICKS = 6  # named along an axis
 
 
 def stability_chart(results: Sequence[Mapping[str, Any]]) -> bytes:
-    """PSNR of every probe: the mean and its interval, from the 5th percentile up shaded, the worst as dots.
-
-    Args:
-        results: of `run_stability`, one a model; the first is drawn in full.
-    """
+    """PSNR of every probe: mean with interval, shaded from the 5th percentile, the worst as dots."""
     plt = pyplot()
     first = results[0]
     names = list(first["probes"])

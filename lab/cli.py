@@ -65,11 +65,7 @@ _threads = _count("--threads", 1, 1, 256, "Number of threads on the CPU.")
 
 
 def _check_names(what: str, wanted: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse names that are not known.
-
-    Raises:
-        click.UsageError: one is not.
-    """
+    """Raise `click.UsageError` for names that are not known."""
     known = list(known)
     for name in wanted:
         if name not in known:
@@ -683,13 +679,7 @@ def everything(out: Path, budget: float, scenes: int) -> None:
 
 
 def _scripts(name: str, prefix: str, words: str) -> None:
-    """A command that runs a module of a folder of the laboratory, which reads the rest of the command line.
-
-    Args:
-        name: of the command and of the folder.
-        prefix: of the modules' names, which scripts' names leave out.
-        words: for `--help`.
-    """
+    """A command that runs a module of a folder (``prefix`` and a name), which reads the rest of the line."""
     files = (ROOT / "lab" / name).glob(f"{prefix}*.py")
     known = sorted(path.stem.removeprefix(prefix) for path in files if path.stem != "__init__")
 

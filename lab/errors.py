@@ -43,9 +43,7 @@ def proved_errors(
 ) -> tuple[Floats, Floats]:
     """The least and the most (CELLS, CELLS) that a decoder answers above a leaf's exact distance.
 
-    Args:
-        near: bounds may lie so far beyond what was seen in a cell.
-        slack: and so many times the difference of what was seen.
+    Bounds may lie ``near`` beyond what was seen in a cell, and ``slack`` times its differences.
     """
     at, side = np.arange(CELLS), 2 * RADIUS / CELLS
     cells = np.stack(np.meshgrid(at, at), -1).reshape(-1, 2)

@@ -101,10 +101,7 @@ def evaluate_set(
 ) -> tuple[dict[str, Any], list[Case]]:
     """Draw a set and compare; returns a summary for JSON, and the cases of the lowest PSNR.
 
-    Args:
-        side: shorter side of the canvas in pixels; by default that of the set.
-        kept: folder of exact pictures, which other weights and renderers do not change.
-        report: called with the set, scenes done and all.
+    ``side`` is the canvas's shorter one in pixels; ``kept`` is a folder of exact pictures.
     """
     scene_at = scenes_of(model, name, seed, side)
     started = time.perf_counter()

@@ -18,12 +18,7 @@ from lab import ROOT
 
 
 class Step(NamedTuple):
-    """A command line of the laboratory.
-
-    ``{out}`` is the run's folder, ``{budget}`` processor minutes of a training, ``{scenes}`` of an
-    evaluation, ``{few}`` a twentieth but at least 1, for what draws many
-    for each value, ``{examples}`` that many files.
-    """
+    """A command line to format; ``{few}`` is a twentieth of ``{scenes}`` but at least 1."""
 
     line: str
     # modules, programs or variables of the environment besides the extra `dev`; left out where one lacks
@@ -67,13 +62,7 @@ ELSEWHERE: Final = {
 
 
 def command_lines(out: Path, budget: float, scenes: int) -> list[tuple[list[str], Step]]:
-    """The words of each step.
-
-    Args:
-        out: folder that gets everything.
-        budget: processor minutes of each training.
-        scenes: of evaluations.
-    """
+    """The words of each step, for a folder, processor minutes of each training and scenes of evaluations."""
     examples = sorted((ROOT / "examples").glob("*.nsg"))[:scenes]
     fields = {
         "{out}": [str(out)],
@@ -93,17 +82,9 @@ def command_lines(out: Path, budget: float, scenes: int) -> list[tuple[list[str]
 def run_everything(
     out: Path, budget: float, scenes: int, done: Callable[[list[dict[str, Any]]], None]
 ) -> list[dict[str, Any]]:
-    """Run all steps, one after the other, and go on behind those that fail.
+    """Run all steps, also behind those that fail; ``done`` is called with the result so far after each.
 
-    Args:
-        out: as of `command_lines`, like the next two.
-        budget: minutes.
-        scenes: how many.
-        done: called behind each step with what is returned at the end, as far as it goes.
-
-    Returns:
-        For each step ``command``, and ``seconds``, those of the processor (``processor_s``) and ``exit``, or
-        ``needs`` where it was left out.
+    Of each step ``command``, and ``seconds``, ``processor_s`` and ``exit``, or ``needs`` if left out.
     """
     result: list[dict[str, Any]] = []
     for words, step in command_lines(out.resolve(), budget, scenes):

@@ -50,30 +50,19 @@ _WORD: Final = re.compile(r"\b(\w+)(?:\(| = )")
 
 
 class Case(Record):
-    """A scene to be fitted.
-
-    Args:
-        set: what it was drawn from.
-        text: the scene, whose params start at their defaults.
-        truth: values of the target, as shares of their ranges.
-        target: exact picture of these, 8 bits a channel, (H, W, 3) in [0, 1].
-        start_db: how near the start's picture is to it.
-    """
+    """A scene to be fitted."""
 
     set: str
-    text: str
-    truth: dict[str, float]
-    target: Image
-    start_db: float
+    text: str  # its params start at their defaults
+    truth: dict[str, float]  # the target's values, as shares of their ranges
+    target: Image  # exact, 8 bits a channel, (H, W, 3) in [0, 1]
+    start_db: float  # how near the start's picture is to it
 
 
 def measure(
     model: str, counts: Sequence[int], scenes: int, seed: int, side: int, report: Report = silent
 ) -> dict[str, Any]:
-    """Fit seeded scenes, of so many params in turn, and say how often these or a near picture are found.
-
-    Seconds are of the processor, one thread, the first look at a text to the report.
-    """
+    """Fit seeded scenes of so many params in turn; shares found, and processor seconds of each."""
     manifest = load_manifest(model)
     rows: list[dict[str, Any]] = []
     for index in range(scenes):

@@ -77,12 +77,7 @@ def ways_of(scene: Scene, model: Model) -> dict[str, dict[str, float]]:
 def measure_examples(
     paths: Iterable[Path], report: Callable[[dict[str, Any]], None] | None = None
 ) -> dict[str, Any]:
-    """Plans of scenes, with the machine they were measured on; on one thread.
-
-    Args:
-        paths: scenes.
-        report: called with each plan.
-    """
+    """Plans of scenes on one thread, with the machine they were measured on."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     plans, digests = [], {}

@@ -1,8 +1,6 @@
 """Probes of the stability suite: each varies one quantity from its trained range to far beyond.
 
-A probe makes a random scene for a value of its quantity; the same index gives the same random numbers at
-every value, so that a curve differs by the quantity alone. The base is that of the set `shapes2d`, or of
-another dimension where a `Kit` says so.
+The same index gives the same random numbers at every value, so that a curve differs by the quantity alone.
 """
 
 from __future__ import annotations
@@ -158,17 +156,11 @@ class Probe:
 
 @dataclass(frozen=True, slots=True)
 class Kit:
-    """Probes and counts for models of a dimension.
-
-    Args:
-        probes: by name.
-        apart: a number of objects that do not overlap.
-        animated: a number of frames of one scene that moves a little.
-    """
+    """Probes and counts for models of a dimension."""
 
     probes: dict[str, Probe]
-    apart: Callable[[Rng], list[Object]]
-    animated: Callable[[Rng, int], list[Scene]]
+    apart: Callable[[Rng], list[Object]]  # a number of objects that do not overlap
+    animated: Callable[[Rng, int], list[Scene]]  # frames of one scene that moves a little
 
 
 def _scene(rng: Rng, **changes: object) -> Scene:
@@ -176,13 +168,7 @@ def _scene(rng: Rng, **changes: object) -> Scene:
 
 
 def common(base: Base, deformed: Base, warp: float) -> dict[str, Probe]:
-    """The probes of any dimension.
-
-    Args:
-        base: makes scenes.
-        deformed: the like of deformed objects.
-        warp: its strongest deformations.
-    """
+    """The probes of any dimension: of base scenes, and deformed ones up to ``warp``."""
     return {
         "objects": Probe(
             "objects of a scene", "objects", (1, 2, 4, 8, 16, 32, 64, 128), 4,

@@ -32,11 +32,7 @@ Array = npt.NDArray[np.float64]
 
 
 def shadow_mask(scene: Scene, manifest: Manifest) -> tuple[npt.NDArray[np.bool_], Array, Array]:
-    """Mask (H, W) of solids in a medium's shadow, and exact pictures (H, W, 3) with and without it.
-
-    Args:
-        scene: a solid, then a medium.
-    """
+    """Mask (H, W) of a solid in a medium's shadow, and exact pictures (H, W, 3) with and without it."""
     solid, medium = scene.nodes
 
     def exact(**changes: Any) -> Array:
@@ -52,17 +48,9 @@ def shadow_mask(scene: Scene, manifest: Manifest) -> tuple[npt.NDArray[np.bool_]
 def measure_shadows(
     model: Model, count: int, seed: int, side: int, *, report: Report = silent
 ) -> tuple[dict[str, Any], Image]:
-    """Draw scenes in which a medium throws its shadow on a solid.
+    """Draw ``count`` scenes in which a medium's shadow on a solid takes at least 1 % of the canvas.
 
-    Args:
-        model: of solids.
-        count: scenes, each with at least 1 % of its canvas in shadow.
-        seed: of the scenes.
-        side: pixels along a side of the canvas.
-        report: called with scenes done and all.
-
-    Returns:
-        A summary for JSON, and the first scenes: network, exact picture and FLIP map.
+    Returns a summary for JSON, and the first scenes: network, exact picture and FLIP map.
     """
     result: list[dict[str, float]] = []
     rows: list[Image] = []

@@ -51,9 +51,7 @@ def distances(layers: Layers, p: Floats) -> Floats:
 def proved_slack(layers: Layers, near: float = 0.0015, slack: float = 1.25) -> Floats:
     """s (radii, cells, cells), as `Slopes` takes it, of a decoder with three layers and one output.
 
-    Args:
-        near: f and g may differ by so much anywhere.
-        slack: or else by so many times the most that was seen at samples of a node's cell.
+    f and g may differ by ``near`` anywhere, or by ``slack`` times the most that was seen at a node's cell.
     """
     layers = [(np.asarray(w, np.float64), np.asarray(b, np.float64)) for w, b in layers]
     side = round(2 * RADIUS / NODE)

@@ -70,12 +70,7 @@ def exact_picture(
 ) -> tuple[Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """The exact picture (H, W, 3), of the plane over white, which pixels are covered, which are on an edge.
 
-    Solids cover what is not as it would be without them: what they throw their shadow on too.
-
-    Args:
-        scene: what is drawn.
-        model: that its names are known by.
-        per_side: samples along each side of a pixel; 2 is the definition.
+    Solids also cover what they throw their shadow on.
     """
     solid = model.manifest.dimension == 3
     clear = scene.model_copy(update={"nodes": ()} if solid else {"background": None})
@@ -110,15 +105,7 @@ def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
 
 
 def unfolded(scene: Scene, program: Program, model: Model) -> Program:
-    """The same Program, its geometry vectors lifted one affine map after the other.
-
-    The exact lifting does so in float32, to show what rounding adds up to.
-
-    Args:
-        scene: one chain of objects, deformations first.
-        program: compiled of it without dropping rows.
-        model: that it was compiled for.
-    """
+    """The same Program of one chain, its vectors lifted one affine map after the other in float32."""
     (chain,) = scene.nodes
     assert isinstance(chain, Chain)
     vectors = program.vectors.copy()
@@ -170,10 +157,7 @@ def scene_of(probe: Probe, value: float, index: int, seed: int, model: Model) ->
 def run_probe(
     model: Model, name: str, scenes: int, seed: int, report: Report = silent, known: Sequence[Row] = ()
 ) -> dict[str, Any]:
-    """A curve: errors at every value of a probe; none for one that the model's canvas rules out.
-
-    Rows that are ``known`` are taken as they are.
-    """
+    """Errors at every value of a probe, or rows ``known``; none where the model's canvas rules one out."""
     probe = kit_of(model.manifest).probes[name]
     rows: list[Row] = []
     before = {row["value"]: row for row in known}
@@ -232,11 +216,7 @@ def order_of_disjoint(model: Model, scenes: int, seed: int) -> dict[str, float]:
 
 
 def flicker(model: Model, scenes: int, seed: int) -> dict[str, float]:
-    """Change from frame to frame that the exact animation does not have, over the change that it has.
-
-    Both are root mean squares over pixels; 0 is none, 1 as much again as the picture moves. Animations in
-    which nothing moves do not count, and where none does more are drawn.
-    """
+    """Change from frame to frame (root mean square) that the exact animation does not have, over its own."""
     ratios: list[float] = []
     index = -1
     while (index := index + 1) < scenes or not ratios:
@@ -299,20 +279,10 @@ def run_stability(
     report: Report = silent,
     known: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The whole suite, or the probes and invariants named.
+    """The whole suite, or the probes and invariants named by ``only``.
 
-    Args:
-        model, scenes, seed: what draws, how many scenes of every value, and their seed.
-        only: names of probes and of `INVARIANTS`; all by default.
-        report: called with a name, values done and all.
-        known: earlier results: values of as many scenes are not measured again, nor are invariants; probes
-            that are not asked for stay as they are.
-
-    Returns:
-        For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
-
-    Raises:
-        ValueError: an earlier result is of other weights or another seed.
+    Earlier results that are ``known`` are not measured again; ValueError if of other weights or another seed.
+    For JSON: ``probes`` and ``invariants`` by name, and what was measured on what.
     """
     started = time.perf_counter()
     rows: dict[str, list[Row]] = {}
@@ -354,7 +324,7 @@ WARP_OF, SCALES_OF = {2: WARP, 3: SOLID_WARP}, {2: SCALES, 3: SIDES}
 
 
 def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
-    """Quantity of a manifest -> the probe that varies it, and by what either end of its values is multiplied.
+    """Quantity of a manifest -> the probe that varies it, and factors of either end of its values.
 
     The ratio of scales of solids says little: rays may pass over what is thinner than 0.01, at any size.
     """
@@ -388,16 +358,7 @@ BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side o
 def measured_ranges(
     found: Mapping[str, Any], dimension: int = 2
 ) -> tuple[dict[str, list[float]], dict[str, str]]:
-    """Ranges of a model as the suite measured them.
-
-    Args:
-        found: of `lab.stability.run_stability`.
-        dimension: the model's.
-
-    Returns:
-        Ranges ``quantity -> [low, high]`` for the manifest's ``trained``, and lines about what lies beyond
-        for ``measured.stability``.
-    """
+    """Ranges by quantity for a manifest's ``trained``, and lines about what lies beyond for ``measured``."""
     ranges: dict[str, list[float]] = {}
     lines: dict[str, str] = {}
     for quantity, (name, low_unit, high_unit) in quantities(dimension).items():

@@ -41,15 +41,10 @@ FRESH = 15  # steps between new points
 
 
 class Leaf(NamedTuple):
-    """A shape of dihedral symmetry, with a vertex at +x.
-
-    Args:
-        order: n.
-        inner: radius, half a sector on, where the edge from the vertex at radius 1 ends; 0 for a disc.
-    """
+    """A shape of dihedral symmetry, with a vertex at +x, at radius 1."""
 
     order: int
-    inner: float
+    inner: float  # radius, half a sector on, of the vertex's edge; 0 for a disc
 
     def distance(self, p: Floats) -> Floats:
         """Exact distances (P,) at points (2, P)."""
@@ -87,13 +82,9 @@ LEAVES: Final = {
 class Decoder:
     """A decoder whose numbers are linear in few parameters.
 
-    Args:
-        order: n.
-        layers: orbits of both hidden layers, a letter each. ``g`` has 2n units, ``v`` and ``e`` have n, each
-            its own mirror image at the axis of a vertex or of an edge, ``1`` is one unit of the second layer.
-
-    Attributes:
-        parts: weights and biases, layer by layer, as matrices (numbers, parameters of the part).
+    ``layers`` are orbits of both hidden layers, a letter each: ``g`` has 2n units, ``v`` and ``e`` have n,
+    each its own mirror image at the axis of a vertex or of an edge, ``1`` is one unit of the second layer.
+    ``parts`` are weights and biases, layer by layer, as matrices (numbers, parameters of the part).
     """
 
     def __init__(self, order: int, layers: tuple[str, str]) -> None:
@@ -180,13 +171,7 @@ def _ties(moves: Index) -> Floats:
 
 
 class Start:
-    """One random start of a leaf's decoder, which goes on where it stopped.
-
-    Args:
-        leaf: its name.
-        layers: orbits of the hidden layers.
-        seed: of parameters and points.
-    """
+    """One random start of a leaf's decoder, which goes on where it stopped."""
 
     def __init__(self, leaf: str, layers: tuple[str, str], seed: int) -> None:
         self.leaf = LEAVES[leaf]
@@ -219,17 +204,11 @@ class Start:
 
 
 class Fit(NamedTuple):
-    """Settings of the fit of a leaf's decoder.
+    """Settings of the fit of a leaf's decoder."""
 
-    Args:
-        layers: orbits of its hidden layers.
-        seed: of the best start that was found.
-        rounds: of steps behind the first.
-    """
-
-    layers: tuple[str, str]
-    seed: int
-    rounds: int
+    layers: tuple[str, str]  # orbits of the hidden layers
+    seed: int  # of the best start that was found
+    rounds: int  # of steps behind the first
 
     def run(self, leaf: str) -> list[Floats]:
         """The decoder's numbers, the leaf as scenes have it."""
@@ -254,9 +233,9 @@ def placed(numbers: list[Floats], width: int) -> list[Floats]:
 def hiding(a: list[Floats], b: list[Floats], third: list[Floats], width: int) -> list[list[Floats]]:
     """Decoders a and b with so many units, for which 2 a - b is a third decoder.
 
-    Codes of four numbers hold five leaves of any kind. So they hold one more on the line through two of them.
-    The third's units, the last of each layer, are shut in a and b by their biases. The others have factors in
-    the last layer that cancel: ±1 in a, ±2 in b.
+    Codes of four numbers hold five leaves of any kind, and so one more on the line through two of them. The
+    third's units, the last of each layer, are shut in a and b by their biases. The others have factors in the
+    last layer that cancel: ±1 in a, ±2 in b.
     """
     w1, b1, w2, b2, w3, b3 = third
     # a unit that is 1 makes up for the last bias
@@ -293,11 +272,7 @@ DISC: Final = (0.2, -0.1, 0.4, 0.0)
 
 
 def trained(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict[str, Any]]:
-    """Tensors and header of a weights file of `shapes2d` with new decoders in the place of its own.
-
-    The codes stay, so that vectors of Programs do. The header has those of the disc and the hexagon, which no
-    manifest names.
-    """
+    """Tensors and header of `shapes2d` with new decoders; codes stay, so that vectors of Programs do."""
     header, arrays = open_weights(data)
     width = header["config"]["network"]["decoder_width"]
     result = {leaf: fit.run(leaf) for leaf, fit in FITS.items()}

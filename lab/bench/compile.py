@@ -89,7 +89,6 @@ def measure(kind: str, count: int) -> dict[str, float | int | str]:
 
 
 def main() -> None:
-    """Measure each kind and count in its own process."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("counts", nargs="*", type=int, default=COUNTS)
     parser.add_argument("--json", metavar="FILE")

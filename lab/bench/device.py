@@ -2,10 +2,9 @@
 
     python -m lab bench device [--frames N] [--scene NAME ...] [--warps N]
 
-Wall-clock time, medians. Each frame is of a Program that was not drawn before in the process, after one that
-warms up (and, the first time, compiles the kernel). *Host* ends when the kernel is on its way, *kernel* is
-what the device then takes for it by its own clock, *frame* ends when the picture is back. Pictures are
-compared with four samples a pixel of numpy. Without a GPU only the host's part is timed, and nothing drawn.
+Medians of wall-clock time, each frame of a new Program. *Host* ends when the kernel is on its way, *kernel*
+is its time by the device's clock, *frame* ends when the picture is back. Pictures are compared with four
+samples a pixel of numpy. Without a GPU only the host's part is timed.
 """
 
 from __future__ import annotations

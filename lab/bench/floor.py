@@ -86,12 +86,10 @@ def solids(frame: int, name: str, side: int = 256) -> Any:
 
 
 def of_set(frame: int, name: str) -> Any:
-    """Scenes of an evaluation set."""
     return random_scene(np.random.default_rng([2021, frame]), SETS[name])
 
 
 def of_solid_set(frame: int, name: str) -> Any:
-    """Scenes of an evaluation set of solids."""
     return random_solid(np.random.default_rng([2021, frame]), SOLID_SETS[name])
 
 
@@ -108,7 +106,6 @@ SCENES: dict[str, Callable[[int], Any]] = {
 
 
 def model_of(name: str) -> str:
-    """Name of the model that draws a scene."""
     return "solids3d" if name in SOLIDS or name.startswith("solids") else "shapes2d"
 
 
@@ -199,7 +196,6 @@ def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
 
 
 def told(title: str, frames: Sequence[Frame]) -> str:
-    """Medians of frames."""
     seconds, pairs, refined, met = (statistics.median(f[at] for f in frames) for at in range(4))
     counts = f"{pairs:,.0f} pairs met, {met:,.0f} pixels asked, {refined:,.0f} of them four times"
     first = statistics.median(frame.first for frame in frames)
@@ -207,7 +203,6 @@ def told(title: str, frames: Sequence[Frame]) -> str:
 
 
 def middle(frames: Sequence[Frame]) -> dict[str, float]:
-    """Medians of seconds and of pairs met."""
     return {what: statistics.median(getattr(f, what) for f in frames) for what in ("seconds", "pairs")}
 
 

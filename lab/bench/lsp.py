@@ -1,16 +1,14 @@
 """Cost of a keystroke: ``python -m lab bench lsp [LINES] [KEYS]``.
 
-A server process is driven over its pipes, as an editor drives it. A statement is typed in the middle of a
-file, letter by letter. Measured are, by wall clock from the first byte sent to the last byte read:
+A server process is driven over its pipes, as an editor drives it: a statement is typed in the middle of a
+file. Wall clock from the first byte sent to the last byte read:
 
-- syntax: from ``didChange`` to the ``publishDiagnostics`` of that text, with the mistakes of syntax;
+- syntax: from ``didChange`` to the ``publishDiagnostics`` with the mistakes of syntax;
 - completion: from ``didChange`` to the answer of a completion right behind it;
-- check: from the last key to the ``publishDiagnostics`` with all that evaluation and compiler found, less the
-  pause of typing that is waited for (``debounceMs``).
+- check: from the last key to the ``publishDiagnostics`` with all mistakes, less the pause (``debounceMs``).
 
-A file of many small statements, of which those near the edit are parsed again, is typed into by an editor
-that closes braces by itself and by one that does not: while a brace is open, the layout of the whole text
-decides where it belongs. A file that is one long chain is parsed whole in any case.
+Files of many small statements are typed into with and without closing braces by themselves: while a brace is
+open, the layout of the whole text decides where it belongs. One long chain is parsed whole in any case.
 """
 
 from __future__ import annotations

@@ -30,10 +30,7 @@ NO_BSDF = {"type": "null"}
 
 
 def by_vectors() -> str:
-    """Draw scenes to come by vectors where there is an LLVM of at least 16; says how they are drawn.
-
-    An older one ends the process at what Mitsuba asks of it.
-    """
+    """Draw scenes to come by vectors where there is an LLVM of at least 16 (older ones crash); says how."""
     mi.set_variant(VECTORS)
     try:
         version: tuple[int, ...] = dr.detail.llvm_version()

@@ -18,7 +18,6 @@ COLUMNS = ("mistakes", "sound", "one, near", "one", "near", "0", "2", "3", "more
 
 
 def row(name: str, outcomes: list[Outcome]) -> str:
-    """One line of the table."""
     mistakes = [o for o in outcomes if o.fault != "none"]
     counts = Counter(o.count for o in mistakes)
     more = sum(number for count, number in counts.items() if count > 3)
@@ -48,7 +47,6 @@ def show(outcome: Outcome) -> None:
 
 
 def main() -> None:
-    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=1000, help="slips of each kind (1000)")
     parser.add_argument("--seed", type=int, default=2021)

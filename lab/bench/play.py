@@ -2,10 +2,9 @@
 
     python -m lab bench play [SCENE] [KEYS] [-o docs/results/play.json]
 
-A server and Chromium with software GL run on this machine. A digit of the scene's first number behind a
-bracket is typed and taken back, each key a pause after the picture of the one before. Measured in the page,
-from the time that the browser gives the key press to the frame after the network's picture of that text has
-been put in, at the scene's own size; beside it what the server says that compiling and drawing took.
+Chromium with software GL types a digit of the scene's first number and takes it back. Measured in the page,
+from the key press to the frame after the network's picture of that text, at the scene's own size; beside it
+the server's times of compiling and drawing.
 """
 
 from __future__ import annotations

@@ -51,12 +51,10 @@ def povray() -> str | None:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """A vector."""
     return "<{}>".format(", ".join(f"{v:.17g}" for v in values))
 
 
 def rgb(values: Iterable[float], factor: float = 1.0) -> str:
-    """A colour."""
     return "rgb " + numbers(factor * v for v in values)
 
 
@@ -144,16 +142,14 @@ def isosurface(name: str) -> str:
 
 
 def joined(word: str, *shapes: str) -> str:
-    """A boolean of shapes."""
     return f"{word} {{ {' '.join(shapes)} }}"
 
 
 def cells(root: Fold, formulas: Formulas) -> list[tuple[str, Leaf]]:
     """Shapes that do not overlap, each with the leaf that has its look: a chain of leaves, folded.
 
-    A later object is cut out of those before it; a medium with a gap, as of two clear surfaces in one place a
-    ray would meet but one. Solids and media may not overlap: there the language takes the normal from the
-    distance of both, POV-Ray from the solid. Blends join one shape to one, of one look.
+    A later object is cut out of those before it; a medium with a gap, as a ray would meet one of two surfaces
+    in one place. Solids and media may not overlap. Blends join one shape to one, of one look.
     """
     found: list[tuple[str, Leaf]] = []
     distance = ""
@@ -229,11 +225,7 @@ def exported(root: Fold, stage: Stage, canvas: tuple[int, int]) -> str:
 
 
 def traced(scene: str, canvas: tuple[int, int], *options: str) -> np.ndarray:
-    """Linear light (H, W, 3) that POV-Ray draws, one sample a pixel unless options say otherwise.
-
-    Raises:
-        RuntimeError: POV-Ray failed; the message is its own.
-    """
+    """Linear light (H, W, 3) by POV-Ray, a sample a pixel unless options differ; RuntimeError if it fails."""
     width, height = canvas
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "scene.pov").write_text(scene)

@@ -104,7 +104,6 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
 
 
 def main() -> int:
-    """Measure sets."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--scenes", type=int, default=40)
     parser.add_argument("--seed", type=int, default=2021)

@@ -2,13 +2,11 @@
 
     python -m lab bench solids [-o docs/results/solid-rivals.json] [--scenes N] [--weights FILE ...]
 
-Every way draws every scene once, in turn. What counts is the processor time of a frame, all
-threads together; of ours of a Program that was not drawn before, warm otherwise. Starting the others, which
-includes reading the scene, is told apart: of POV-Ray it is a picture of one pixel, of Mitsuba all up to the
-end of the first frame but for what the second takes. A picture is compared with what the same renderer makes
-of many samples a pixel, ours with the exact one, and with the four samples that the language defines.
-Mitsuba leaves out ambient light, the fade and the sky; it draws by vectors where there is an LLVM of at least
-16, which `DRJIT_LIBLLVM_PATH` may name, and one by one elsewhere. Needs the extra ``oracles`` and POV-Ray.
+Every way draws every scene once, in turn. Processor time of a warm frame counts, all threads together; the
+time of starting, with reading the scene, stands apart. A picture is compared with the same renderer's of many
+samples a pixel, ours with the exact one, and with the four samples that the language defines. Mitsuba leaves
+out ambient light, the fade and the sky; it draws by vectors where there is an LLVM of at least 16, which
+`DRJIT_LIBLLVM_PATH` may name. Needs the extra ``oracles`` and POV-Ray.
 """
 
 from __future__ import annotations

@@ -57,7 +57,6 @@ def seconds(command: list[str], environment: dict[str, str]) -> float:
 
 
 def main() -> None:
-    """Run all commands, round after round, and print their medians."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("rounds", nargs="?", type=int, default=11)
     parser.add_argument("-o", "--out", type=Path, metavar="FILE")

@@ -86,7 +86,6 @@ def in_chromium(work: Callable[[Any], None]) -> None:
 
 
 def main() -> None:
-    """Print a line for each scene."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--side", type=int, default=256, help="pixels along a side")
     parser.add_argument("--frames", type=int, default=5, help="frames after the first")

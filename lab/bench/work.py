@@ -48,7 +48,6 @@ def programs(share: float) -> Iterator[Program]:
 
 
 def frame_ms(program: Program, samples: Samples = "adaptive") -> float:
-    """Milliseconds of a frame."""
     taken = []
     for _ in range(3):
         started = time.process_time()

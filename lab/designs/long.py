@@ -1,12 +1,8 @@
 """Long trainings of the paper's renderers: in phases of counted steps, with a curve, over many sessions.
 
-A phase
-has a resolution, so that `streaming` grows as in the paper. Two things are not the paper's: every prefix of a
-stream is drawn and asked for, which costs no more than the last one alone; and the ConvLSTM, nearly all of
-the work, may run over a window of each picture near an object, in place of the whole.
-
-Steps decide what a training yields, so that one that was killed ends as it would have; processor time is only
-told. A training may begin from the weights of another: its time and its curve go on.
+A phase has a resolution, so that `streaming` grows as in the paper. Two things are not the paper's: every
+prefix of a stream is drawn and asked for, which costs no more than the last one alone; and the ConvLSTM may
+run over a window of each picture near an object. Steps alone decide what a training yields.
 
 Letters: B scenes, N objects, R pixels along a side.
 """
@@ -105,16 +101,7 @@ class Point(NamedTuple):
 
 
 class LongTraining:
-    """A training that can be stopped, killed and taken up again.
-
-    Args:
-        config: what to train.
-        folder: gets ``checkpoint.safetensors``.
-        begin: weights of another training to begin from, unless there is a checkpoint.
-
-    Raises:
-        ValueError: the checkpoint is of another configuration, or the weights of another network.
-    """
+    """A training in a folder that can be stopped, killed and taken up again, or ``begin`` from weights."""
 
     def __init__(self, config: LongConfig, folder: Path, begin: Path | None = None) -> None:
         torch.manual_seed(config.seed)
@@ -139,14 +126,10 @@ class LongTraining:
 
     @property
     def steps(self) -> int:
-        """Optimiser steps of all phases."""
         return sum(phase.steps for phase in self.config.phases)
 
     def run(self, seconds: float = math.inf, save_every_s: float = 60.0) -> Iterator[float]:
-        """Train until all steps are done, or for so many seconds of processor time; yields losses.
-
-        Checkpoints are ``save_every_s`` apart, in seconds of the clock.
-        """
+        """Train until all steps are done, or for so many seconds of processor time; yields losses."""
         used, saved = 0.0, time.monotonic()
         while self.step < self.steps and used <= seconds:
             started = time.process_time()
@@ -182,10 +165,7 @@ class LongTraining:
 
     @torch.no_grad()
     def measure(self, count: int = UNSEEN) -> float:
-        """Mean PSNR (dB) of the averaged weights over unseen scenes.
-
-        As in the set `shapes2d`, scenes that cover under 2 % of the canvas do not count.
-        """
+        """Mean PSNR (dB) of the averaged weights over unseen scenes that cover at least 2 % of the canvas."""
         side = self.measured_side
         generator = torch.Generator().manual_seed(999)
         result: list[Tensor] = []
@@ -254,7 +234,6 @@ class LongTraining:
         torch._foreach_lerp_(list(self.averaged.parameters()), new, 1 - decay)
 
     def save(self) -> None:
-        """Write the checkpoint."""
         self.folder.mkdir(parents=True, exist_ok=True)
         header = {
             "format": 1,
@@ -333,11 +312,7 @@ def _rate(phase: LongPhase, into: int) -> float:
 
 
 def export_long(training: LongTraining, model: str, path: Path) -> None:
-    """Write the averaged weights of a training, finished or not, with its curve: another can go on from them.
-
-    They are the lifting's and the renderer's, without levels of growing, in half precision, which is far
-    finer than what such a training leaves undecided.
-    """
+    """Write averaged weights in half precision, with the curve: another training can go on from them."""
     header = {
         "model": model,
         "config": training.config.to_json(),
@@ -361,10 +336,7 @@ def export_long(training: LongTraining, model: str, path: Path) -> None:
 
 
 def trained_model(path: Path) -> Model:
-    """The model of exported weights, whatever ships under its name.
-
-    Scenes are compiled as for `shapes2d`, or of a learned lifting as for `shapes2d-reading`: on any canvas.
-    """
+    """The model of exported weights, whatever ships under its name."""
     data = read_regular(path, MOST_BYTES)
     header = open_weights(data).header
     student = header["config"]["student"]

@@ -35,8 +35,6 @@ class PictureConfig:
 
 @dataclass(slots=True)
 class Scenes:
-    """Random scenes."""
-
     leaf: Tensor  # geometry index (B, N), int64
     # (B, N), nearest the leaf, in that order
     twirl: Tensor
@@ -139,13 +137,7 @@ def pictures(scenes: Scenes, r: int) -> Tensor:
 
 
 def exact_vectors(scenes: Scenes, codes: Tensor, material_codes: Tensor) -> Tensor:
-    """Vectors (B, N, 64) as `scenelang.compiler.lifting` lifts chains, for codes in training.
-
-    Args:
-        scenes: any.
-        codes: (G, 4).
-        material_codes: (K, 12); all objects have the first.
-    """
+    """Vectors (B, N, 64) as `scenelang.compiler.lifting` makes them, of codes (G, 4) and (K, 12)."""
     b, n = scenes.leaf.shape
     out, at = torch.zeros(b, n, WIDTH, device=codes.device), PLANE_LAYOUT.places
     out[..., at.one] = 1.0

@@ -40,11 +40,6 @@ class Encoder(nn.Module):
 
     Two hidden layers of rectified linear units; the last layer starts small, so that long chains neither
     vanish nor grow before anything is learned.
-
-    Args:
-        inputs: numbers of a transformation.
-        width: hidden units W.
-        size: rows and columns d of the matrix.
     """
 
     def __init__(self, inputs: int, width: int, size: int) -> None:
@@ -67,13 +62,7 @@ class Encoder(nn.Module):
 
 
 class Encoders(nn.Module):
-    """Learned vectors of the elements and encoders of the transformations.
-
-    Args:
-        config: sizes.
-        geometries: number of leaf geometries.
-        materials: number of materials.
-    """
+    """Learned vectors of the elements and encoders of the transformations."""
 
     def __init__(self, config: LiftingConfig, geometries: int, materials: int) -> None:
         super().__init__()
@@ -137,11 +126,7 @@ class LearnedLifting(Encoders):
 
 
 class Student(nn.Module, ABC):
-    """A lifting and a renderer.
-
-    Args:
-        config: which ones.
-    """
+    """A lifting and a renderer."""
 
     def __init__(self, config: StudentConfig) -> None:
         super().__init__()
@@ -161,8 +146,6 @@ class Student(nn.Module, ABC):
 
 
 class StreamingStudent(Student):
-    """The streaming renderer."""
-
     def __init__(self, config: StudentConfig, *, grown: bool = False) -> None:
         super().__init__(config)
         sizes: dict[str, Any] = asdict(config.streaming) | {"vector": self.vector}
@@ -222,11 +205,7 @@ CARRIED = 18  # channels: 4 of coordinates, 4 slopes, 2 warps, 4 of the code, 3 
 
 @torch.no_grad()
 def carry_frames(network: Streaming) -> None:
-    """Let all deconvolutions carry frames, warps, codes and colours in their first `CARRIED` channels.
-
-    Raises:
-        ValueError: a level has fewer filters.
-    """
+    """Let deconvolutions carry frames, warps, codes and colours in their first `CARRIED` channels."""
     for level, layer in enumerate(network.deconvolutions):
         assert isinstance(layer, nn.ConvTranspose2d)
         assert layer.bias is not None

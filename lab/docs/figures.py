@@ -111,11 +111,7 @@ def _match(claim: str, text: str) -> re.Match[str]:
 
 
 def filled(text: str, claims: Iterable[str]) -> str:
-    """The page with the figures of every claim as records have them.
-
-    Raises:
-        LookupError: A claim is not in the page, or there more than once.
-    """
+    """The page with every claim's figures as records have them; LookupError unless each is there once."""
     for claim in claims:
         match = _match(claim, text)
         shown = re.findall(f"{OPEN}(.*?){CLOSE}", claim)
@@ -156,11 +152,7 @@ def prose(text: str) -> str:
 
 
 def uncovered(text: str, claims: Iterable[str], given: Mapping[str, str]) -> Iterator[tuple[int, str]]:
-    """(line, words) of every figure in prose that no claim shows and that is not given.
-
-    Raises:
-        LookupError: A claim is not there exactly once, or what is given is not there.
-    """
+    """(line, words) of every figure in prose that is neither claimed nor given; LookupError as `filled`."""
     covered = []
     for claim in claims:
         match = _match(claim, text)

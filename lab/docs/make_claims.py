@@ -25,7 +25,6 @@ def claimed() -> Iterator[tuple[Path, ModuleType]]:
 
 
 def main() -> None:
-    """See the module's description."""
     for page, module in claimed():
         text = page.read_text("utf-8")
         try:

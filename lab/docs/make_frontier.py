@@ -98,7 +98,6 @@ BLOCKS: dict[str, Callable[[], str]] = {f"savings{ending}": _told(base) for base
 
 
 def main() -> None:
-    """See the module's description."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ship", type=Path, metavar="OUT", required=True)
     ship(parser.parse_args().ship)

@@ -340,7 +340,6 @@ def plan() -> dict[str, Callable[[], bytes]]:
 
 
 def main() -> None:
-    """Draw what is asked for, and say what changed."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", metavar="PATTERN", default="*", help="such as 'tutorial/*' or 'gear.png'")
     only = parser.parse_args().only

@@ -109,7 +109,6 @@ def record(page: Any, film: Film) -> None:
 
 
 def main() -> None:
-    """Record and write."""
     path = next(filter(None, map(shutil.which, NAMES)))
     with server() as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))

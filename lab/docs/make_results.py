@@ -131,7 +131,6 @@ def filled(text: str) -> str:
 
 
 def main() -> None:
-    """Write the page, or check it."""
     text = PAGE.read_text("utf-8")
     if filled(text) != text and "--check" in sys.argv:
         raise SystemExit("docs/measurements.md is out of date: python -m lab docs results")

@@ -197,7 +197,6 @@ PLACES: Final = [
 
 
 def _edged() -> list[Any]:
-    """White around letters, over lines."""
     from matplotlib.patheffects import Normal, Stroke
 
     return [Stroke(linewidth=2, foreground="white"), Normal()]

@@ -14,16 +14,9 @@ ROUNDS = 20  # of weights
 
 
 def fit_cost(loads: Sequence[Load], ms: Sequence[float], skip: bool, *, fixed: bool = False) -> Cost:
-    """The sum that comes nearest to measured frames: twice a frame is as far off as half of it.
+    """The sum nearest to measured frames, by the least sum of (guess - ms)² / (guess ms), reweighted.
 
-    The least sum of (guess - ms)² / (guess ms), by least squares with weights of the guess before.
-
-    Args:
-        loads: of the frames.
-        ms: what they took.
-        skip: whether objects meet only the pixels in their reach.
-        fixed: the canvas is always the same, so that only objects count. Where it may change but only one
-            was measured, everything is taken to grow with its pixels.
+    ``skip``: objects meet only pixels in their reach. ``fixed``: only objects count, on one canvas.
     """
     rows = np.array([load.row(skip) for load in loads]) / UNITS
     if fixed:

@@ -1,8 +1,7 @@
 """One run that takes the time and the error of every way to draw, side by side.
 
-Each scene is drawn once by all ways in turn, beginning with another one each time, so that a machine that
-slows down slows all of them. Each frame is of a Program that was compiled for it and not drawn before, and no
-renderer keeps anything between frames. Ways that take long draw fewer scenes; the file says how many.
+Each scene is drawn by all ways in turn, beginning with another one each time, each frame of a Program that
+was not drawn before. Ways that take long draw fewer scenes; the file says how many.
 """
 
 from __future__ import annotations
@@ -80,8 +79,6 @@ CASES: tuple[Case, ...] = (
 
 @dataclass(slots=True)
 class Record:
-    """Measurements of a way."""
-
     ms: list[float] = field(default_factory=list)  # of each scene
     # of each scene
     flip: list[float] = field(default_factory=list)
@@ -102,18 +99,9 @@ def measure_frontier(
     report: Report = silent,
     kept: Path | None = None,
 ) -> tuple[Frontier, dict[str, list[Image]], list[Image]]:
-    """Measure all ways to draw the scenes of a set.
+    """Measure all ways to draw scenes of the set of ``base``, with exact pictures ``kept`` in a folder.
 
-    Args:
-        base: the model named like the set.
-        scenes: how many; of 256 x 256 pixels, of the `usual_set`.
-        seed: of the scenes.
-        threads: cores to draw on.
-        report: called with the stage, what is done and all.
-        kept: folder of exact pictures, which are drawn and kept there unless they are.
-
-    Returns:
-        The figures, pictures of the first scenes by the name of what drew them, and the exact ones.
+    Returns the figures, pictures of the first scenes by the name of what drew them, and the exact ones.
     """
     keep_memory()
     torch.set_num_threads(threads)
@@ -253,8 +241,8 @@ def _other_cases(
 def promised(values: Sequence[float]) -> float:
     """A bound that a new value of the same kind exceeds with a probability of at most 2.5 %.
 
-    The k-th smallest of n values, k = ceil(0.975 (n + 1)); a little more than the largest where n is under 39
-    (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005: a conformal quantile).
+    The k-th smallest of n values, k = ceil(0.975 (n + 1)), or a little over the largest: a conformal quantile
+    (Vovk, Gammerman, Shafer, *Algorithmic Learning in a Random World*, 2005).
     """
     ordered = sorted(values)
     k = math.ceil(PROMISED * (len(ordered) + 1))
@@ -323,7 +311,6 @@ def _over(slow: Record, fast: Record) -> list[float]:
 
 
 def machine() -> str:
-    """The processor."""
     name = platform.processor() or platform.machine()
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()

@@ -1,8 +1,4 @@
-"""The frontier as one HTML file that needs nothing else: a chart, a table, and each point's pictures.
-
-The table is there without JavaScript; with it, the chart's points and the table's rows show their pictures,
-figures and command. `page.html` is the page around them.
-"""
+"""The frontier as one HTML file: a chart, a table and, by JavaScript, each point's pictures and command."""
 
 from __future__ import annotations
 
@@ -25,13 +21,7 @@ _LARGE: Final = 24_000
 
 
 def frontier_page(frontier: Frontier, pictures: Mapping[str, Sequence[Image]], exact: Sequence[Image]) -> str:
-    """The page's text.
-
-    Args:
-        frontier: figures.
-        pictures: of the same scenes, of each point, by its name.
-        exact: the exact ones.
-    """
+    """The page's text, with pictures of the same scenes by every point's name, and the exact ones."""
     points = [_facts(p, base_of(frontier), pictures.get(p.name, ())) for p in frontier.points]
     width, height = frontier.canvas
     cores = "one core" if frontier.threads == 1 else f"{frontier.threads} cores"

@@ -141,10 +141,7 @@ def _rounded(value: Any) -> Any:
 
 
 def front(figures: Sequence[tuple[float, float]]) -> list[bool]:
-    """Mask of the Pareto front of (time, error): no other point is as good in both and better in one.
-
-    Of equal points the first one counts.
-    """
+    """Mask of the Pareto front of (time, error); of equal points the first one counts."""
     order = sorted(range(len(figures)), key=lambda i: (*figures[i], i))
     mask = [False] * len(figures)
     best = math.inf

@@ -35,20 +35,9 @@ def verify(
 ) -> dict[str, Any]:
     """Draw unseen scenes by every offered point and count in how many the promised FLIP is kept.
 
-    Args:
-        frontier: the promises.
-        base: the model named like the set.
-        scenes: of the first case; the others take a share.
-        seed: of the scenes; another than the frontier's.
-        report: called with the case, scenes done and all.
-        kept: folder of exact pictures, which are drawn and kept there unless they are.
-
-    Returns:
-        For JSON: for each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise); of
-        all together ``drawings`` and ``kept``; and ``held``: whether every share is at least `KEPT`.
-
-    Raises:
-        ValueError: the seed is the frontier's own.
+    The ``seed`` may not be the frontier's (ValueError); exact pictures are ``kept`` in a folder. For JSON: of
+    each case and point ``scenes``, ``kept`` (share), ``worst`` (FLIP over the promise); of all together
+    ``drawings`` and ``kept``; and ``held``: whether every share is at least `KEPT`.
     """
     if seed == frontier.seed:
         raise ValueError(f"seed {seed} made the promises; verify with another")

@@ -66,15 +66,7 @@ class Way:
 
 
 def ways_of(base: str, threads: int) -> list[Way]:
-    """All ways to draw the scenes of a set.
-
-    Args:
-        base: the model named like the set.
-        threads: cores to draw on.
-
-    Raises:
-        RenderError: a model's weights are missing or damaged.
-    """
+    """All ways to draw the scenes of a set; RenderError where weights are missing or damaged."""
     manifests = [m for m in map(load_manifest, available()) if m.set == load_manifest(base).set]
     result: list[Way] = []
     for manifest in sorted(manifests, key=lambda m: (m.name != base, m.name)):
@@ -166,9 +158,7 @@ def _formulas(name: str, threads: int, samples: Samples, skip: bool) -> Prepare:
 
 
 def paired(base: str) -> list[tuple[str, str]]:
-    """Pairs of ways whose times are told as a ratio, the slower first: network and exact field with the same
-    savings, either without the savings, and the paper's renderer and the reference over either.
-    """
+    """Pairs of ways, the slower first, whose times are told as a ratio."""
     savings = ["", TITLES["four"], ", nothing skipped", f", nothing skipped{TITLES['four']}"]
     pairs = [(base + saved, FIELD + saved) for saved in [*savings, TITLES["one"], TITLES["quick"]]]
     pairs += [(name + saved, name) for name in (base, FIELD) for saved in savings[1:]]

@@ -207,7 +207,6 @@ def chained(rng: Rng, node: SceneNode) -> Chain:
 
 
 def random_scene(rng: Rng, config: SetConfig) -> Scene:
-    """One scene of a set."""
     model = "shapes2d"
     if config.nest in ("any", "leaves"):
         tree = any_tree(rng, lambda: random_object(rng, config))

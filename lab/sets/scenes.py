@@ -58,14 +58,9 @@ def usual_set(manifest: Manifest) -> str:
 
 
 def scenes_of(model: Model, name: str, seed: int, side: int | None = None) -> Callable[[int], Scene]:
-    """The scenes of a set by index, on a canvas that a model draws.
+    """Scenes by index of a set, or of `meshes3d` with the solids of a file, on a canvas that a model draws.
 
-    Scenes that cover under 2 % of the canvas are drawn again.
-
-    Args:
-        name: of the set, or a file of elements, whose solids take the place of those of `meshes3d`.
-        seed: of the set; training uses other streams of random numbers.
-        side: shorter side of the canvas in pixels; by default that of the set.
+    Those that cover under 2 % of the canvas are drawn again. ``side`` is the shorter one, in pixels.
     """
     manifest = model.manifest
     brought = replace(SOLID_SETS["meshes3d"], meshes=name)
@@ -120,11 +115,7 @@ def summarise(cases: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float
 
 
 def record_measured(path: Path, name: str) -> dict[str, Any]:
-    """Measure PSNR (dB, at most 50) on a few unseen scenes and write it into the header of a model's weights.
-
-    Returns:
-        What was written: scenes, seed, and mean, 5th percentile and worst of each set.
-    """
+    """Measure PSNR (dB, at most 50) on unseen scenes and write it into the header of a model's weights."""
     model = load_model(name, path=path)
     measured: dict[str, Any] = {"scenes": RECORDED, "seed": 99}
     for group in ("unions", "affine", "chains"):

@@ -44,33 +44,19 @@ WARP = 0.8  # of deformed objects
 
 @dataclass(frozen=True, slots=True)
 class SolidConfig:
-    """Distribution of the scenes of a set.
+    """Distribution of the scenes of a set."""
 
-    Args:
-        objects: fewest and most objects.
-        media: share of objects that are volumetric.
-        warp: largest twirl, bend and twist, each there in half of the objects, as is a displacement; 0: none.
-        unions: share of scenes that are unions only; in the others half of the blends have another width.
-        shuffled: scale, rotate, translate and shear in random order, a twirl before and a bend among them.
-        size: factor on scales.
-        spread: factor on translations.
-        staged: a random camera, light, ground and sky.
-        canvas: pixels.
-        meshes: a file of elements whose solids take the place of spheres and tori.
-        trees: any trees of booleans; see `lab.sets.plane.any_tree`.
-    """
-
-    objects: tuple[int, int] = (1, 3)
-    media: float = 0.5
-    warp: float = 0.0
-    unions: float = 1.0
-    shuffled: bool = False
-    size: float = 1.0
-    spread: float = 1.0
-    staged: bool = False
-    canvas: tuple[int, int] = (128, 128)
-    meshes: str = ""
-    trees: bool = False
+    objects: tuple[int, int] = (1, 3)  # fewest and most
+    media: float = 0.5  # share of objects
+    warp: float = 0.0  # largest twirl, bend and twist, each in half of the objects; displaced too; 0: none
+    unions: float = 1.0  # share of scenes; in the others half of the blends have another width
+    shuffled: bool = False  # scale, rotate, translate, shear in any order, a twirl before, a bend among them
+    size: float = 1.0  # factor on scales
+    spread: float = 1.0  # factor on translations
+    staged: bool = False  # a random camera, light, ground and sky
+    canvas: tuple[int, int] = (128, 128)  # pixels
+    meshes: str = ""  # a file of elements whose solids take the place of spheres and tori
+    trees: bool = False  # any trees of booleans; see `lab.sets.plane.any_tree`
 
 
 SOLID_SETS: dict[str, SolidConfig] = {
@@ -117,7 +103,6 @@ def _moves(rng: Rng, config: SolidConfig) -> list[Transform]:
 
 
 def _stage(rng: Rng) -> dict[str, object]:
-    """Settings of a scene."""
     turn, height = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(0.3, 3.0))
     eye = (5.8 * math.sin(turn), height, 5.8 * math.cos(turn))
     fov = math.radians(float(rng.uniform(30, 50)))

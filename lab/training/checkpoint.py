@@ -24,10 +24,7 @@ def save_tensors(path: Path, tensors: dict[str, Tensor], header: dict[str, Any])
 
 
 def load_tensors(path: Path, device: str = "cpu") -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Tensors and header of a file that `save_tensors` wrote.
-
-    Raises `OSError` where it cannot be read, `ModelError` where it is damaged or not such a file.
-    """
+    """Tensors and header of a file of `save_tensors`; OSError if unreadable, `ModelError` if damaged."""
     data = read_regular(path, _MOST_BYTES)
     try:
         result = read_tensors(data, _MOST_BYTES)
@@ -75,11 +72,7 @@ def unpack_training(
 
 
 def check_config(path: Path, saved: Any, own: Any) -> None:
-    """Refuse a checkpoint of another configuration; settings that have gone since it was saved do not count.
-
-    Raises:
-        ValueError: a setting differs.
-    """
+    """Raise ValueError for a checkpoint of another configuration; settings that have gone do not count."""
     if not _same(saved, json.loads(json.dumps(own))):
         raise ValueError(f"{path} was trained with another configuration")
 

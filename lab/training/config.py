@@ -87,8 +87,5 @@ def read_solids_config(name: str) -> SolidsConfig:
 
 
 def read_config(name: str) -> TrainConfig:
-    """Read a configuration by path or by the name of a shipped one.
-
-    Raises `OSError`, or `pydantic.ValidationError` where a key is unknown or a value has the wrong type.
-    """
+    """Read a configuration by path or shipped name; raises OSError or `pydantic.ValidationError`."""
     return TypeAdapter[TrainConfig](TrainConfig).validate_json(config_data(name))

@@ -17,19 +17,12 @@ LEAVES = (*words.LEAVES[3],)
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Points on and around a leaf.
+    """Points on and around a leaf."""
 
-    Args:
-        q: (P, 3).
-        distance: exact (P,).
-        gradient: of it (P, 3).
-        weight: of the errors of distance and gradient (P, 4).
-    """
-
-    q: Tensor
-    distance: Tensor
-    gradient: Tensor
-    weight: Tensor
+    q: Tensor  # (P, 3)
+    distance: Tensor  # exact (P,)
+    gradient: Tensor  # of it (P, 3)
+    weight: Tensor  # of the errors of distance and gradient (P, 4)
 
 
 def leaf_points(leaf: str, count: int, g: torch.Generator, kind: torch.dtype) -> Points:
@@ -62,10 +55,7 @@ def _directions(count: int, g: torch.Generator) -> Tensor:
 
 
 def half_rays(leaf: str, count: int, g: torch.Generator, cells: int = 128) -> tuple[Tensor, Tensor]:
-    """Half rays as `folded` tells them (5, 6 count), and lengths (6 count,) of the leaf on them.
-
-    Six each lie on a line through its unit ball; two of them are all of it.
-    """
+    """Half rays as `folded` has them (5, 6 count), six each on a line, and lengths (6 count,) of the leaf."""
     p = _directions(count, g) * torch.rand((count, 1), generator=g) ** (1 / 3)
     way = _directions(count, g)
     middle = -(p * way).sum(1, keepdim=True)

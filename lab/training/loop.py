@@ -35,23 +35,13 @@ def train(
     save_every_s: float = 60.0,
     report_every: int = 500,
 ) -> bool:
-    """Train, or go on from the checkpoint in ``folder``.
+    """Train, or go on from the checkpoint in ``folder``; true when done, false when time is over.
 
-    Args:
-        config: must equal the checkpoint's.
-        folder: gets ``checkpoint.safetensors``, ``log.jsonl`` and, at the end, ``weights.safetensors``. What
-            the log tells of steps after the checkpoint, which are done again, is cut off.
-        budget_s: stop after so many seconds of this call, with a checkpoint.
-        report: called with iteration, iterations, seconds spent and mean loss parts, of which there are none
-            at the start.
-        save_every_s: most seconds between checkpoints. The first comes after the first step, and each
-            later one at most when the time since the start has doubled.
-
-    Returns:
-        True when all iterations are done.
-
-    Raises:
-        ValueError: the checkpoint belongs to another configuration.
+    The folder gets ``checkpoint.safetensors``, ``log.jsonl``, from which what the log tells of steps after
+    the checkpoint is cut off, and, at the end, ``weights.safetensors``. Checkpoints are at most
+    ``save_every_s`` apart, sooner at the start: whenever the time has doubled. ``report`` is called with
+    iteration, iterations, seconds spent and mean loss parts, none at the start. ValueError for a checkpoint
+    of another configuration.
     """
     folder.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(config.seed)
@@ -142,10 +132,7 @@ def _cut(log: Path, done: int) -> None:
 
 
 def take_cell(network: Trainee, model: str) -> None:
-    """Give a network the cell, the materials and the slopes of a shipped framed model.
-
-    Raises `ModelError` where its weights cannot be had, `RuntimeError` where its cell has other sizes.
-    """
+    """Give a network a shipped model's cell, materials and slopes; RuntimeError where sizes differ."""
     given = load_model(model).framed.state_dict()
     decoder, _ = network.parts()
     own = {id(parameter) for parameter in decoder}

@@ -20,8 +20,8 @@ def image_loss(network: Trainee, batch: Batch, *, forced: bool = False) -> tuple
     """Loss of a batch of streams at points, and its parts as numbers by name.
 
     Coverage by cross-entropy and distance by relative absolute error, of each object alone and of each
-    prefix; colour where the prefix covers the point by squared and absolute error. Padding counts for
-    nothing. If ``forced``, every step starts from the exact state before it.
+    prefix; colour where the prefix covers the point. If ``forced``, every step starts from the exact state
+    before it.
     """
     material = network.material_codes[torch.zeros_like(batch.leaf).flatten()]
     colours = batch.rgb * network.object_albedo(material).view(*batch.leaf.shape, 3)

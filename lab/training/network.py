@@ -19,21 +19,13 @@ from scenelang.drawing.neural.network import EMPTY, TOKENS, FramedConfig
 
 @dataclass(slots=True)
 class Trace:
-    """Distances, states and colours after each object, from `Trainee.trace`.
+    """Distances, states and colours after each object, from `Trainee.trace`."""
 
-    Args:
-        distance: first feature of each object, world units (B, N, P).
-        alone: the same as a logit against the object alone covering the point.
-        depth: first entry of the state after each object, world units (B, N, P).
-        margin: the same as a logit against coverage after each object.
-        colour: register after each object (B, N, P, 3).
-    """
-
-    distance: Tensor
-    alone: Tensor
-    depth: Tensor
-    margin: Tensor
-    colour: Tensor
+    distance: Tensor  # first feature of each object, world units (B, N, P)
+    alone: Tensor  # as a logit against the object alone covering the point
+    depth: Tensor  # first entry of the state after each object, world units (B, N, P)
+    margin: Tensor  # as a logit against coverage after each object
+    colour: Tensor  # register after each object (B, N, P, 3)
 
 
 class Trainee(Framed):
@@ -79,15 +71,7 @@ class Trainee(Framed):
     def step(
         self, features: Array, state: Array, colour: Array, object_colour: Array, weights: tuple[Array, ...]
     ) -> tuple[Array, Array]:
-        """One object: the LSTM cell and the register.
-
-        Args:
-            features: (…, F, M).
-            state: (…, S, M).
-            colour: the register (…, R, M).
-            object_colour: (…, R, 1).
-            weights: the `Cell` of the object's token.
-        """
+        """One object: the LSTM cell on features (…, F, M) and state (…, S, M), and the register (…, R, M)."""
         lines, bias, candidate, bump = weights
         levels = self.xp.dense(self.xp.concat([features, state], -2), lines, bias)  # (…, S + L, M)
         return self.update(levels, candidate @ features, bump, state, colour, object_colour)
@@ -103,14 +87,9 @@ class Trainee(Framed):
     ) -> Trace:
         """Run streams for training, keeping what the image of every prefix shows.
 
-        Args:
-            q: leaf coordinates (B, N, d, P).
-            scale: (B, N).
-            code: (B, N, C).
-            colours: (B, N, 3).
-            tokens: (B, N), int64.
-            given: exact distance (B, N, P) and colour (B, N, P, 3) after every object, from which each
-                step then starts in place of its own answers (teacher forcing, Williams and Zipser 1989).
+        Leaf coordinates q are (B, N, d, P), scale and tokens (B, N), codes (B, N, C), colours (B, N, 3). Each
+        step starts from ``given`` exact distance (B, N, P) and colour (B, N, P, 3), if any, in place of its
+        own answers (teacher forcing, Williams and Zipser 1989).
         """
         b, n, d, p = q.shape
         decoder = self.decoder_weights(code.reshape(b * n, -1))

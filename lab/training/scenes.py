@@ -23,8 +23,6 @@ FAR = 1e3  # translation of the objects that pad a stream: off every point
 
 @dataclass(frozen=True, slots=True)
 class SceneConfig:
-    """The training distribution."""
-
     points: int = 256  # points P of a stream
     # shares of streams of unions only and of unions and smooth unions only; the others draw each token
     # evenly
@@ -136,12 +134,7 @@ def points_of(
 ) -> Tensor:
     """World points (B, pool, 2): first those on edges, then a pool around objects and over the canvas.
 
-    Args:
-        world: world-from-leaf maps (B, N, 2, 3) of the affine maps.
-        leaf: geometry index (B, N).
-        count: (B,) objects in use.
-        twirl, bend: (B, N).
-        singular: smallest singular value (B, N) of the maps.
+    Of maps ``world`` (B, N, 2, 3), their smallest singular values, ``leaf`` and warps (B, N), count (B,).
     """
     b, edges = leaf.shape[0], int(config.points * config.edge)
     pool = edges + 3 * (config.points - edges)

@@ -1,11 +1,9 @@
 """Training of the solids' network: leaves by their distances and gradients, the cell by single steps.
 
 The decoders of all leaves are fitted together through the codes by Adam, then each by the Gauss-Newton method
-(Levenberg 1944, Marquardt 1963) in float64, which is what brings distances to 1e-4; what that found goes back
-into the weights by the smallest change of them that the codes turn into it. The cell learns the fold from
-random pairs of distances, close to equal at all scales so that gates become steep. Answers for whole segments
-come last and change none of the others. Everything is drawn anew
-at every step, and the exact reference defines what is right.
+(Levenberg 1944, Marquardt 1963) in float64, which brings distances to 1e-4 and goes back into the weights by
+their smallest change. The cell learns the fold from random pairs of distances, close to equal at all scales.
+Answers for whole segments come last and change none of the others.
 """
 
 from __future__ import annotations
@@ -182,8 +180,7 @@ def _gauss_newton(
 def fit_cell(network: Solids, steps: int, g: torch.Generator) -> float:
     """Fit the cell, and what materials look like, by single steps of the fold; returns the last loss.
 
-    Some beginnings end with a gate shut or with two lines that do the same. So each token goes on from the
-    best of several short fits.
+    Some beginnings end with a gate shut, so each token goes on from the best of several short fits.
     """
     cell = [network.cell_lines, network.cell_gain, network.cell_bias, network.candidate, network.bump]
     best, kept = torch.full((len(TOKENS),), math.inf), [part.detach().clone() for part in cell]
@@ -248,19 +245,11 @@ def train_solids(
     budget_s: float = math.inf,
     report: Report | None = None,
 ) -> bool:
-    """Train, or go on from the checkpoint in ``folder``, which is saved after each part of the training.
+    """Train, or go on from the checkpoint in ``folder``; true when done, false when time is over.
 
-    Args:
-        config: what to train; must equal the checkpoint's.
-        folder: gets ``checkpoint.safetensors`` and, at the end, ``weights.safetensors``.
-        budget_s: stop at the first checkpoint after so many seconds of this call.
-        report: called with steps, all steps, seconds spent and losses, of which there are none at the start.
-
-    Returns:
-        True when all is done.
-
-    Raises:
-        ValueError: the checkpoint belongs to another configuration.
+    The folder gets ``checkpoint.safetensors`` after each part and, at the end, ``weights.safetensors``.
+    ``report`` is called with steps, all steps, seconds spent and losses. ValueError for a checkpoint of
+    another configuration.
     """
     folder.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(config.seed)
