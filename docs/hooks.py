@@ -28,7 +28,7 @@ from mkdocs.structure.pages import Page
 from lab.docs.blocks import pictured
 from scenelang.cli.main import COMMANDS, Commands, cli
 from scenelang.language.evaluation import Source
-from scenelang.web.export import View, control_rows, viewed
+from scenelang.web.export import PagePayload, control_rows, viewed
 from scenelang.web.export import page as page_of
 
 ROOT = Path(__file__).parents[1]
@@ -94,7 +94,7 @@ def live_scenes() -> dict[str, str | Path]:
     return found
 
 
-def view_of_scene(scene: str | Path) -> View:
+def view_of_scene(scene: str | Path) -> PagePayload:
     """The scene of a page, from a text or a file."""
     if isinstance(scene, Path):
         return viewed(Source(scene, root=ROOT / "examples"), scene.stem)[0]

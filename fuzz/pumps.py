@@ -11,8 +11,8 @@ from random import Random
 from typing import Final
 
 from fuzz import text
+from scenelang.assets.element_file import read_zoo
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import read_zoo
 from scenelang.cli.commands.check import Scenes
 from scenelang.cli.options import Request
 from scenelang.compiler.program import ProgramError, parse_program

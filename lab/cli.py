@@ -145,7 +145,7 @@ def evaluate(
 
     from lab.evaluate import evaluate_set, sheet
     from lab.sets.scenes import sets_of
-    from scenelang.assets.zoo import SUFFIX
+    from scenelang.assets.element_file import SUFFIX
     from scenelang.drawing.how import keep_memory
 
     loaded = _model_to_measure(model, weights)

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from lab.docs.make_words import made
-from scenelang.assets.zoo import load_textures
+from scenelang.assets.element_file import load_textures
 from scenelang.compiler.manifest import available, load_manifest
 from scenelang.editors.highlighting import OPERATORS
 from scenelang.language import modifiers, values, words

@@ -11,7 +11,7 @@ from PIL import Image
 
 from fuzz import trees
 from fuzz.target import Target, hold
-from scenelang.assets.zoo import read_zoo
+from scenelang.assets.element_file import read_zoo
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.exact.originals import MOST_OF
 from scenelang.inverse.learn import make

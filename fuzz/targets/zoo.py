@@ -8,8 +8,8 @@ from functools import cache
 from fuzz import tensors
 from fuzz.target import Target, hold
 from scenelang.assets.element import Part
+from scenelang.assets.element_file import element_file_bytes, read_zoo
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import read_zoo, zoo_bytes
 from scenelang.drawing.small import thumbnail
 from tests.assets.shapes import ball, element, noise, square, torus
 
@@ -25,9 +25,9 @@ def check(data: bytes) -> None:
     except TensorError as error:
         hold(len(str(error)) < 1000, "errors are short", str(error)[:300])
         return
-    written = zoo_bytes(zoo.elements, zoo.groups)
+    written = element_file_bytes(zoo.elements, zoo.groups)
     again = read_zoo(written)
-    hold(zoo_bytes(again.elements, again.groups) == written, "elements to bytes and back")
+    hold(element_file_bytes(again.elements, again.groups) == written, "elements to bytes and back")
     hold(again.groups == zoo.groups, "groups stay")
     for old, new in zip(zoo.elements, again.elements, strict=True):
         hold((old, old.about, old.digest) == (new, new.about, new.digest), "elements stay", old.name)
@@ -46,13 +46,13 @@ def seeds() -> list[bytes]:
     solid, flat = element(torus, "ring", levels=2), element(square, "tile", levels=3, d=2)
     bark, hide = noise(5, 4, name="bark"), noise(3, 3, 3, name="hide")
     group = (Part("ring", (0.0, 0.5, 0.0), 0.5, material="hide"), Part("ring", (0.0, 0.0, 0.0), 0.5))
-    whole = zoo_bytes([solid, flat, bark, hide], {"two": group})
-    one = zoo_bytes([element(ball, "ball", levels=2)])
+    whole = element_file_bytes([solid, flat, bark, hide], {"two": group})
+    one = element_file_bytes([element(ball, "ball", levels=2)])
     return [
         whole,
         one,
-        zoo_bytes([flat]),
-        zoo_bytes([bark]),
+        element_file_bytes([flat]),
+        element_file_bytes([bark]),
         b"",
         one[:-1],
         one[:8],

@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as Pillow
 
+from scenelang.assets.element_file import TEXTURES_FILE, element_file_bytes
 from scenelang.assets.files import write_whole
 from scenelang.assets.picture import painted
-from scenelang.assets.zoo import TEXTURES_FILE, zoo_bytes
 
 ABOUT: dict[str, str | float] = {"license": "MIT", "source": "docs/make_textures.py of scenelang"}
 SIDE = 256  # texels
@@ -326,4 +326,4 @@ if __name__ == "__main__":
         sheet().save(sys.argv[2])
     else:
         made = [painted(name, drawn(name), ABOUT) for name in TEXTURES]
-        write_whole(TEXTURES_FILE, zoo_bytes(made))
+        write_whole(TEXTURES_FILE, element_file_bytes(made))

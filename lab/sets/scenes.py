@@ -14,7 +14,7 @@ import numpy as np
 from lab.sets.plane import SETS, Rng, random_scene
 from lab.sets.solids import SOLID_SETS, random_solid
 from lab.training.checkpoint import load_tensors, save_tensors
-from scenelang.assets.zoo import SUFFIX
+from scenelang.assets.element_file import SUFFIX
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program
@@ -24,7 +24,7 @@ from scenelang.drawing.neural.load import Model, load_model
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.scene import Scene
-from scenelang.output.plan import reference_of
+from scenelang.output.cost import reference_of
 
 PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
 LEAST_COVER = 0.02  # share of the canvas

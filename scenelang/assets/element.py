@@ -17,7 +17,7 @@ MOST_PIXELS: Final = 2048  # along a side of a picture
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
 
-class Form(NamedTuple):
+class Encoding(NamedTuple):
     """Form of elements."""
 
     sizes: tuple[str, ...]  # names of its numbers in headers
@@ -27,15 +27,15 @@ class Form(NamedTuple):
 
 FORMS: Final = {
     # a geometry: grids of distances over [-1, 1]^d (`scenelang.assets.pyramid`)
-    "pyramid": Form(
+    "pyramid": Encoding(
         ("dimension", "cells", "levels"),
         ("deflate", "bzip2"),
         {2: "element of the plane", 3: "element of space"},
     ),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
-    "picture": Form(("height", "width"), ("webp", "av1"), {2: "texture"}),
+    "picture": Encoding(("height", "width"), ("webp", "av1"), {2: "texture"}),
     # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.colours`)
-    "colours": Form(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
+    "colours": Encoding(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
 }
 
 

@@ -13,10 +13,10 @@ from scenelang.compiler.lower import Memory, Spans
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.passes import check_scene
 from scenelang.language import tree as nodes
+from scenelang.language.definitions import find_unused
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, settle
 from scenelang.language.evaluation import Evaluation, Source, in_file_order, name_frame
 from scenelang.language.reports import SceneError
-from scenelang.language.resolve import find_unused
 from scenelang.language.scene import Scene, same_nodes
 
 Frames = Literal["one", "some", "all"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from scenelang.assets.element import Element
-from scenelang.assets.zoo import load_textures
+from scenelang.assets.element_file import load_textures
 from scenelang.compiler.graph import (
     MOST_STEPS,
     WHITE,

@@ -24,10 +24,9 @@ import numpy.typing as npt
 
 from scenelang.assets import notebook
 from scenelang.assets.element import Element
+from scenelang.assets.element_file import MOST_ELEMENT_BYTES, entry_of, read_elements
 from scenelang.assets.files import read_regular, write_output
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
-from scenelang.assets.zoo import MOST_BYTES as MOST_ELEMENT_BYTES
-from scenelang.assets.zoo import entry_of, read_elements
 from scenelang.compiler.graph import MOST_STEPS, ColourStep
 from scenelang.compiler.groups import OPERATOR, token_fault
 from scenelang.compiler.lifting import LAYOUTS, WIDTH
@@ -339,8 +338,8 @@ def _check_settings(program: Program) -> None:
 
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
-MOST_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
-MOST_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
+MOST_PROGRAM_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
+MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
 
 _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "vectors": ("F32", (WIDTH,)),
@@ -373,7 +372,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
         ProgramError: the file is damaged, foreign or hostile, or was compiled for other weights.
         OSError: the file cannot be read.
     """
-    program = parse_program(read_regular(path, MOST_BYTES))
+    program = parse_program(read_regular(path, MOST_PROGRAM_BYTES))
     program.check_weights(_shipped(program) if weights is None else weights)
     return program
 
@@ -381,7 +380,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
 def parse_program(data: bytes) -> Program:
     """The Program in a file's bytes, checked but for the weights' digest; raises `ProgramError`."""
     try:
-        file = read_tensors(data, MOST_BYTES, (1, 2, 3, 4))
+        file = read_tensors(data, MOST_PROGRAM_BYTES, (1, 2, 3, 4))
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()

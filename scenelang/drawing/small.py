@@ -15,8 +15,8 @@ import numpy as np
 from PIL import Image as Pillow
 
 from scenelang.assets.element import Element, credit_of
+from scenelang.assets.element_file import ElementFile
 from scenelang.assets.picture import pixels
-from scenelang.assets.zoo import Zoo
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError
@@ -143,7 +143,7 @@ def thumbnail(element: Element, side: int = 128, worn: Element | None = None) ->
         small = Pillow.fromarray(colours).resize((side, side))
         return (np.asarray(small, np.float32) / np.float32(255)).view(Image)
     worn = element if element.material else worn
-    zoo = Elements.of("zoo", "zoo.safetensors", Zoo.of([element, *([worn] if worn else ())]))
+    zoo = Elements.of("zoo", "zoo.safetensors", ElementFile.of([element, *([worn] if worn else ())]))
     solid = element.dimension == 3
     moves = (_TURN, Scale(1.0)) if solid else (Scale(0.9),)
     look = Material("diffuse" if solid else "flat", (Color("#c96" if solid else "#222"),))

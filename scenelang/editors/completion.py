@@ -23,7 +23,7 @@ from scenelang.editors.context import Cursor, cursor_at, find_callee, word_of
 from scenelang.editors.workspace import Document, Workspace, scenes_below, width
 from scenelang.language import library, tree, words
 from scenelang.language import scene_text as to_nsg
-from scenelang.language.resolve import Names, Symbol, Use
+from scenelang.language.definitions import Names, Symbol, Use
 from scenelang.language.tables import tables
 from scenelang.language.tree import walk
 from scenelang.language.values import Angle, MaterialValue, RangeValue, Time, Vec, pack, show

@@ -11,8 +11,8 @@ from lsprotocol import types
 from scenelang.assets.records import Record
 from scenelang.editors.workspace import Document, Workspace, width
 from scenelang.language import tree
+from scenelang.language.definitions import Symbol
 from scenelang.language.lexer import Tokens
-from scenelang.language.resolve import Symbol
 from scenelang.language.tables import tables
 from scenelang.language.tree import children
 from scenelang.language.words import COMBINE, NODES, Word, word_for_call

@@ -19,7 +19,7 @@ from scenelang.editors.context import find_symbol, path_to, word_of
 from scenelang.editors.workspace import Document, Seen, Settings, Workspace
 from scenelang.language import scene_text as to_nsg
 from scenelang.language import tree, words
-from scenelang.language.resolve import Symbol, Use
+from scenelang.language.definitions import Symbol, Use
 from scenelang.language.tree import walk
 from scenelang.language.values import show
 from scenelang.language.words import word_for_call

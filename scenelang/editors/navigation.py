@@ -12,7 +12,7 @@ from lsprotocol import types
 from scenelang.editors.context import path_to
 from scenelang.editors.workspace import Document, Workspace, uri_of
 from scenelang.language import library, tree
-from scenelang.language.resolve import Symbol, Use
+from scenelang.language.definitions import Symbol, Use
 from scenelang.language.tree import walk
 from scenelang.language.words import LANGUAGE, RESERVED, STAGE
 

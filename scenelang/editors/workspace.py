@@ -19,21 +19,21 @@ from typing import Any, Final, Literal
 from lsprotocol import types
 from pygls.uris import from_fs_path, to_fs_path
 
+from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.compiler.check import check_compiles, check_frames
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.manifest import Manifest
 from scenelang.editors.dumps import common_start
 from scenelang.language import library, tree
+from scenelang.language.definitions import Names, Symbol, Use, find_unused
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Fix, Label, SourceFile, Span
 from scenelang.language.diagnostics import Edit as Change
 from scenelang.language.evaluation import Source, in_file_order
 from scenelang.language.lexer import Report, Tokens, scan
 from scenelang.language.limits import Halt
 from scenelang.language.parser import parse
-from scenelang.language.resolve import Names, Symbol, Use, find_unused
 from scenelang.language.session import Unreadable, read_source
 
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
@@ -402,13 +402,13 @@ class Workspace:
             return self.by_path(library.find(text))
         return self.by_path(self._place(document, text))
 
-    def zoo(self, document: Document, stmt: tree.Import) -> Zoo | None:
+    def zoo(self, document: Document, stmt: tree.Import) -> ElementFile | None:
         """The file of elements that an import brings, if it is one."""
         path = library.find(stmt.path.value) or self._place(document, stmt.path.value)
         if path is None or path.suffix != SUFFIX:
             return None
         try:
-            return load_zoo(path)
+            return load_element_file(path)
         except (OSError, TensorError):
             return None
 

@@ -15,9 +15,15 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 from scenelang.assets.element import TEXELS, Element
+from scenelang.assets.element_file import (
+    MOST_ELEMENT_BYTES,
+    ElementFile,
+    element_file_bytes,
+    is_said,
+    read_zoo,
+)
 from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import MOST_BYTES, Zoo, is_said, read_zoo, zoo_bytes
 from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
 from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
@@ -116,7 +122,7 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
     if options.paints(suffix):
-        return zoo_bytes([_texture(data, name, job)])
+        return element_file_bytes([_texture(data, name, job)])
     brought = originals.brought(data, suffix, name, request["files"], options.sign, options.parts)
     job.say(f"{name}: {', '.join(brought.notes)}")
     group, elements = list(brought.group), []
@@ -133,7 +139,7 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
                 raise
             job.say(f"{called}: left out: {error}")
             group = [part for part in group if part.geometry != called]
-    return zoo_bytes(elements, {name: tuple(group)} if group else {})
+    return element_file_bytes(elements, {name: tuple(group)} if group else {})
 
 
 def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
@@ -222,7 +228,7 @@ def learn_files(
     """
     names = names_of(files, options, name)
     first = held = _writable(out)
-    results: dict[int, Zoo] = {}
+    results: dict[int, ElementFile] = {}
     troubles: dict[int, str] = {}
 
     @contextmanager
@@ -245,7 +251,7 @@ def learn_files(
                 if isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
-                    results[index] = replace(Zoo.of([result]), groups=groups)
+                    results[index] = replace(ElementFile.of([result]), groups=groups)
                 else:
                     yield index, result
 
@@ -305,7 +311,7 @@ def names_of(
     return names
 
 
-def _writable(out: str | os.PathLike[str]) -> Zoo:
+def _writable(out: str | os.PathLike[str]) -> ElementFile:
     """Contents of the output file; raises before the work where it could not be written afterwards."""
     place = output_place(out)
     for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
@@ -316,24 +322,26 @@ def _writable(out: str | os.PathLike[str]) -> Zoo:
                 raise NotWritten(errno.EACCES, os.strerror(errno.EACCES), os.fspath(out))
     try:
         with open(place, "rb") as file:
-            return read_zoo(file.read(MOST_BYTES + 1))
+            return read_zoo(file.read(MOST_ELEMENT_BYTES + 1))
     except FileNotFoundError:
-        return Zoo.of(())
+        return ElementFile.of(())
     except TensorError as error:
         raise NotWritten(errno.EINVAL, f"it is not a file of elements: {error}", os.fspath(out)) from None
 
 
-def _named(zoo: Zoo) -> dict[tuple[str, bool], Element]:
+def _named(zoo: ElementFile) -> dict[tuple[str, bool], Element]:
     return {(element.name, element.material): element for element in zoo.elements}
 
 
-def _written(out: str | os.PathLike[str], held: Zoo, made: Iterable[tuple[str, Zoo]]) -> Zoo:
+def _written(
+    out: str | os.PathLike[str], held: ElementFile, made: Iterable[tuple[str, ElementFile]]
+) -> ElementFile:
     """Write a file's elements and the new ones, which replace those of the same names and their groups."""
     elements, groups = _named(held), dict(held.groups)
     for name, zoo in made:
         groups.pop(name, None)
         elements, groups = elements | _named(zoo), groups | zoo.groups
-    data = zoo_bytes(elements.values(), groups)
+    data = element_file_bytes(elements.values(), groups)
     try:
         result = read_zoo(data)
     except TensorError as error:

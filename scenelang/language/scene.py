@@ -19,10 +19,10 @@ from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.assets import notebook
 from scenelang.assets.element import Element, Part
+from scenelang.assets.element_file import ElementFile, load_element_file
 from scenelang.assets.files import depth_of_json, no_number
 from scenelang.assets.records import Record, deep_stack
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import Zoo, load_zoo
 from scenelang.language import library, nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, plural
 from scenelang.language.library import SpanMap, Written
@@ -60,7 +60,7 @@ from scenelang.language.scene_text import angle, node_lines, number, rgb, vector
 from scenelang.language.words import BLEND, STAGE
 
 
-def objects_of(zoo: Zoo, file: str, name: str) -> tuple[Object, ...]:
+def objects_of(zoo: ElementFile, file: str, name: str) -> tuple[Object, ...]:
     """The parts of a group of a file in their places and looks, in order of painting; raises KeyError."""
     if name not in zoo.groups:
         raise KeyError(f"`{file}` has no group `{name}`; it has {listing(zoo.groups) or 'none'}")
@@ -101,7 +101,7 @@ class Elements(Frozen):
         str, Field(pattern=r'^[^"\\\x00-\x1f]+$', description="of the file, from the scene's folder")
     ]
     digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of the file")]
-    _zoo: Zoo | None = PrivateAttr(None)  # not part of the value, which the digest identifies
+    _zoo: ElementFile | None = PrivateAttr(None)  # not part of the value, which the digest identifies
 
     if TYPE_CHECKING:
 
@@ -114,13 +114,13 @@ class Elements(Frozen):
         return hash(self.digest)
 
     @staticmethod
-    def of(name: str, path: str, zoo: Zoo) -> Elements:
+    def of(name: str, path: str, zoo: ElementFile) -> Elements:
         elements = Elements(name, path, zoo.digest)
         elements._zoo = zoo
         return elements
 
     @property
-    def zoo(self) -> Zoo | None:
+    def zoo(self) -> ElementFile | None:
         """Contents of the file; None where it has not been read."""
         return self._zoo
 
@@ -137,7 +137,7 @@ class Elements(Frozen):
             place = library.find(self.path) or (root / self.path).resolve()
             if not library.owns(place) and not place.is_relative_to(root.resolve()):
                 return "E0215", f"`{self.path}` lies outside the import root"
-            zoo = load_zoo(place)
+            zoo = load_element_file(place)
         except TensorError as error:
             return "E0217", f"`{self.path}` is not a file of elements: {error}"
         except (OSError, RuntimeError, ValueError) as error:
@@ -178,7 +178,7 @@ def load_elements(path: str | Path, name: str | None = None) -> Elements:
         TensorError: it is damaged, or no such file.
         ValueError: its name is not one that objects can have: give another.
     """
-    zoo = load_zoo(library.find(str(path)) or path)
+    zoo = load_element_file(library.find(str(path)) or path)
     return Elements.of(Path(path).stem if name is None else name, str(path), zoo)
 
 

@@ -11,10 +11,10 @@ from dataclasses import field
 from pathlib import Path, PureWindowsPath
 from typing import Any, Final, Literal
 
+from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
 from scenelang.assets.files import read_regular
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import SUFFIX, Zoo, load_zoo
 from scenelang.language import library, tree
 from scenelang.language.diagnostics import Diagnostics, Fix, Label, SourceFile, Span, listing, nearest
 from scenelang.language.library import SpanMap
@@ -264,14 +264,14 @@ class Loader(Record, frozen=False):
     parsed: dict[Path, tree.File] = field(default_factory=dict)
     prepared: dict[Path, Any] = field(default_factory=dict)  # each file's `FileContext`, under its last name
     repeated: int = 0  # characters of files prepared again, as their params have another name each time
-    zoos: dict[Path, Zoo] = field(default_factory=dict)
+    zoos: dict[Path, ElementFile] = field(default_factory=dict)
     wanted: dict[Path, None] = field(default_factory=dict)  # files asked for, there or not
     count: int = 0
     texts: Mapping[Path, str] = field(default_factory=dict)  # instead of files, by their resolved paths
 
     def load(
         self, stmt: tree.Import, importer: Path | None, session: Session
-    ) -> tuple[Path, tree.File | Zoo] | None:
+    ) -> tuple[Path, tree.File | ElementFile] | None:
         """The file that an import in the file ``importer`` means, parsed; None after a report."""
         span = stmt.path.span
         try:
@@ -328,7 +328,7 @@ class Loader(Record, frozen=False):
         name = library.called(text) if library.is_reserved(text) else name
         try:
             if path.suffix == SUFFIX:
-                self.zoos[path] = load_zoo(path)
+                self.zoos[path] = load_element_file(path)
                 return
             source = SourceFile(name, self.texts[path]) if path in self.texts else read_source(path, name)
         except TensorError as error:

@@ -7,7 +7,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
-from scenelang.assets.zoo import Zoo
+from scenelang.assets.element_file import ElementFile
 from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, tree, words
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
@@ -188,7 +188,7 @@ def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     if loaded is None or not good:
         return None
     path, file = loaded
-    if isinstance(file, Zoo):
+    if isinstance(file, ElementFile):
         binding.value = _elements(path, file, stmt, context)
         return None
     known = loader.prepared.get(path)
@@ -220,7 +220,7 @@ def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
     return action
 
 
-def _elements(path: Path, zoo: Zoo, stmt: tree.Import, context: FileContext) -> FileContext:
+def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileContext) -> FileContext:
     """An imported file of elements as a file whose names they are."""
     session, root = context.session, context.loader.root
     if path not in session.elements:

@@ -115,7 +115,7 @@ def runs(keys: Sequence[K], lengths: Iterable[int]) -> list[tuple[K, int]]:
 Kind = Literal["sequence", "gif", "webp", "apng", "video"]
 
 _VIDEO: Final[dict[str, Kind]] = dict.fromkeys((".mp4", ".m4v", ".mov", ".mkv", ".webm"), "video")
-ENCODED: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
+FILM_FORMATS: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
 PICTURES: Final = frozenset({".gif", ".webp", ".apng"})  # hold a single picture as well
 _NUMBER: Final = re.compile(r"%(0?\d{0,2})d")
 
@@ -158,11 +158,11 @@ def is_pattern(out: str) -> bool:
 
 def is_animation(out: str) -> bool:
     """Return whether a name asks for an animation if the scene is one."""
-    return is_pattern(out) or Path(out).suffix.lower() in ENCODED
+    return is_pattern(out) or Path(out).suffix.lower() in FILM_FORMATS
 
 
 def find_target(out: str, stem: str = "frame") -> Target:
-    """Parse ``out``: a file of `ENCODED`, a pattern, or a folder of ``stem``s; else raise `TargetError`."""
+    """Parse ``out``, one of `FILM_FORMATS`, a pattern, or a folder of ``stem``s, or raise `TargetError`."""
     path = Path(out)
     if is_pattern(out):
         bare = path.name.replace("%%", "")
@@ -179,11 +179,11 @@ def find_target(out: str, stem: str = "frame") -> Target:
         if path.exists() and not path.is_dir():
             raise TargetError(f"`{out}` is a file")
         return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
-    kind = ENCODED.get(path.suffix.lower())
+    kind = FILM_FORMATS.get(path.suffix.lower())
     if kind is None:
         raise TargetError(
             f"`{out}` holds one picture; an animation goes to a file with one of the suffixes "
-            f"{', '.join(ENCODED)}, to "
+            f"{', '.join(FILM_FORMATS)}, to "
             "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
         )
     _check_folder(path.parent, out)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import enlarged, packed
-from scenelang.drawing.neural.draw import Kept
+from scenelang.drawing.neural.draw import TileCache
 from scenelang.output.frames import Clip, Shot, frame_key, put_frame
 from scenelang.output.workers import AHEAD, Link
 
@@ -57,7 +57,7 @@ class Painter:
     clip: Clip  # the animation
     how: How = DEFAULT  # how they are drawn
     # the previous picture, whose unchanged parts are reused
-    kept: Kept = field(default_factory=Kept, repr=False)
+    kept: TileCache = field(default_factory=TileCache, repr=False)
     outputs: tuple[Output, ...] = ()  # next to each picture
     single: bool = False  # draw each frame as a single picture: small ones by numpy
     load_s: float = 0.0  # time of loading torch
@@ -143,7 +143,7 @@ class Errand(NamedTuple):
     outputs: tuple[Output, ...] = ()  # next to it
     how: How = DEFAULT  # how it is drawn
 
-    def run(self, program: bytes, kept: Kept) -> dict[Path, bytes]:
+    def run(self, program: bytes, kept: TileCache) -> dict[Path, bytes]:
         """Draw a Program's bytes; returns those of its files and raises as `scenelang.render_outputs`."""
         from scenelang.drawing.render import draw, outputs_of
 
@@ -226,7 +226,7 @@ def main() -> None:
     # Answers go to standard output; prints of libraries go to standard error.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    cache, source = Kept(), sys.stdin.buffer
+    cache, source = TileCache(), sys.stdin.buffer
     while line := source.readline():
         head = json.loads(line)
         program = source.read(head["bytes"])
@@ -309,7 +309,7 @@ class Cluster:
 
 def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
     """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
-    cache = _local.__dict__.setdefault("kept", Kept())
+    cache = _local.__dict__.setdefault("kept", TileCache())
     started = time.process_time()  # others on this machine do not make batches smaller
     result = [
         {file.name: data for file, data in errand.run(program, cache).items()} for program, errand in batch

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from scenelang.drawing.how import How, RenderError
-from scenelang.drawing.neural.draw import Kept
+from scenelang.drawing.neural.draw import TileCache
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError, render_text
@@ -80,7 +80,7 @@ class Easel:
     seen: Stamps = field(default_factory=dict)  # their stamps when their names were read
     _key: str | None = None
     _image: Image | None = None
-    _kept: Kept = field(default_factory=Kept)
+    _kept: TileCache = field(default_factory=TileCache)
     _took_s: float = float("inf")  # drawing time of the last picture
 
     def __post_init__(self) -> None:

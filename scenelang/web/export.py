@@ -39,7 +39,7 @@ from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
 from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, stage_of, web
-from scenelang.web.form import Form, form_of
+from scenelang.web.form import PageProgram, form_of
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -127,7 +127,7 @@ FORMAT: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PagePayload:
     """The content of a page: JSON data, see docs/architecture.md, and the arrays that it names."""
 
     data: dict[str, Any]
@@ -143,9 +143,9 @@ def view_of(
     *,
     title: str = "",
     source: Sequence[tuple[str, str]] = (),
-    form: Form | None = None,
+    form: PageProgram | None = None,
     animation: Animation | None = None,
-) -> View:
+) -> PagePayload:
     """The view of a Program that was compiled for a shipped model.
 
     Args:
@@ -204,7 +204,7 @@ def view_of(
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
     data["alt"] = alternative(data)
-    return View(data, store.bytes())
+    return PagePayload(data, store.bytes())
 
 
 MOST_TITLE: Final = 200
@@ -216,7 +216,7 @@ _SLOT: Final = re.compile(r"\[\[(\w+)\]\]")
 _COMMENT: Final = re.compile(r"^ *(?:/\*\*.*?\*/|//[^\n]*)\n", re.MULTILINE | re.DOTALL)
 
 
-def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
+def page(view: PagePayload, *, still: bytes = b"", embedded: bool = False) -> str:
     """An HTML file that draws a view; nothing in it comes from elsewhere, and its policy allows nothing to.
 
     Args:
@@ -251,7 +251,7 @@ def page(view: View, *, still: bytes = b"", embedded: bool = False) -> str:
     return _SLOT.sub(lambda slot: parts[slot[1]], web("page.html"))
 
 
-def control_rows(view: View) -> int:
+def control_rows(view: PagePayload) -> int:
     """The approximate height of a view's controls, in rem."""
     data = view.data
     fixed = {one["name"] for one in data["fixed"]}
@@ -340,7 +340,7 @@ def export(
     write_output(out, page(view, still=still(program)).encode())
 
 
-def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]:
+def viewed(source: Source | Scene | Program, title: str) -> tuple[PagePayload, Program]:
     """The view of a scene or a Program, and the Program that it shows first; raises as `export`."""
     if isinstance(source, Program):
         return scene_view(source, None, None, title=title), source
@@ -360,7 +360,7 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[View, Program]
 
 def scene_view(
     program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
-) -> View:
+) -> PagePayload:
     """The view of a compiled scene, None for a Program from a file; the evaluation is that of its text."""
     source: list[tuple[str, str]] = []
     form = None

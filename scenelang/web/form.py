@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from scenelang.assets.element import Element
+from scenelang.assets.element_file import load_textures
 from scenelang.assets.records import Record, deep_stack
-from scenelang.assets.zoo import load_textures
 from scenelang.compiler.manifest import Manifest
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
@@ -441,7 +441,7 @@ _WHY: Final = {
 _LABEL: Final = re.compile(r"[ \t)]*;[ \t]*//[ \t]*([^\n]*)")
 
 
-class Form(Record):
+class PageProgram(Record):
     """A scene's form and its params in a view."""
 
     data: Json  # for `evaluateForm`
@@ -451,7 +451,7 @@ class Form(Record):
     paints: tuple[Element, ...]
 
 
-def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> Form:
+def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
     Args:
@@ -479,7 +479,7 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
     shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]
-    return Form(
+    return PageProgram(
         data,
         [param_data(name, stmt, file) for name, stmt, file, _ in shown],
         [{"name": name, "reason": reason} for name, reason in reasons.items()],

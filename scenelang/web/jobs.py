@@ -24,7 +24,7 @@ from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import flip, over_white, psnr, side_by_side, ssim
-from scenelang.drawing.neural.draw import Kept
+from scenelang.drawing.neural.draw import TileCache
 from scenelang.drawing.render import draw, draw_exact
 from scenelang.drawing.small import draw_small
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
@@ -33,7 +33,7 @@ from scenelang.language.reports import SceneError
 from scenelang.output.animate import Progress, make
 from scenelang.output.frames import Clip, Shot, find_target, frame_key
 from scenelang.output.painting import Drawable, Painter
-from scenelang.web.export import View, page, scene_view, still
+from scenelang.web.export import PagePayload, page, scene_view, still
 from scenelang.web.folder import Answer, JobFailed
 
 MOST_PIXELS: Final = 1 << 24
@@ -41,7 +41,7 @@ MOST_ROWS: Final = 5000
 """Objects of a scene that a page is given: so many take 1 MB and most of a second."""
 MOST_TOLD: Final = 100  # problems of a scene
 _BY_NUMPY: Final = ("framed", "solid")  # renderers
-_CACHE: Final = Kept()
+_CACHE: Final = TileCache()
 _EXACT: dict[str, Image] = {}  # the last exact picture, by what it shows
 
 Job = dict[str, Any]
@@ -74,7 +74,7 @@ def _view(job: Job, tell: Tell) -> Answer:
     """The scene for the page's own shader, and what is wrong with it."""
     started = time.perf_counter()
     result = Diagnostics()
-    shown: View | None = None
+    shown: PagePayload | None = None
     lacking: list[dict[str, Any]] = []
     evaluation = _source(job).evaluation(result)
     try:
@@ -96,7 +96,7 @@ def _view(job: Job, tell: Tell) -> Answer:
     return Answer(_json(data), head)
 
 
-def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple[View, Program]:
+def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple[PagePayload, Program]:
     scene, spans = evaluation.run(0)
     if scene is None or diagnostics.errors:
         raise SceneError(diagnostics)

@@ -13,10 +13,10 @@ import pytest
 from scenelang.assets.colours import packed as packed_colours
 from scenelang.assets.colours import unpacked as unpacked_colours
 from scenelang.assets.element import Element
+from scenelang.assets.element_file import element_file_bytes, read_zoo
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import between, unpacked
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import read_zoo, zoo_bytes
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.assets import GridShape
 from tests.assets.shapes import Formula, ball, element, torus
@@ -71,7 +71,7 @@ def test_elements_of_either_coding_keep_their_digest() -> None:
     said = b"pyramid 3 4 2 "
     assert old.digest == hashlib.sha256(said + old.data).hexdigest()
     assert new.digest == hashlib.sha256(said + b"bzip2 " + new.data).hexdigest()
-    (back,) = read_zoo(zoo_bytes([new])).elements
+    (back,) = read_zoo(element_file_bytes([new])).elements
     assert (back, back.digest) == (new, new.digest)
 
 
@@ -104,7 +104,7 @@ def test_every_node_that_counts_is_within_half_a_step(sides: tuple[int, ...]) ->
     assert made.held == 3 * sum(side**3 for side in sides)
     assert abs(unpacked_colours(made) - cube(side)).max() <= HALF + 1e-6
     assert np.array_equal(np.moveaxis(texels(made), -1, 0), unpacked_colours(made))
-    assert read_zoo(zoo_bytes([made])).materials == {"hide": made}
+    assert read_zoo(element_file_bytes([made])).materials == {"hide": made}
 
 
 def test_nodes_off_the_surface_cost_little_and_do_not_disturb() -> None:
@@ -151,7 +151,7 @@ def test_damaged_colours() -> None:
     for held in (b"", b"\0" * 80, b"\0" * 82, b"\0" * (1 << 24)):
         made = Element("hide", "colours", (3, 32), "bzip2", bz2.compress(held))
         with pytest.raises(TensorError, match="does not hold 81 bytes"):
-            read_zoo(zoo_bytes([made]))
+            read_zoo(element_file_bytes([made]))
     made = packed_colours("hide", cube(9), np.ones((9,) * 3, bool), {})
     for data in (made.data[:-1], made.data + b"x", made.data[:9] + b"!!!!" + made.data[13:]):
         with pytest.raises(TensorError, match="`hide`"):

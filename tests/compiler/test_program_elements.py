@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.assets.zoo import Zoo
+from scenelang.assets.element_file import ElementFile
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.emit import emit
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move
@@ -31,7 +31,7 @@ from tests.drawing.solids import MIXED, Object, graph, moved, network, scaled, t
 
 
 def compiled() -> Program:
-    zoo = nsg.Elements.of("zoo", "z", Zoo.of([element(torus, "ring", levels=2)]))
+    zoo = nsg.Elements.of("zoo", "z", ElementFile.of([element(torus, "ring", levels=2)]))
     objects = [nsg.Object("zoo.ring"), nsg.Object("sphere", nsg.Translate(1, 1))]
     return compile_scene(nsg.Scene(elements=zoo, nodes=objects))
 

@@ -7,8 +7,8 @@ import pytest
 
 import scenelang as nsg
 from lab.docs.make_textures import drawn
+from scenelang.assets.element_file import TEXTURES_FILE, load_textures
 from scenelang.assets.picture import pixels
-from scenelang.assets.zoo import TEXTURES_FILE, load_textures
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import ROOT, Manifest, available, load_manifest
 from scenelang.drawing.torch_backend import draw_program, open_model

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import scenelang as nsg
-from scenelang.assets.zoo import Zoo
+from scenelang.assets.element_file import ElementFile
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.lifting import LAYOUTS
@@ -21,7 +21,7 @@ from scenelang.language.diagnostics import Diagnostics
 from tests.assets.shapes import noise
 
 BARK, STONE, HIDE = noise(4, 6), noise(3, 3, name="stone", seed=1), noise(3, 3, 3, name="hide")
-ZOO = nsg.Elements.of("zoo", "zoo.safetensors", Zoo.of([BARK, STONE, HIDE]))
+ZOO = nsg.Elements.of("zoo", "zoo.safetensors", ElementFile.of([BARK, STONE, HIDE]))
 
 
 def compiled(*materials: nsg.Material, geometry: str = "square", **scene: Any) -> Program:

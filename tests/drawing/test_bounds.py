@@ -12,7 +12,7 @@ import scenelang as nsg
 from lab.probes import FLAT, rng_of
 from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.slopes import distances, proved_slack
-from scenelang.assets.zoo import Zoo
+from scenelang.assets.element_file import ElementFile
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
 from scenelang.drawing.arrays import NUMPY
@@ -131,7 +131,9 @@ def test_nothing_is_ruled_out_of_which_nothing_is_proved() -> None:
 
 
 EGG = element(lambda x, y: np.hypot(x, y / 0.6) - 0.5, "egg", d=2)
-ZOO = nsg.Elements.of("zoo", "zoo.safetensors", Zoo.of([element(square, "tile", d=2), EGG, noise(9, 7)]))
+ZOO = nsg.Elements.of(
+    "zoo", "zoo.safetensors", ElementFile.of([element(square, "tile", d=2), EGG, noise(9, 7)])
+)
 
 
 def wild(rng: np.random.Generator) -> nsg.Scene:

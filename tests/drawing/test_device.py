@@ -15,7 +15,7 @@ import pytest
 
 import scenelang as nsg
 from lab.sets.plane import SETS, random_scene
-from scenelang.assets.zoo import Zoo
+from scenelang.assets.element_file import ElementFile
 from scenelang.compiler.groups import read_groups
 from scenelang.compiler.program import Paint, Program
 from scenelang.drawing import torch_backend
@@ -93,7 +93,7 @@ def test_draws_what_numpy_draws() -> None:
 def test_draws_elements() -> None:
     """Inside and beyond their grids, which are coarse enough to be told from the shape."""
     square_of_eight = element(square, "made", cells=4, levels=2, d=2)
-    zoo = nsg.Elements.of("zoo", "z", Zoo({"made": square_of_eight}, "0" * 64))
+    zoo = nsg.Elements.of("zoo", "z", ElementFile({"made": square_of_eight}, "0" * 64))
     objects = [
         nsg.Object("zoo.made", [nsg.Scale(0.7, 0.5), nsg.Rotate.degrees(20)]),
         nsg.Object("star", [nsg.Scale(0.4), nsg.Translate(0.5, 0.3)]),

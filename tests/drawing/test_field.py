@@ -12,7 +12,7 @@ import pytest
 import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.drawing.neural.draw import Drawing, Kept, draw
+from scenelang.drawing.neural.draw import Drawing, TileCache, draw
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.load import load_model
 from tests.compiler.random_scenes import blob_scene, random_scene
@@ -194,7 +194,7 @@ def test_what_stays_is_taken_over(network) -> None:
         moving = leaf("star", colour, f"scale(0.2); translate({x}, 0.7);")
         return program(f"{moving} {leaf('square', '#08f', 'scale(0.2); translate(0, -0.6);')}", (112, size))
 
-    kept = Kept()
+    kept = TileCache()
     whole = [drawn(network, p, split=8)[1].pairs for p in (frame(0), frame(0.3))]
     frames = [frame(0), frame(0), frame(0.3), frame(0.3, "#f00")]
     frames += [frame(x, "#f00", 128) for x in (0.3, -0.3)]
@@ -223,7 +223,7 @@ def test_what_changes_tiles_is_not_taken_over(network) -> None:
         stars = (leaf("star", "#fff", f"scale(0.12); translate(0.1, {y});") for y in (0.4, 0.4 - shift))
         sequences.append([(star + LEAVES[0], 20) for star in stars])
     for frames in sequences:
-        kept = Kept()
+        kept = TileCache()
         for text, split in frames:
             p = program(text, (40, 40))
             again = drawn(network, p, split=split, kept=kept)[0]

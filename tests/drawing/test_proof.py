@@ -15,7 +15,7 @@ import scenelang as nsg
 from lab import errors as lab
 from lab.sets.plane import SETS
 from lab.sets.scenes import sets_of
-from scenelang.assets.zoo import zoo_bytes
+from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.graph import Look
 from scenelang.compiler.lifting import inverse_frame
 from scenelang.compiler.manifest import load_manifest
@@ -120,7 +120,7 @@ def test_other_scenes(text: str, least: float) -> None:
 
 def test_nothing_is_said_of_an_element(tmp_path: Path) -> None:
     """Pixels beyond the disc that it fills are proved, and those in it stay as they were drawn."""
-    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes([element(square, "tile", d=2)]))
+    (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes([element(square, "tile", d=2)]))
     tile = "zoo.tile { scale(0.4); translate(-0.4, 0); }"
     scene = good(
         tmp_path,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenelang.compiler.program import Paint, Program, ProgramError
-from scenelang.drawing.neural.draw import Kept, draw
+from scenelang.drawing.neural.draw import TileCache, draw
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.load import load_model
 from tests.assets.shapes import noise
@@ -95,7 +95,7 @@ def test_rows_without_paint_stay_as_they_are(network) -> None:
 
 def test_steps_between_pictures_are_drawn_again(network) -> None:
     """Of an animation in which nothing but a texture's place or colour changes."""
-    kept, p = Kept(), program(SCENES["unions"])
+    kept, p = TileCache(), program(SCENES["unions"])
     none = [None] * 3
     for paint, x in (
         (Paint(COARSE), 0.0),

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from scenelang.assets.element import Part
-from scenelang.assets.zoo import zoo_bytes
+from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.manifest import available
 from scenelang.language.words import TEXTURES
 from tests.assets.shapes import ball, element, noise, square, torus
@@ -376,7 +376,7 @@ def test_elements_groups_and_materials_are_proposed_and_told_of(
     ring = Part("ring", (0.0, 0.5, 0.0), 0.5)
     elements = [element(torus, "ring"), element(ball, "ball"), noise(2, 3, name="ring"), noise(2, 2)]
     groups = {"car": (ring, ring), "ring": (ring,)}
-    (folder / "zoo.safetensors").write_bytes(zoo_bytes(elements, groups))
+    (folder / "zoo.safetensors").write_bytes(element_file_bytes(elements, groups))
     text = 'import "zoo.safetensors" as zoo;\nzoo.ring { scale(0.5); }\nzoo.car();\n'
     client.replace(uri, text + "sphere { material diffuse zoo.ring; }\ntorus { material zoo.; }\nzoo.;\n")
     assert labels(client, client.at(uri, "zoo.;\n", 4)) == ["ball", "car()", "ring", "ring()"]
@@ -398,7 +398,7 @@ def test_elements_are_shown_where_the_editor_shows_pictures(
     markdown = {"parser": "marked", "allowedTags": ["p", "img"]}
     monkeypatch.setitem(CAPABILITIES["general"], "markdown", markdown)
     elements = [element(torus, "ring"), element(square, "tile", d=2)]
-    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(elements))
+    (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes(elements))
     with Client(tmp_path) as client:
         text = 'import "zoo.safetensors" as zoo;\nzoo.ring { }\nzoo.tile { }\n'
         uri = client.open((tmp_path / "a.nsg").as_uri(), text)

@@ -14,11 +14,11 @@ from scenelang.editors.context import cursor_at
 from scenelang.editors.workspace import Encoding, Lines, difference
 from scenelang.language import expressions, tree
 from scenelang.language.builder import Place
+from scenelang.language.definitions import Names
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
 from scenelang.language.evaluation import Source
 from scenelang.language.lexer import Report, Tokens, scan
 from scenelang.language.parser import parse
-from scenelang.language.resolve import Names
 from scenelang.language.session import Binding
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.nsg"))

@@ -16,7 +16,7 @@ from PIL import Image
 
 import scenelang as nsg
 from scenelang.assets.element import Part
-from scenelang.assets.zoo import load_zoo
+from scenelang.assets.element_file import load_element_file
 from scenelang.cli.main import cli
 from scenelang.drawing.exact import originals
 from scenelang.drawing.exact.mesh import FitError, Mesh, read_solids
@@ -62,11 +62,11 @@ def test_python_learns_what_the_command_does(folder: Path) -> None:
 def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     about = ("--license", "CC0", "--source", "https://example.org")
     assert run("a-ball.ply", "-o", "zoo.safetensors", *about)[0] == 0
-    before = load_zoo("zoo.safetensors").geometries["a_ball"]
+    before = load_element_file("zoo.safetensors").geometries["a_ball"]
     asked = ("--max-error", "0.01", "--preview", "preview.png")
     code, output = run("2 boxes.stl", "star.svg", "-o", "zoo.safetensors", *asked)
     assert (code, Path("preview.png").stat().st_size > 1000) == (0, True), output
-    zoo = load_zoo("zoo.safetensors").geometries
+    zoo = load_element_file("zoo.safetensors").geometries
     assert list(zoo) == ["_2_boxes", "a_ball", "star"]
     assert (zoo["a_ball"], zoo["a_ball"].about) == (before, before.about)
     assert (before.about["license"], before.about["source"]) == ("CC0", "https://example.org")
@@ -89,11 +89,11 @@ def test_a_picture_becomes_a_texture_or_an_outline(folder: Path) -> None:
         code, output = run("wall.png", "-o", "zoo.safetensors", *given, "--preview", "preview.png")
         assert (code, Path("preview.png").stat().st_size > 100) == (0, True), output
         assert "made before" in run("wall.png", "-o", "zoo.safetensors", *given)[1]
-    zoo = load_zoo("zoo.safetensors")
+    zoo = load_element_file("zoo.safetensors")
     assert zoo.materials["wall"].sizes == (171, 256)
     assert zoo.geometries["wall"].dimension == 2
     assert run("wall.png", "-o", "zoo.safetensors", "--texels", "64")[0] == 0
-    assert load_zoo("zoo.safetensors").materials["wall"].sizes == (43, 64)
+    assert load_element_file("zoo.safetensors").materials["wall"].sizes == (43, 64)
 
 
 def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,7 +109,7 @@ def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch:
     files, stops = ["star.svg", "a-ball.ply"], "a_ball"
     with pytest.raises(KeyboardInterrupt):
         learn_files(files, "z.safetensors")
-    assert list(load_zoo("z.safetensors").geometries) == ["star"]
+    assert list(load_element_file("z.safetensors").geometries) == ["star"]
     stops = ""
     learn_files(files, "z.safetensors")
     assert fitted == ["star", "a_ball", "a_ball"]
@@ -138,7 +138,7 @@ def test_a_file_that_fails_does_not_stop_the_others(folder: Path) -> None:
         "Error: notes.txt: not one of .obj, .ply",
     ):
         assert line in output
-    assert list(load_zoo("z.safetensors").geometries) == ["star"]
+    assert list(load_element_file("z.safetensors").geometries) == ["star"]
 
 
 def test_mistakes_are_found_before_the_work(folder: Path) -> None:
@@ -240,7 +240,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
     out = tmp_path / "zoo.safetensors"
     said: list[str] = []
     made = learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
-    zoo = load_zoo(out)
+    zoo = load_element_file(out)
     assert {*zoo.geometries} == {"car", *(part.geometry for part in zoo.groups["car"])}
     assert {element.name for element in made} == {*zoo.geometries}
     for name, element in zoo.geometries.items():
@@ -251,7 +251,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
     learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
     assert said[-1] == "car: made before of this file"
     learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=1))
-    assert load_zoo(out).groups["car"] == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)
+    assert load_element_file(out).groups["car"] == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)
     with pytest.raises(FitError, match="no part 9"):
         originals.shape_in(car, ".glb", "auto", 9)
 
@@ -276,7 +276,7 @@ def test_a_drawing_is_parts_in_its_colours(tmp_path: Path) -> None:
     (tmp_path / "logo.svg").write_text(f"<svg>{shapes}</svg>")
     out = tmp_path / "zoo.safetensors"
     learn_files([tmp_path / "logo.svg"], out, LearnOptions(steps=1))
-    zoo = load_zoo(out)
+    zoo = load_element_file(out)
     assert list(zoo.geometries) == ["logo", "logo_1", "logo_2"]
     first, second = zoo.groups["logo"]
     half = (24**2 + 8**2) ** 0.5 / 2
@@ -286,7 +286,7 @@ def test_a_drawing_is_parts_in_its_colours(tmp_path: Path) -> None:
     shape = originals.shape_in((tmp_path / "logo.svg").read_bytes(), ".svg", "auto", 2)
     assert shape.size == pytest.approx(8**0.5)
     learn_files([tmp_path / "logo.svg"], out, LearnOptions(steps=1, parts=False))
-    assert "logo" not in load_zoo(out).groups
+    assert "logo" not in load_element_file(out).groups
 
 
 CODE = sandbox._CODE

@@ -18,8 +18,8 @@ from PIL import Image
 
 import scenelang as nsg
 from scenelang.assets.colours import unpacked
+from scenelang.assets.element_file import element_file_bytes, load_element_file
 from scenelang.assets.picture import texels
-from scenelang.assets.zoo import load_zoo, zoo_bytes
 from scenelang.drawing.exact.mesh import FitError, Look, Mesh, mesh_of, read_solids, white, whole
 from scenelang.drawing.exact.originals import FOLDER
 from scenelang.drawing.exact.outline import read_outline, read_picture
@@ -454,9 +454,9 @@ def test_a_cube_is_drawn_as_by_its_formula(learned: Path) -> None:
 def changed(learned: Path, **about: str | None) -> None:
     """The zoo with other words of the cube."""
     path = learned / "zoo.safetensors"
-    cube = load_zoo(path).geometries["cube"]
+    cube = load_element_file(path).geometries["cube"]
     said = {key: value for key, value in {**cube.about, **about}.items() if value is not None}
-    path.write_bytes(zoo_bytes([replace(cube, about=said)]))
+    path.write_bytes(element_file_bytes([replace(cube, about=said)]))
 
 
 def test_what_an_element_was_made_from_is_looked_for(learned: Path, monkeypatch: pytest.MonkeyPatch) -> None:

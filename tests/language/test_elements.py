@@ -10,7 +10,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.assets.element import Part
-from scenelang.assets.zoo import zoo_bytes
+from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.check import check, check_compiles
 from scenelang.compiler.compile import compile_scene, find_model
 from scenelang.compiler.program import parse_program, program_bytes
@@ -30,7 +30,7 @@ PURE = RING.replace("zoo.ring", "torus")
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     flat = [element(ball, "ball", d=2, levels=3), element(square, "tile", d=2, levels=7)]
-    zoo = zoo_bytes([element(torus, "ring", levels=5), *flat])
+    zoo = element_file_bytes([element(torus, "ring", levels=5), *flat])
     (tmp_path / "zoo.safetensors").write_bytes(zoo)
     return tmp_path
 
@@ -94,7 +94,7 @@ def test_an_animation_tells_elements_apart(folder: Path) -> None:
 
 def test_names_come_through_other_files(folder: Path) -> None:
     (folder / "more").mkdir()
-    (folder / "more/zoo.safetensors").write_bytes(zoo_bytes([element(ball, "ring", levels=2)]))
+    (folder / "more/zoo.safetensors").write_bytes(element_file_bytes([element(ball, "ring", levels=2)]))
     library = 'import "more/zoo.safetensors" as zoo; module small() { zoo.ring { scale(0.5); } }'
     scene = good(folder, f'{IMPORT} import "lib.nsg" as lib; {RING} lib.small();', lib=library)
     assert [(file.name, file.path) for file in scene.elements] == [
@@ -229,7 +229,7 @@ def garage(tmp_path: Path) -> Path:
         noise(4, 6),
         noise(2, 2, name="stone"),
     ]
-    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(held, GROUPS))
+    (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes(held, GROUPS))
     return tmp_path
 
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenelang.language.definitions import find_unused
 from scenelang.language.diagnostics import (
     MAX_CROWDED,
     Diagnostic,
@@ -28,7 +29,6 @@ from scenelang.language.evaluation import Source
 from scenelang.language.lexer import Report, scan
 from scenelang.language.pages import CODES, read_page
 from scenelang.language.parser import parse
-from scenelang.language.resolve import find_unused
 from scenelang.language.scene import Scene
 
 TEXT = "abcdef"

@@ -10,12 +10,12 @@ import pytest
 
 from scenelang.language import reporter, session
 from scenelang.language import tree as nodes
+from scenelang.language.definitions import find_unused
 from scenelang.language.diagnostics import MOST, Diagnostics, SourceFile, Span
 from scenelang.language.evaluation import Source
 from scenelang.language.limits import MAX_DEPTH, MAX_OBJECTS
 from scenelang.language.parser import parse
 from scenelang.language.reports import render_text
-from scenelang.language.resolve import find_unused
 from tests.language.cases import Outcome, run_text, transform
 from tests.work import lines_run
 

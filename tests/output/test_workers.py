@@ -23,7 +23,7 @@ import trimesh
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.assets.zoo import load_zoo
+from scenelang.assets.element_file import load_element_file
 from scenelang.drawing.how import RenderError
 from scenelang.inverse import learn as learning
 from scenelang.inverse.sandbox import LIBRARIES
@@ -318,7 +318,7 @@ def test_the_file_is_the_one_without_workers(
     nsg.learn(FILES, "one.safetensors", steps=2)
     nsg.learn(FILES, "two.safetensors", steps=2, cluster=address, say=heard.append)
     assert Path("one.safetensors").read_bytes() == Path("two.safetensors").read_bytes()
-    assert load_zoo("two.safetensors").materials.keys() == {"tent"}
+    assert load_element_file("two.safetensors").materials.keys() == {"tent"}
     said = [line.partition(":")[0] for line in heard if not line.startswith(" ")]
     assert said.index("star") < said.index("ball")
     assert [name for name, last in zip(said, [None, *said], strict=False) if name != last] in (
@@ -356,7 +356,7 @@ def test_who_is_first_has_no_say(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     Path("fatal.svg").write_bytes(Path("star.svg").read_bytes())
     files = ["car.glb", "car_roof.ply", "fatal.svg", "star.svg"]
     nsg.learn([name for name in files if "fatal" not in name], "one.safetensors", steps=1, parts=True)
-    found = load_zoo("one.safetensors").geometries
+    found = load_element_file("one.safetensors").geometries
     assert found.keys() == {"car", "car_body", "car_roof", "star"}
     assert found["car_roof"].about["original"] == "car_roof.ply"
     monkeypatch.setattr(learning, "by_workers", backwards)

@@ -29,7 +29,7 @@ from scenelang.language.scene import Camera
 from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
 from scenelang.language.words import FUNCTIONS
 from scenelang.web.arrays import rows_of, stage_of
-from scenelang.web.form import Form, Scope, Writer, form_of
+from scenelang.web.form import PageProgram, Scope, Writer, form_of
 from tests.assets.scenes import IMPORT
 from tests.compiler.random_scenes import blob_scene, full_scene
 from tests.language.test_elements import garage
@@ -47,7 +47,7 @@ class Compiled(NamedTuple):
     manifest: Manifest
     program: Program
 
-    def form(self) -> Form:
+    def form(self) -> PageProgram:
         """The same for a page."""
         return form_of(self.evaluation, self.manifest, self.program.elements)
 
@@ -90,7 +90,7 @@ def carried(steps: list[list[float]], p: np.ndarray) -> np.ndarray:
     return p
 
 
-def check_picture(picture: dict[str, Any], expected: Compiled, form: Form) -> None:
+def check_picture(picture: dict[str, Any], expected: Compiled, form: PageProgram) -> None:
     """Hold what a page's evaluator says against the rows and the stage of the Program."""
     program, manifest = expected.program, expected.manifest
     network, _ = load_arrays(program.model)
@@ -140,13 +140,13 @@ RUN = """(jobs) => jobs.map(([form, all]) => all.map((inputs) => {
 }))"""
 
 
-def pictures(page: Any, jobs: list[tuple[Form, list[dict[str, Any]]]]) -> list[list[Any]]:
+def pictures(page: Any, jobs: list[tuple[PageProgram, list[dict[str, Any]]]]) -> list[list[Any]]:
     """What a page says of forms for inputs: a picture, or why there is none."""
     found: list[list[Any]] = page.evaluate(RUN, [[form.data, inputs] for form, inputs in jobs])
     return found
 
 
-def drawable(source: SourceFile, **inputs: Any) -> tuple[Form, Compiled | None] | None:
+def drawable(source: SourceFile, **inputs: Any) -> tuple[PageProgram, Compiled | None] | None:
     """A scene's form, and what the compiler makes of it, if it does; nothing where no page draws it."""
     found = Diagnostics()
     evaluation = Source(text=source, **inputs).evaluation(found)

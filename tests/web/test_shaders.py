@@ -16,8 +16,8 @@ import pytest
 import scenelang as nsg
 from lab.sets.plane import SETS, random_scene
 from lab.sets.solids import SOLID_SETS, random_solid
+from scenelang.assets.element_file import element_file_bytes
 from scenelang.assets.pyramid import unpacked
-from scenelang.assets.zoo import zoo_bytes
 from scenelang.compiler.groups import read_groups
 from scenelang.compiler.program import Program
 from scenelang.drawing.neural.coverage import Coverage, Tile, add_textures
@@ -315,7 +315,7 @@ def field_at(program: Program, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", CORNERS)
 def test_corners_are_the_networks(page: Any, tmp_path: Path, name: str) -> None:
     brought = [element(torus, "ring"), noise(9, 9, 9, name="space"), noise(24, 16)]
-    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(brought))
+    (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes(brought))
     program = nsg.compile(nsg.loads(CORNERS[name], root=tmp_path))
     check_points(page, program)
     assert compared(page, program) > LEAST_DB[3]

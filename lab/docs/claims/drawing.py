@@ -1,10 +1,10 @@
 """Figures in docs/drawing.md."""
 
 from lab.docs.figures import Figure
-from scenelang.drawing.solid.draw import PACES
+from scenelang.drawing.solid.draw import MARCH_SETTINGS
 from scenelang.drawing.solid.march import CAREFUL
 
-FOUR, QUICK, ONE = CAREFUL, PACES["quick"], PACES["one"]
+FOUR, QUICK, ONE = CAREFUL, MARCH_SETTINGS["quick"], MARCH_SETTINGS["one"]
 CLAIMS = [
     f"| `four` | four | {Figure(FOUR.gap)} | {Figure(FOUR.nodes)} |",
     f"; in space where neighbours differ by more than {Figure(FOUR.contrast)} | {Figure(FOUR.gap)} | "

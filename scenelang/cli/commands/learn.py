@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from scenelang.assets.element import MOST_PIXELS, TEXELS
-from scenelang.assets.zoo import SUFFIX, load_zoo
+from scenelang.assets.element_file import SUFFIX, load_element_file
 from scenelang.cli import options
 from scenelang.cli.files import targets
 from scenelang.cli.main import Trouble
@@ -105,4 +105,4 @@ def command(
     if preview is not None:
         from scenelang.drawing.small import sheet
 
-        sheet(load_zoo(out).elements).save(preview)
+        sheet(load_element_file(out).elements).save(preview)

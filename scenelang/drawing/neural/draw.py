@@ -33,7 +33,7 @@ _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
 
 @dataclass(slots=True)
-class Kept:
+class TileCache:
     """The last picture of a sequence."""
 
     keys: list[bytes] = field(default_factory=list)  # what each of its tiles showed, a digest
@@ -87,7 +87,7 @@ class Run(Care, total=False):
 
     threads: int | None
     split: int | None
-    kept: Kept | None
+    kept: TileCache | None
     progress: Callable[[float], None] | None
 
 
@@ -146,7 +146,7 @@ def draw(
     *,
     threads: int | None = None,
     split: int | None = None,
-    kept: Kept | None = None,
+    kept: TileCache | None = None,
     skip: bool = True,
     samples: str = "adaptive",
     tile: int = TILE,

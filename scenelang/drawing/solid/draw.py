@@ -17,7 +17,16 @@ from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, 
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light
 from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.march import CAREFUL, STEPS, Pace, Piece, Trail, Work, march
+from scenelang.drawing.solid.march import (
+    CAREFUL,
+    MARCH_SETTINGS,
+    STEPS,
+    MarchSettings,
+    Piece,
+    Trail,
+    Work,
+    march,
+)
 from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import BEGIN, END, INF, Passes
 
@@ -63,7 +72,7 @@ class Points(NamedTuple):
 class Lighting:
     """A field under the light of its stage, drawn at a pace."""
 
-    def __init__(self, field: SolidField, stage: Stage, pace: Pace = CAREFUL) -> None:
+    def __init__(self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL) -> None:
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
@@ -404,8 +413,6 @@ def _length(xp: Arrays, a: Array) -> Array:
 
 TILE = 1 << 16  # samples at a time
 QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
-PACES = {"quick": Pace(0.04, 2, 0.15), "one": Pace(0.04, 2)}
-"""Paces of the ways to sample solids; the others are `CAREFUL`."""
 
 
 def draw_solids(
@@ -422,7 +429,7 @@ def draw_solids(
     `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas
-    lighting = Lighting(field, stage, PACES.get(samples, CAREFUL))
+    lighting = Lighting(field, stage, MARCH_SETTINGS.get(samples, CAREFUL))
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(TILE // width, -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]

@@ -1,9 +1,9 @@
 """Rays through the solids' field: the first surface, and the ways through media before it.
 
 The field bounds how far a surface or another kind of material is, and a step goes as far (Hart 1996). Where
-the last two bounds predict a surface farther on, a step goes just behind that, by at most `Pace.gap` more. A
-ray prepares its questions once, up to where it meets other objects; most rays meet one object alone and ask
-its decoder, with no cell between.
+the last two bounds predict a surface farther on, a step goes just behind that, by at most `MarchSettings.gap`
+more. A ray prepares its questions once, up to where it meets other objects; most rays meet one object alone
+and ask its decoder, with no cell between.
 
 A network has learned the length of half a ray inside a leaf. It answers for rays that pass only media under
 affine maps, joined by unions and beyond the reach of blends, whose balls are apart.
@@ -371,7 +371,7 @@ def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
 HALVINGS = 16  # of the interval in which a medium gives way to a solid
 
 
-class Pace(NamedTuple):
+class MarchSettings(NamedTuple):
     """Trade-offs between speed and accuracy where solids are drawn."""
 
     gap: float = 0.009  # world units by which steps may pass what is certain, and what is thinner
@@ -379,7 +379,9 @@ class Pace(NamedTuple):
     contrast: float = 0.04  # sRGB: pixels that differ more from their neighbours are sampled four times
 
 
-CAREFUL = Pace()
+CAREFUL = MarchSettings()
+MARCH_SETTINGS = {"quick": MarchSettings(0.04, 2, 0.15), "one": MarchSettings(0.04, 2)}
+"""Settings of the ways to sample solids; the others are `CAREFUL`."""
 
 
 def march(
@@ -394,8 +396,9 @@ def march(
 ) -> Trail:
     """Follow rays from an origin (3,) along unit directions (3, M) up to a limit (M,), in ``steps`` at most.
 
-    ``halvings`` of the interval find where a medium gives way to a solid; ``gap`` is as of `Pace`. If
-    ``whole``, nobody asks where media begin and end, so that the network for segments may answer.
+    ``halvings`` of the interval find where a medium gives way to a solid; ``gap`` is that of
+    `MarchSettings`. If ``whole``, nobody asks where media begin and end, so that the network for segments may
+    answer.
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))

@@ -23,14 +23,14 @@ from scenelang.assets.tensors import Tensor, TensorError, read_tensors
 
 SUFFIX: Final = ".safetensors"
 TEXTURES_FILE: Final = Path(__file__).with_name("textures.safetensors")
-MOST_BYTES: Final = 32 << 20
+MOST_ELEMENT_BYTES: Final = 32 << 20
 MOST_ELEMENTS: Final = 1000
 MOST_HELD: Final = 128 << 20  # bytes that all elements of a file take unpacked
 _MOST_TEXT: Final = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Zoo:
+class ElementFile:
     """Contents of a file of elements by name; a geometry and a material may share a name."""
 
     geometries: dict[str, Element]
@@ -40,11 +40,13 @@ class Zoo:
     folder: Path | None = field(default=None, compare=False)  # where it lies
 
     @staticmethod
-    def of(elements: Iterable[Element], digest: str = "0" * 64) -> Zoo:
+    def of(elements: Iterable[Element], digest: str = "0" * 64) -> ElementFile:
         """The zoo of elements, without groups."""
         listed = list(elements)
         geometries = {element.name: element for element in listed if not element.material}
-        return Zoo(geometries, digest, {element.name: element for element in listed if element.material})
+        return ElementFile(
+            geometries, digest, {element.name: element for element in listed if element.material}
+        )
 
     @property
     def elements(self) -> tuple[Element, ...]:
@@ -52,30 +54,30 @@ class Zoo:
         return *self.geometries.values(), *self.materials.values()
 
 
-def load_zoo(path: str | Path) -> Zoo:
+def load_element_file(path: str | Path) -> ElementFile:
     """Read a file of elements; raises `OSError`, or `TensorError` for a damaged or hostile one."""
     stat = os.stat(path)
     return _load(os.fspath(path), stat.st_mtime_ns, stat.st_size, stat.st_ino)
 
 
 def load_textures() -> dict[str, Element]:
-    """The sixteen textures that ship, by name, materials of every model; raises as `load_zoo`."""
-    return load_zoo(TEXTURES_FILE).materials
+    """The sixteen textures that ship, by name, materials of every model; raises as `load_element_file`."""
+    return load_element_file(TEXTURES_FILE).materials
 
 
 @lru_cache(maxsize=16)
-def _load(path: str, *version: int) -> Zoo:
+def _load(path: str, *version: int) -> ElementFile:
     """Cached elements of one version of a file, which editors and animations read repeatedly."""
-    return replace(read_zoo(read_regular(path, MOST_BYTES)), folder=Path(path).parent)
+    return replace(read_zoo(read_regular(path, MOST_ELEMENT_BYTES)), folder=Path(path).parent)
 
 
 _TABLES: Final = {"elements": "", "materials": "material."}
 """Tables of a header, and the prefixes of their tensors' names."""
 
 
-def read_zoo(data: bytes) -> Zoo:
+def read_zoo(data: bytes) -> ElementFile:
     """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
-    file = read_tensors(data, MOST_BYTES, (1, 2))
+    file = read_tensors(data, MOST_ELEMENT_BYTES, (1, 2))
     known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
     tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
     if file.header.keys() != known or not all(isinstance(table, dict) for table in tables.values()):
@@ -91,7 +93,7 @@ def read_zoo(data: bytes) -> Zoo:
     result = read_elements(listed, file.body)
     if any(e.material != (key == "materials") for (key, *_), e in zip(entries, result, strict=True)):
         raise TensorError("a material among its geometries, or a geometry among its materials")
-    zoo = Zoo.of(result, hashlib.sha256(data).hexdigest())
+    zoo = ElementFile.of(result, hashlib.sha256(data).hexdigest())
     if len(listed_groups) > MOST_ELEMENTS:
         raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
     held = zoo.geometries, zoo.materials
@@ -147,12 +149,12 @@ def entry_of(element: Element) -> dict[str, Any]:
     return {"form": element.form, **sizes, **coding, "about": element.about}
 
 
-def zoo_bytes(elements: Iterable[Element], groups: Mapping[str, Group] | None = None) -> bytes:
+def element_file_bytes(elements: Iterable[Element], groups: Mapping[str, Group] | None = None) -> bytes:
     """The file of elements and groups; equal ones give equal bytes."""
     import numpy as np
     from safetensors.numpy import save
 
-    zoo = Zoo.of(sorted(elements, key=lambda element: element.name))
+    zoo = ElementFile.of(sorted(elements, key=lambda element: element.name))
     tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if zoo.materials or groups else {})
     header: dict[str, Any] = {"format": len(tables)}
     header |= {key: {e.name: entry_of(e) for e in table.values()} for key, table in tables.items()}

@@ -17,9 +17,9 @@ from safetensors.numpy import save
 
 from scenelang.assets import element as elements
 from scenelang.assets.element import FORMS, Element, Part
+from scenelang.assets.element_file import element_file_bytes, entry_of, load_element_file, read_zoo
 from scenelang.assets.picture import frame_of, painted, size_of, texels
 from scenelang.assets.tensors import TensorError
-from scenelang.assets.zoo import entry_of, load_zoo, read_zoo, zoo_bytes
 from scenelang.drawing.exact.outline import Picture, fit_picture
 from tests.assets.scenes import changed
 from tests.assets.shapes import ball, element, noise, torus
@@ -27,11 +27,11 @@ from tests.assets.shapes import ball, element, noise, torus
 
 def test_elements_come_back(tmp_path: Path) -> None:
     made = [element(torus, "ring"), element(ball, "ball", cells=6, levels=3)]
-    (tmp_path / "zoo.safetensors").write_bytes(zoo_bytes(made))
-    zoo = load_zoo(tmp_path / "zoo.safetensors")
+    (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes(made))
+    zoo = load_element_file(tmp_path / "zoo.safetensors")
     assert list(zoo.elements) == sorted(made, key=lambda e: e.name)
     assert zoo.geometries["ring"].about == {"license": "none needed"}
-    assert zoo_bytes(made[::-1]) == zoo_bytes(made)
+    assert element_file_bytes(made[::-1]) == element_file_bytes(made)
 
 
 def test_the_digest_is_that_of_the_shape() -> None:
@@ -85,7 +85,7 @@ def test_damaged_bytes() -> None:
     cases[bomb] = "does not hold 854 bytes"
     refused(
         [
-            (zoo_bytes([Element("ring", "pyramid", (3, 4, 2), "deflate", data)]), words)
+            (element_file_bytes([Element("ring", "pyramid", (3, 4, 2), "deflate", data)]), words)
             for data, words in cases.items()
         ]
     )
@@ -96,7 +96,7 @@ def test_many_elements_hold_no_more_than_one_file_may() -> None:
     large = Element("a", "pyramid", (3, 6, 6), "deflate", zlib.compress(whole, 9))
     listed = [replace(large, name=f"a{at}") for at in range(17)]
     with pytest.raises(TensorError, match="more than 134,217,728 bytes"):
-        read_zoo(zoo_bytes(listed))
+        read_zoo(element_file_bytes(listed))
 
 
 HELD = [
@@ -114,14 +114,14 @@ CAR = (
 
 def test_groups_come_back() -> None:
     known = {"car": CAR, "spot": (Part("disc", (0.0, 0.0), 1.0, material="bark"),)}
-    data = zoo_bytes(HELD, known)
+    data = element_file_bytes(HELD, known)
     assert read_zoo(data).groups == known
-    assert zoo_bytes(read_zoo(data).elements, read_zoo(data).groups) == data
+    assert element_file_bytes(read_zoo(data).elements, read_zoo(data).groups) == data
 
 
 def test_elements_without_groups_are_in_files_of_the_old_format() -> None:
-    assert b"groups" not in zoo_bytes(HELD[:2])
-    assert read_zoo(zoo_bytes(HELD[:1], {"car": CAR[1:]})).groups == {"car": (CAR[1],)}
+    assert b"groups" not in element_file_bytes(HELD[:2])
+    assert read_zoo(element_file_bytes(HELD[:1], {"car": CAR[1:]})).groups == {"car": (CAR[1],)}
 
 
 BAD_PARTS: dict[str, list[dict[str, Any]]] = {
@@ -143,7 +143,7 @@ BAD_PARTS: dict[str, list[dict[str, Any]]] = {
 def test_groups_of_strangers() -> None:
     for words, changes in BAD_PARTS.items():
         for change in changes:
-            data = zoo_bytes(HELD, {"car": (CAR[0], CAR[1]._replace(**change))})
+            data = element_file_bytes(HELD, {"car": (CAR[0], CAR[1]._replace(**change))})
             with pytest.raises(TensorError, match=f"group `car`.*{words}"):
                 read_zoo(data)
     for name, group, words in (
@@ -152,14 +152,16 @@ def test_groups_of_strangers() -> None:
         ("car", CAR * 129, "1 to 256 parts"),
     ):
         with pytest.raises(TensorError, match=words):
-            read_zoo(zoo_bytes(HELD, {name: group}))
+            read_zoo(element_file_bytes(HELD, {name: group}))
 
 
 def test_fields_are_those_of_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     for damaged in ("wheel", [CAR], [{"geometry": "ring"}], [{**CAR[0]._asdict(), "name": 1}]):
-        monkeypatch.setattr("scenelang.assets.zoo.group_entry", lambda group, damaged=damaged: damaged)
+        monkeypatch.setattr(
+            "scenelang.assets.element_file.group_entry", lambda group, damaged=damaged: damaged
+        )
         with pytest.raises(TensorError, match="group `car`"):
-            read_zoo(zoo_bytes(HELD, {"car": CAR}))
+            read_zoo(element_file_bytes(HELD, {"car": CAR}))
 
 
 def test_volumes_are_determinants() -> None:
@@ -174,7 +176,7 @@ BARK = noise(5, 7)
 def test_colours_come_back() -> None:
     for shape in ((1, 1), (5, 7)):
         colours = np.random.default_rng(1).integers(0, 256, (*shape, 3), np.uint8)
-        (found,) = read_zoo(zoo_bytes([painted("bark", colours)])).elements
+        (found,) = read_zoo(element_file_bytes([painted("bark", colours)])).elements
         np.testing.assert_array_equal(texels(found), colours.astype(np.float32) / 255)
         assert found.held == colours.size
 
@@ -190,18 +192,18 @@ def test_another_coding_is_not_tried() -> None:
     assert [element.coding for element in made] == [*FORMS["picture"].codings]
     for one, other in zip(made, made[::-1], strict=True):
         assert abs(texels(one) * 255 - ramp).max() < 20
-        assert read_zoo(zoo_bytes([one])).materials == {"bark": one}
+        assert read_zoo(element_file_bytes([one])).materials == {"bark": one}
         with pytest.raises(TensorError, match="`bark` is damaged"):
             texels(replace(one, coding=other.coding))
 
 
 def test_a_geometry_and_a_material_share_a_name() -> None:
     made = [element(torus, "cow", levels=2), noise(3, 3, name="cow"), noise(2, 2, 2, name="hide")]
-    zoo = read_zoo(zoo_bytes(made))
+    zoo = read_zoo(element_file_bytes(made))
     assert (list(zoo.geometries), list(zoo.materials)) == (["cow"], ["cow", "hide"])
     assert {e.digest for e in zoo.elements} == {e.digest for e in made}
     assert [e.kind for e in zoo.elements] == ["element of space", "texture", "colouring of space"]
-    assert zoo_bytes(zoo.elements) == zoo_bytes(made[::-1])
+    assert element_file_bytes(zoo.elements) == element_file_bytes(made[::-1])
 
 
 def test_the_digest_is_that_of_the_colours() -> None:
@@ -214,7 +216,7 @@ def other(**entry: Any) -> bytes:
         header["materials"]["bark"] |= entry
         header |= {key: value for key, value in entry.items() if key in header}
 
-    return changed(zoo_bytes([BARK]), change)
+    return changed(element_file_bytes([BARK]), change)
 
 
 def test_damaged_entries() -> None:
@@ -241,7 +243,7 @@ def test_a_material_is_not_listed_as_a_geometry() -> None:
         tensors["bark"], tensors["material.bark"] = tensors["material.bark"], tensors["bark"]
 
     with pytest.raises(TensorError, match="a material among its geometries"):
-        read_zoo(changed(zoo_bytes([made, BARK]), swap))
+        read_zoo(changed(element_file_bytes([made, BARK]), swap))
 
 
 def saved(kind: str, size: tuple[int, int], **options: Any) -> bytes:
@@ -272,7 +274,12 @@ def test_damaged_pictures() -> None:
         ("av1", frame_of(saved("AVIF", (7, 5), subsampling="4:2:0")), "not a still picture"),
         ("av1", frame_of(saved("AVIF", (300, 100), subsampling="4:4:4")), "a picture of 300 x 100"),
     ]
-    refused([(zoo_bytes([replace(BARK, coding=coding, data=data)]), words) for coding, data, words in cases])
+    refused(
+        [
+            (element_file_bytes([replace(BARK, coding=coding, data=data)]), words)
+            for coding, data, words in cases
+        ]
+    )
 
 
 def test_the_frame_says_its_size_before_it_takes_memory() -> None:
