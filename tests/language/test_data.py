@@ -21,8 +21,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @settings(max_examples=60)
 @given(scenes)
 def test_text_json_and_repr_read_back(scene: nsg.Scene) -> None:
-    names = {name: getattr(nsg, name) for name in nsg.__all__}
-    assert eval(repr(scene.nodes), names) == scene.nodes
+    code = repr(scene.nodes)
+    assert eval(code, {name: getattr(nsg, name) for name in nsg.__all__ if name in code}) == scene.nodes
     for text in (scene.to_json(), to_readable_json(scene)):
         assert nsg.Scene.from_json(text) == scene
         assert nsg.Scene.from_json(text).to_json() == scene.to_json()
