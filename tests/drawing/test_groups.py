@@ -20,6 +20,7 @@ from scenelang.compiler.groups import (
     felt,
     read_groups,
     token_fault,
+    token_name,
     widths_of,
 )
 from scenelang.compiler.program import Program, ProgramError, parse_program, program_bytes
@@ -91,6 +92,11 @@ def test_states_are_those_of_the_recursion(seed: int) -> None:
             assert np.sign(found) == np.sign(wanted)
     assert seen > 0.5 * columns
     assert close > 0.995 * seen
+
+
+def test_names_of_tokens() -> None:
+    tokens = (0, 2, BEGINS | 3, 2 << ENDS | 2, 1 << ENDS | BEGINS | 1)
+    assert [*map(token_name, tokens)] == ["union", "subtract", "intersect (", "subtract ))", "smooth ( )"]
 
 
 def test_a_group_begins_with_its_first_row_as_it_is() -> None:
