@@ -160,7 +160,7 @@ _NO_VECTOR: Final = {
 
 
 class Spec(Record):
-    """How the arguments of a statement become a node, or values in order where it has none."""
+    """A reader of a statement's arguments: into a node, or values in order where it has none."""
 
     word: words.Word
     help: str | None  # advice for a wrong number of arguments; None prints the signature

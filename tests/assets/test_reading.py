@@ -81,7 +81,7 @@ def test_odd_files_are_refused(folder: Folder, kind: str) -> None:
 
 
 def test_pipes_of_whole_processes(folder: Folder) -> None:
-    """Those in folders are refused, those of shells are read."""
+    """Pipes in folders are refused, pipes of shells are read."""
     os.mkfifo("it.nsg")
     assert one_line(run("check", "it.nsg")) == "it.nsg: not a regular file"
     read, write = os.pipe()

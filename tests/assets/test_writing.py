@@ -293,7 +293,7 @@ def test_an_output_that_is_standard_input(folder: Folder) -> None:
 
 
 def test_commands_that_work_in_place(folder: Folder) -> None:
-    """Those that are there to change a file do, also behind a link."""
+    """Commands that are there to change a file do, also behind a link."""
     folder.write("a.nsg", "square   { scale(1) }\n")
     os.symlink("a.nsg", "link.nsg")
     assert folder.run("check", "--fix", "link.nsg").exit_code == 0

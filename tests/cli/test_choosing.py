@@ -71,7 +71,7 @@ def test_the_choice_is_told(shipped: Folder) -> None:
 
 
 def test_what_is_chosen_is_what_is_drawn(shipped: Folder) -> None:
-    """Of animations, by --frame, too."""
+    """Frames of animations, by --frame, too."""
     name = shipped.write("a.nsg", "animate(1, 4); star { scale(0.2 + u); material flat { color(#d33); } }\n")
     pictures = []
     for limit, way in (
@@ -89,7 +89,7 @@ def test_what_is_chosen_is_what_is_drawn(shipped: Folder) -> None:
 
 
 def test_each_scene_is_chosen_for(shipped: Folder) -> None:
-    """Those that nothing draws as well are reported, and the others drawn."""
+    """Scenes that nothing draws as well are reported, and the others drawn."""
     names = shipped.write("small.nsg", "canvas(64, 64); square { scale(0.5); }\n"), shipped.write("large.nsg")
     flip = ("--max-flip", "0.01")
     both = shipped.run("render", *names, "-o", "out/", *flip, "-v", code=0).stderr

@@ -155,7 +155,7 @@ def test_pages_of_scenes_programs_and_json(folder: Folder) -> None:
 
 
 def test_scenes_without_pages(folder: Folder) -> None:
-    """Those with errors are left out; a page replaces no input and follows no link nobody wrote."""
+    """Scenes with errors are left out; a page replaces no input and follows no link nobody wrote."""
     names = (
         folder.write("a.nsg"),
         folder.write("b.nsg", "circle;"),

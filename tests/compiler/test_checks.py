@@ -182,7 +182,7 @@ def test_what_is_warned_of_is_of_one_colour() -> None:
 
 
 def test_the_help_for_pixels_leads_to_a_picture() -> None:
-    """What the help says to put all into, done; the middle of the object is where pixels have it."""
+    """The group that the help says to put all into; the middle of the object is where pixels have it."""
     for before, shape, x, y, half in (
         ("canvas(400, 300); ", "square { scale(100); translate(200, 150); }", 200, 150, 70.7),
         ('import "std/shapes" as s; canvas(300, 200); ', "s.disc(40) { translate(20, 180); }", 20, 170.5, 40),

@@ -157,7 +157,7 @@ APART = MIXED[0]._replace(steps=(Displace(0.05, 6.0), Warp(0.5, (0.0, 0.0)), Twi
 
 
 def test_vectors_are_those_lifted_by_hand() -> None:
-    """Where nothing trades places or shares a slot; blends of the usual width leave 0."""
+    """Chains in which nothing trades places or shares a slot; blends of the usual width leave 0."""
     for o in (APART, *MIXED[1:]):
         found = program(graph([o._replace(token="union")])).vectors[0]
         wanted = vector(o._replace(k=0.0), network())
