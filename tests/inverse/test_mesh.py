@@ -485,3 +485,13 @@ def test_an_outline_is_drawn_as_the_shape_that_it_is(learned: Path) -> None:
     scenes = (scene(learned, chain.replace("NAME", name)) for name in ("zoo.tile", "square"))
     drawn, exact = (np.asarray(nsg.render(shown, backend="reference")) for shown in scenes)
     assert psnr_db(drawn, exact) > 55
+
+
+def test_soup_is_refused_before_all_of_it_is_asked() -> None:
+    """Triangles across all of the ball leave winding numbers nothing to sum up: a point took 70 ms."""
+    corners = np.random.default_rng(0).uniform(-1, 1, (300_000, 3))
+    mesh = mesh_of(corners, np.arange(300_000).reshape(-1, 3))
+    started = time.process_time()
+    with pytest.raises(FitError, match=r"overlap so much|encloses no solid"):
+        mesh.surface(200_000)
+    assert time.process_time() - started < 30
