@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import radians
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from scenelang.compiler.groups import BEGINS, ENDS
 from scenelang.compiler.lifting import SOLID_LAYOUT as LAYOUT
 from scenelang.compiler.lifting import Parts, inverse_frame
 from scenelang.compiler.program import Paint
-from scenelang.compiler.spaces import Triple
+from scenelang.compiler.spaces import Camera, Ground, Light, Stage, Triple
 from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed
 from scenelang.compiler.weights import shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
@@ -195,6 +196,18 @@ USUAL = fold(
     leaf("sphere", "diffuse", GOLD, scaled(0.6), moved(0, 0.6, 0)),
     leaf("torus", "diffuse", SKY, scaled(1.2, 1.2, 0.4), turned(1.22, 1, 0, 0)),
     leaf("sphere", "diffuse", RED, scaled(0.9, 0.2, 0.5), sheared("xy", 0.6), moved(0.5, -0.8, 0.5)),
+)
+ASIDE = fold(
+    leaf("torus", "diffuse", SKY, scaled(1.1, 0.7, 0.9), turned(2.1, 1, 2, 0.5), sheared("yz", 0.4)),
+    leaf("sphere", "diffuse", GOLD, scaled(0.6, 0.2, 0.4), turned(0.7, 0, 0, 1), moved(0.9, 0.3, -0.4)),
+)
+"""Other solids; `FROM_ASIDE` sees them from aside with a wide view, by a light close to a surface."""
+FROM_ASIDE = Stage(
+    Camera((2.2, 2.6, -1.7), (0.3, -0.2, 0.1), radians(80)),
+    Light((0.75, 0.7, -0.4), 0.4, (1.0, 0.7, 0.4)),
+    Ground(-1.1, (0.3, 0.5, 0.6)),
+    (0.4, 0.1, 0.2),
+    (0.4, 0.1, 0.2),
 )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import acos, radians
+from dataclasses import replace
+from math import acos
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scenelang.compiler.spaces import Camera, Ground, Light, Stage
 from scenelang.drawing.exact import solid as exact
 from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import flip
-from tests.drawing.solids import fold, leaf, moved, scaled, sheared, turned
+from tests.drawing.solids import ASIDE, FROM_ASIDE, fold, leaf, moved, scaled, turned
 from tests.pictures import psnr_db
 
 pytest.importorskip("mitsuba", reason="Mitsuba is not installed (the extra oracles)")
@@ -44,19 +45,8 @@ UNIONS: dict[str, tuple[Fold, Stage, tuple[int, int], int]] = {
         144,
     ),
     "from aside, a wide view, a light close to a surface": (
-        fold(
-            leaf("torus", "diffuse", BLUE, scaled(1.1, 0.7, 0.9), turned(2.1, 1, 2, 0.5), sheared("yz", 0.4)),
-            leaf(
-                "sphere", "diffuse", GOLD, scaled(0.6, 0.2, 0.4), turned(0.7, 0, 0, 1), moved(0.9, 0.3, -0.4)
-            ),
-        ),
-        Stage(
-            Camera((2.2, 2.6, -1.7), (0.3, -0.2, 0.1), radians(80)),
-            Light((0.75, 0.7, -0.4), 0.4, (1.0, 0.7, 0.4)),
-            Ground(-1.1, (0.3, 0.5, 0.6)),
-            BLACK,
-            BLACK,
-        ),
+        ASIDE,
+        replace(FROM_ASIDE, horizon=BLACK, zenith=BLACK),
         (60, 40),
         144,
     ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import radians
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,20 @@ from scenelang.drawing.exact.solid import Body, solid_image
 from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import flip
 from tests.drawing import solid_oracle
-from tests.drawing.solids import GOLD, RED, SKY, USUAL, fold, leaf, moved, scaled, sheared, turned
+from tests.drawing.solids import (
+    ASIDE,
+    FROM_ASIDE,
+    GOLD,
+    RED,
+    SKY,
+    USUAL,
+    fold,
+    leaf,
+    moved,
+    scaled,
+    sheared,
+    turned,
+)
 from tests.pictures import psnr_db
 
 AXES = np.eye(3)[:, :, None]
@@ -30,19 +42,8 @@ BENT = Warp(0.8, (0.0, 0.0)), Warp(0.0, (0.5, 0.0)), Twist(0.8)
 POVRAY: dict[str, tuple[Fold, Stage, tuple[int, int], float]] = {
     "usual": (USUAL, Stage(), (120, 120), 65),
     "from aside, a wide view, a light close to a surface": (
-        fold(
-            leaf("torus", "diffuse", SKY, scaled(1.1, 0.7, 0.9), turned(2.1, 1, 2, 0.5), sheared("yz", 0.4)),
-            leaf(
-                "sphere", "diffuse", GOLD, scaled(0.6, 0.2, 0.4), turned(0.7, 0, 0, 1), moved(0.9, 0.3, -0.4)
-            ),
-        ),
-        Stage(
-            Camera((2.2, 2.6, -1.7), (0.3, -0.2, 0.1), radians(80)),
-            Light((0.75, 0.7, -0.4), 0.4, (1.0, 0.7, 0.4)),
-            Ground(-1.1, (0.3, 0.5, 0.6)),
-            (0.4, 0.1, 0.2),
-            (0.4, 0.1, 0.2),
-        ),
+        ASIDE,
+        FROM_ASIDE,
         (150, 100),
         60,
     ),
