@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
 from scenelang.compiler.graph import Graph, Look
@@ -82,7 +83,8 @@ class Written(NamedTuple):
             return 0.0
         reach = min(reach, _seen(self.steps, far))
         off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
-        off *= max(self.look.element.sizes)
+        element = self.look.element
+        off *= element.slope if isinstance(element, Gradient) else max(element.sizes)
         for kind, *numbers in self.look.colours:
             if kind == "hue":
                 off = 6 * (off + EPS * abs(numbers[0]))
