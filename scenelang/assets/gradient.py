@@ -24,7 +24,7 @@ class Gradient(NamedTuple):
     name: str
     stops: Stops
 
-    kind = "gradient"
+    kind = "texture"  # a model that draws textures draws gradients
     material = True
     dimension = 2
 

@@ -313,7 +313,7 @@ class _Lowering:
 
     def gradient(self, material: schema.Material) -> Gradient | None:
         """The gradient of a material, with colours in the space that they are averaged in."""
-        if "texture" not in self.manifest.elements:
+        if Gradient.kind not in self.manifest.elements:
             fact = f"model `{self.manifest.name}` does not draw `{material.name}`, a gradient"
             self.say("E0502", fact, material)
             return None
