@@ -187,8 +187,10 @@ def test_pictures_of_examples_are_the_networks(page: Any) -> None:
 GRADED = """
     nsg 1; canvas(96, 64); background(none);
     chain {
-      square { scale(1.1, 0.6); material linear { stop(0.1, #f00); stop(0.4, #0f0); stop(1, #00f); rotate(40deg); } }
-      smooth star { scale(0.7); material radial { stop(0, #ff0); stop(0.3, #f0f); stop(0.3, #000); hue(80deg); } }
+      square { scale(1.1, 0.6);
+        material linear { stop(0.1, #f00); stop(0.4, #0f0); stop(1, #00f); rotate(40deg); } }
+      smooth star { scale(0.7);
+        material radial { stop(0, #ff0); stop(0.3, #f0f); stop(0.3, #000); hue(80deg); } }
       subtract pentagon { scale(0.2); translate(0.4, 0.2); }
       triangle { scale(0.5); bend(0.5); translate(-0.6, 0.2); material bricks { scale(0.5); } }
     }
@@ -282,13 +284,13 @@ CORNERS = {
         }
         """,
     "gradients": """
-        canvas(64, 48); background(none);
+        import "zoo.safetensors" as zoo; canvas(64, 48); background(none);
         torus { rotate(60deg, axis = X); scale(0.8); translate(-0.6, 0.2, 0);
-            material radial { stop(0, #ff0); stop(0.5, #f00); stop(0.5, #00f); stop(1, #fff); hue(0.1turn); } }
+            material radial { stop(0, #ff0); stop(0.5, #f00); stop(0.5, #00f); stop(1, #fff); hue(36deg); } }
         sphere { scale(0.6); translate(0.8, -0.2, 0.6);
             material volumetric linear { stop(0.2, #f22); stop(0.7, #22f); rotate(60deg); scale(0.6); } }
         sphere { scale(0.4); translate(0, -0.6, 1); material diffuse zoo.bark; }
-        """.replace("torus", 'import "zoo.safetensors" as zoo; torus', 1),
+        """,
     "inside": """
         canvas(48, 48); camera(eye = [0.1, 0.2, 0.6], target = [0, 0, -1], fov = 70deg);
         light(position = [0.3, 0.5, 0.2], power = 2);
