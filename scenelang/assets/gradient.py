@@ -34,14 +34,19 @@ class Gradient(NamedTuple):
         return hashlib.sha256(repr(tuple(self)).encode()).hexdigest()
 
     @property
+    def edges(self) -> tuple[float, ...]:
+        """Offsets of its hard edges."""
+        return tuple([b[0] for a, b in pairwise(self.stops) if b[0] - a[0] <= HARD and a[1:] != b[1:]])
+
+    @property
     def slope(self) -> float:
-        """The most that a channel changes over a unit of (u, v); infinite with a hard edge."""
-        pairs = pairwise(self.stops)
-        changes = [
-            (b[0] - a[0], max(abs(p - q) for p, q in zip(a[1:], b[1:], strict=True))) for a, b in pairs
+        """The most that a channel changes over a unit of (u, v), apart from hard edges."""
+        rates = [
+            max(abs(p - q) for p, q in zip(a[1:], b[1:], strict=True)) / (b[0] - a[0])
+            for a, b in pairwise(self.stops)
+            if b[0] - a[0] > HARD
         ]
-        steepest = max((c / o if o > HARD else float("inf") for o, c in changes if c), default=0.0)
-        return steepest / 2 if self.name == "linear" else steepest
+        return max(rates, default=0.0) / (2 if self.name == "linear" else 1)
 
 
 def stops_fault(offsets: list[float]) -> tuple[int, str] | None:

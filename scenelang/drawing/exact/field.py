@@ -57,10 +57,15 @@ def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
     return _stepped(_mixed(values, places), look.colours)
 
 
+def along(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Offsets (M,) of points (u, v) on a gradient."""
+    return np.asarray((u + 1) / 2 if gradient.name == "linear" else np.hypot(u, v))
+
+
 def _graded(gradient: Gradient, u: Floats, v: Floats) -> Floats:
     """Colours (M, 3) of a gradient at points (u, v), before operations."""
     offsets, colours = np.split(np.array(gradient.stops, np.float64), [1], 1)
-    s = (u + 1) / 2 if gradient.name == "linear" else np.hypot(u, v)
+    s = along(gradient, u, v)
     after = np.searchsorted(offsets[:, 0], s, "right")  # of equal offsets the last has been passed
     a, b = np.maximum(after - 1, 0), np.minimum(after, len(offsets) - 1)
     gap = (offsets[b] - offsets[a])[:, 0]

@@ -138,7 +138,7 @@ class Texture:
             self._gradient = paint.element
             self.place = Affine(tuple(map(tuple, frame.astype(np.float64).reshape(2, 3).tolist())))
             across = abs(np.array([row[:2] for row in self.place.rows])).max()
-            self.detail = min(float(across * paint.element.slope), EDGE)
+            self.detail = EDGE if paint.element.edges else min(float(across * paint.element.slope), EDGE)
             self._at = self._graded
             return
         values = _nodes(paint.element, light)
