@@ -26,7 +26,6 @@ from scenelang.compiler.groups import OPERATOR, widths_of
 from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.compiler.spaces import Stage
 from scenelang.drawing.neural.frames import Frames
 from scenelang.drawing.solid.passes import read_solid_frame
 
@@ -190,24 +189,6 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             row["place"] = parts.texture[i].tolist()
         rows.append(row)
     return rows
-
-
-def stage_of(stage: Stage) -> dict[str, Any]:
-    """A stage as JSON data, with the camera's axes."""
-    camera, light, ground = stage.camera, stage.light, stage.ground
-    return {
-        "eye": camera.eye,
-        "axes": camera.axes(),
-        "target": camera.target,
-        "fov": camera.fov_rad,
-        "light": light.position,
-        "power": light.power,
-        "lightRgb": light.rgb,
-        "ground": ground and {"y": ground.y, "rgb": ground.rgb},
-        "horizon": stage.horizon,
-        "zenith": stage.zenith,
-        "transparent": stage.transparent,
-    }
 
 
 def _index(known: np.ndarray, code: np.ndarray) -> int:

@@ -11,16 +11,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Final
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.spaces import Stage, stage_data
+from scenelang.language import scene
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
+from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
@@ -368,7 +372,8 @@ class Writer:
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
-            return None if name == "canvas" else [name, *args]
+            word = (name,) if name == "animate" else ("set", name)
+            return None if name == "canvas" else [*word, *args]
         if name in LANGUAGE:
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
@@ -472,6 +477,7 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         "slots": writer.slots,
         "calls": writer.calls,
         "plain": 0,
+        "stage": _stage(),
         "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
         "geometries": manifest.geometries,
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],
@@ -486,6 +492,18 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         tuple(writer.shapes),
         tuple(writer.paints),
     )
+
+
+@cache
+def _stage() -> Json:
+    """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
+    usual, fields = Stage(), {}
+    for name, word in STAGE.items():
+        schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
+        ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
+        columns = zip(getattr(usual, name).__match_args__, word.kinds, ranges, strict=True)
+        fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
+    return {"usual": stage_data(usual), "fields": fields}
 
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:

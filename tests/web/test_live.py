@@ -19,6 +19,7 @@ from scenelang.compiler.compile import compile_scene, find_model
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.passes import OPTIONAL
 from scenelang.compiler.program import Program
+from scenelang.compiler.spaces import stage_data
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import Diagnostics, SourceFile
@@ -28,7 +29,7 @@ from scenelang.language.reports import SceneError
 from scenelang.language.scene import Camera
 from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
 from scenelang.language.words import FUNCTIONS
-from scenelang.web.arrays import rows_of, stage_of
+from scenelang.web.arrays import rows_of
 from scenelang.web.form import PageProgram, Scope, Writer, form_of
 from tests.assets.scenes import IMPORT
 from tests.compiler.random_scenes import blob_scene, full_scene
@@ -110,7 +111,7 @@ def check_picture(picture: dict[str, Any], expected: Compiled, form: PageProgram
             np.testing.assert_allclose(_numbers(one), _numbers(other), rtol=1e-5, atol=1e-6)
         here, there = (carried(one["steps"], POINTS[: manifest.dimension]) for one in (row, own))
         np.testing.assert_allclose(here, there, rtol=2e-4, atol=2e-4)
-    stage = None if program.stage is None else stage_of(program.stage)
+    stage = None if program.stage is None else stage_data(program.stage)
     assert _flat(picture["stage"]).keys() == _flat(stage).keys()
     for name, number in _flat(stage).items():
         np.testing.assert_allclose(_flat(picture["stage"])[name], number, atol=1e-9, err_msg=name)

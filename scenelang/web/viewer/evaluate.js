@@ -51,7 +51,7 @@ class SceneRun {
     const out = new Block();
     for (const act of this.body) act(undefined, out);
     const rows = rowsOf(out.links, this.form);
-    const made = { rows, ...stageFrom(this.settings, this.form.dimension) };
+    const made = { rows, ...stageFrom(this.settings, this.form) };
     if (made.stage !== null) checkEye(made, this.form);
     return made;
   }
@@ -194,13 +194,6 @@ const INKS = {
   hue: ([angle]) => ["hue", radians(angle) / (2 * Math.PI)],
 };
 
-const settingOf = (name) => (args, run) => {
-  const parts = args.map((arg) => optionalValue(arg, run));
-  return (slots) => {
-    run.settings[name] = parts.map((part) => part(slots));
-  };
-};
-
 const STATEMENTS_OF_FORMS = {
   no: ([why]) => () => refuse(why),
   g: ([slot, expr], run) => {
@@ -322,10 +315,12 @@ const STATEMENTS_OF_FORMS = {
       run.animated = [run.frame / fps, u, run.frame, frames];
     };
   },
-  background: settingOf("background"),
-  camera: settingOf("camera"),
-  light: settingOf("light"),
-  ground: settingOf("ground"),
+  set: ([name, ...args], run) => {
+    const parts = args.map((arg) => optionalValue(arg, run));
+    return (slots) => {
+      run.settings[name] = parts.map((part) => part(slots));
+    };
+  },
 };
 
 /** The nearest whole number, of two the even one. */
