@@ -429,7 +429,7 @@ def draw_solids(
     `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas
-    lighting = Lighting(field, stage, MARCH_SETTINGS.get(samples, CAREFUL))
+    lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(TILE // width, -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
