@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from scenelang.language.nodes import Rotate as Rotate
     from scenelang.language.nodes import Scale as Scale
     from scenelang.language.nodes import Shear as Shear
+    from scenelang.language.nodes import Stop as Stop
     from scenelang.language.nodes import Translate as Translate
     from scenelang.language.nodes import Twirl as Twirl
     from scenelang.language.nodes import Twist as Twist
@@ -88,7 +89,7 @@ _HOME: Final = {
     "scenelang.language.formatting": "format_text",
     "scenelang.language.nodes": (
         "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
-        "Material Matrix Object Rotate Scale Shear Translate Twirl Twist"
+        "Material Matrix Object Rotate Scale Shear Stop Translate Twirl Twist"
     ),
     "scenelang.language.reports": "SceneError",
     "scenelang.language.scene": "Elements load_elements Scene",

@@ -9,6 +9,7 @@ from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
 from operator import attrgetter, itemgetter
 from typing import Final, NamedTuple
 
+from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
 from scenelang.compiler import steps
 from scenelang.compiler.chain import LevelsError, split_levels
@@ -228,7 +229,7 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
 def _texels(leaf: Leaf, graph: Graph) -> Measures:
     """Texels to a pixel of the picture that an object wears, where they are densest."""
     element, affines = leaf.look.element, steps.composed(leaf.steps)
-    if element is None or element.dimension == 3:
+    if not isinstance(element, Element) or element.dimension == 3:
         return []
     a, b, c, _, d, e, f, *_ = steps.inverted(steps.compose(affines, leaf.look.moved))
     p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f

@@ -238,7 +238,9 @@ class Space:
 
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
         """An operation of a material in the space that colours are averaged in; here linear, as light is."""
-        return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
+        if isinstance(op, scene.Color | scene.Stop):
+            return op.model_copy(update={"rgb": decoded(op.rgb)})
+        return op
 
     def written(self, rgb: Triple) -> Triple:
         """The inverse of `inked` for a colour: as it is written."""

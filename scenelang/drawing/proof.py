@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import HARD, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
 from scenelang.compiler.graph import Graph, Look
@@ -41,7 +42,7 @@ from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
-from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance, placed_leaves
+from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -76,13 +77,17 @@ class Written(NamedTuple):
         """Leaf units by which points within a reach of the leaf, and ``far`` from the world's, may be off."""
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
-    def discoloured(self, reach: float, far: float) -> float:
-        """Greatest error of a channel of a texture's colours there."""
+    def mispainted(self, reach: float, far: float) -> float:
+        """Distance by which (u, v) of a texture may be off there."""
+        reach = min(reach, _seen(self.steps, far))
+        return _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
+
+    def discoloured(self, off: float) -> float:
+        """Greatest error of a channel of a texture's colours, apart from hard edges, where (u, v) is off."""
         if self.look.element is None:
             return 0.0
-        reach = min(reach, _seen(self.steps, far))
-        off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
-        off *= max(self.look.element.sizes)
+        element = self.look.element
+        off *= element.slope if isinstance(element, Gradient) else max(element.sizes)
         for kind, *numbers in self.look.colours:
             if kind == "hue":
                 off = 6 * (off + EPS * abs(numbers[0]))
@@ -345,7 +350,10 @@ class Stream:
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
         self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
-        self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
+        self._mispainted = [leaf.mispainted(w, far) if leaf.look.element else 0.0 for leaf, w in own]
+        self._discoloured = [
+            leaf.discoloured(off) for leaf, off in zip(leaves, self._mispainted, strict=True)
+        ]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
         """Mean number of objects that reach a place on the canvas."""
@@ -380,7 +388,11 @@ class Stream:
             some, look = which == at, self._leaves[at].look
             low[:, some], high[:, some] = 0.0, 1.0
             if sampled:
-                seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
+                p = carry_back(look.texture, q[:, some])
+                seen, off = colour_at(look, p).T, self._discoloured[at] * np.ones(len(p[0]))
+                if isinstance(look.element, Gradient):
+                    s, torn = along(look.element, p[0], p[1]), self._mispainted[at] + HARD
+                    off[np.any([abs(s - edge) <= torn for edge in look.element.edges or (np.inf,)], 0)] = 1.0
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
         return Interval(low, high)
 

@@ -13,6 +13,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
@@ -199,7 +200,9 @@ def _node(node: Node) -> dict[str, Any]:
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
-def _texture(element: Element) -> dict[str, Any]:
+def _texture(element: Element | Gradient) -> dict[str, Any]:
+    if isinstance(element, Gradient):
+        return {"name": element.name, "stops": [list(stop) for stop in element.stops]}
     return {"name": element.name, "digest": element.digest}
 
 

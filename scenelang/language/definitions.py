@@ -10,7 +10,16 @@ from typing import Any, Final, Literal
 from scenelang.assets.records import Record
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, SourceFile, Span, removal
-from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, STAGE, TRANSFORMS
+from scenelang.language.words import (
+    ANIMATED,
+    CONSTANTS,
+    FUNCTIONS,
+    NEWER,
+    OPERATIONS,
+    SETTINGS,
+    STAGE,
+    TRANSFORMS,
+)
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -249,6 +258,8 @@ class Names:
         own = scope.find(name) if name in STAGE else None
         if name in SETTINGS and (own is None or (own.kind != "module" and stmt.args is not None)):
             role = "setting"
+        elif name in NEWER and kind != "material" and scope.find(name) is not None:
+            pass
         elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
             role = "operation"
         elif name in TRANSFORMS:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from scenelang.assets.gradient import STOPS
 from scenelang.assets.records import Record
 from scenelang.language import advice, nodes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
@@ -23,10 +24,10 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import Color, Frozen, Grayscale, Shear, singular
+from scenelang.language.nodes import Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
-from scenelang.language.session import Binding, Env
+from scenelang.language.session import Binding, Env, Session
 from scenelang.language.values import (
     POISON,
     Angle,
@@ -300,8 +301,8 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         except Problem as problem:
             advice.report_problem(session.report, problem, span, operands)
             return None
-        if node.__class__ is Color or node.__class__ is Grayscale:
-            _warn(node, session.report, first.span if first else span)
+        if isinstance(node, Color | Grayscale | Stop):
+            _warn(node, session.report, next((o.span for o in reversed(operands) if o is not None), span))
         return node
 
     def append(node: Any, out: Builder) -> None:
@@ -335,9 +336,9 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     return action
 
 
-def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
+def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
     """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
-    components = node.rgb if isinstance(node, Color) else (node.amount,)
+    components = (node.amount,) if isinstance(node, Grayscale) else node.rgb
     outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
     if outside is not None:
         help = "components run from 0 to 1; the result is clamped to that"
@@ -390,16 +391,41 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
     def run(env: Env) -> Material:
         material = make(Material, {"name": called, "ops": operations(env), "shading": shading})
         session.spans.record(material, where)
+        _check_stops(material, where, session)
         return material
 
     return run
+
+
+def _check_stops(material: Material, where: Written, session: Session) -> None:
+    """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
+    fault = paint_fault(material)
+    if fault is None:
+        return
+    stop, message = fault
+    statement, report = where.statement, session.report
+    if len([op for op in material.ops if op.kind == "stop"]) < STOPS[0] and any(
+        error.span is not None
+        and error.span.source is statement.source
+        and statement.start <= error.span.start < statement.end
+        for error in report.diagnostics
+        if error.severity == "error"
+    ):
+        return  # a stop was refused already
+    span = (session.spans.span(stop) if stop is not None else None) or where.name
+    if material.name in words.GRADIENTS:
+        help = "as in material linear { stop(0, #d33); stop(0.5, #fff); stop(1, #33d); }: 2 to 8, in order"
+        report.error("E0360", message, span, help=help)
+    else:
+        help = "stops stand in the block of material linear or material radial"
+        report.error("E0330", message, span, help=help)
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
-        known = {*words.MATERIALS, *words.TEXTURES}
+        known = {*words.MATERIALS, *words.PAINTS}
         if alias in known:
             return alias
         _unknown(name, place, known)
@@ -518,6 +544,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             ops = (*material.ops, *operations(env))
             material = make(Material, {"name": material.name, "ops": ops, "shading": material.shading})
             session.spans.record(material, where)
+            _check_stops(material, where, session)
         _give(material, span, out, place)
         session.count_parts(1 + len(material.ops), span)
 

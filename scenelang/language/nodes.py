@@ -27,8 +27,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from scenelang.assets.gradient import stops_fault
 from scenelang.language.diagnostics import plural
-from scenelang.language.words import BLEND, RESERVED, Combine
+from scenelang.language.words import BLEND, GRADIENTS, RESERVED, Combine
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
@@ -481,8 +482,20 @@ class Hue(_Turn):
         return cls(angle=math.radians(angle_deg))
 
 
+class Stop(Frozen):
+    """A stop of a gradient: the colour ``rgb`` at ``offset``."""
+
+    kind: Literal["stop"] = "stop"
+    offset: Share
+    rgb: Rgb
+
+    if TYPE_CHECKING:
+
+        def __init__(self, offset: float, rgb: str | tuple[float, float, float]) -> None: ...
+
+
 MaterialOp = Annotated[
-    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue | Stop,
     Field(discriminator="kind"),
 ]
 
@@ -555,7 +568,7 @@ Blend = Annotated[
 class Material(Frozen):
     """A material, with its texture and colour operations in order.
 
-    One of the model that is a texture, or an element's, is lit as its ``shading`` says.
+    One of the model that is a texture, a gradient, or an element's, is lit as its ``shading`` says.
     """
 
     name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
@@ -576,6 +589,22 @@ class Material(Frozen):
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
         return given
+
+    @model_validator(mode="after")
+    def _has_stops(self) -> Self:
+        fault = paint_fault(self)
+        if fault is not None:
+            raise ValueError(fault[1])
+        return self
+
+
+def paint_fault(material: Material) -> tuple[Stop | None, str] | None:
+    """What is wrong with the stops of a material, if anything, and the stop it is wrong with."""
+    stops = [op for op in material.ops if op.kind == "stop"]
+    if material.name not in GRADIENTS:
+        return (stops[0], f"a stop in `{material.name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
 
 
 class Object(Frozen):

@@ -51,6 +51,7 @@ from scenelang.language.nodes import Rotate as Rotate
 from scenelang.language.nodes import Scale as Scale
 from scenelang.language.nodes import SceneNode as SceneNode
 from scenelang.language.nodes import Shear as Shear
+from scenelang.language.nodes import Stop as Stop
 from scenelang.language.nodes import Transform as Transform
 from scenelang.language.nodes import Translate as Translate
 from scenelang.language.nodes import Twirl as Twirl

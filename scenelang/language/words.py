@@ -270,6 +270,13 @@ OPERATIONS: Final = _BOTH | _table(
         "grayscale(${1:1});",
     ),
     _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+    _call(
+        "stop",
+        "offset c:colour",
+        "A stop of a gradient, which has 2 to 8 in order; of equal offsets the edge is hard.",
+        ("where it lies, 0 to 1", "`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`"),
+        "stop(${1:0}, ${2:#d33});",
+    ),
 )
 """Operations in a material's block."""
 
@@ -348,6 +355,12 @@ TEXTURES: Final = (
     *("noise", "plaid", "stripes", "terrazzo", "tiles", "waves", "wood", "zigzag"),
 )
 """Materials that are pictures, in the plane and in space."""
+GRADIENTS: Final = {
+    "linear": "A gradient between `stop`s, over x from −1 to 1.",
+    "radial": "A gradient between `stop`s, over the distance from the origin, 0 to 1.",
+}
+PAINTS: Final = dict.fromkeys(TEXTURES, "A texture, in flat and in solid scenes.") | GRADIENTS
+"""Materials whose colour differs from place to place, in the plane and in space."""
 GEOMETRIES: Final = LEAVES[2] | LEAVES[3]
 MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
 SOLID_TRANSFORMS: Final = "twist", "displace"
@@ -361,7 +374,9 @@ def dimension_of(name: str) -> int | None:
     return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
 
 
-LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS))
+NEWER: Final = frozenset(("stop",))
+"""Words that head a statement unless the scene has something of its own of such a name."""
+LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS)) - NEWER
 """Words that head a statement; no module, material or geometry can have such a name."""
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from scenelang.assets.gradient import HARD
 from scenelang.assets.records import Record
 from scenelang.compiler.groups import INTERSECT, SUBTRACT
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
@@ -30,6 +31,7 @@ _CONSTANTS: Final = {
     "LIFT": LIFT,
     "AMBIENT_EVEN": AMBIENT[0],
     "AMBIENT_UP": AMBIENT[1],
+    "HARD": HARD,
 }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
@@ -45,6 +46,8 @@ def sample_points(
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
     """Colours (M, 3) of a look with an element at its own coordinates (d, M), linear if ``light``."""
     assert look.element is not None
+    if isinstance(look.element, Gradient):  # whose stops are in the space that colours are averaged in
+        return _stepped(_graded(look.element, *q), look.colours)
     values = _values(look.element, light)
     if values.ndim == 4:
         places = [(np.clip(x, -1, 1) + 1) / 2 * (len(values) - 1) for x in q]
@@ -52,6 +55,22 @@ def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
         (u, v), (high, wide) = q, values.shape[:2]
         places = [(1 - v) / 2 * high - 0.5, (u + 1) / 2 * wide - 0.5]
     return _stepped(_mixed(values, places), look.colours)
+
+
+def along(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Offsets (M,) of points (u, v) on a gradient."""
+    return np.asarray((u + 1) / 2 if gradient.name == "linear" else np.hypot(u, v))
+
+
+def _graded(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Colours (M, 3) of a gradient at points (u, v), before operations."""
+    offsets, colours = np.split(np.array(gradient.stops, np.float64), [1], 1)
+    s = along(gradient, u, v)
+    after = np.searchsorted(offsets[:, 0], s, "right")  # of equal offsets the last has been passed
+    a, b = np.maximum(after - 1, 0), np.minimum(after, len(offsets) - 1)
+    gap = (offsets[b] - offsets[a])[:, 0]
+    share = np.where(gap > 0, (s - offsets[a, 0]) / np.where(gap > 0, gap, 1), 0.0)[:, None]
+    return np.asarray(colours[a] * (1 - share) + colours[b] * share)
 
 
 @lru_cache(maxsize=16)

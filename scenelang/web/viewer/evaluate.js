@@ -192,6 +192,7 @@ const INKS = {
   color: ([rgb]) => ["color", ...numbersOf(rgb, 3)],
   grayscale: ([amount]) => ["grayscale", bare(amount)],
   hue: ([angle]) => ["hue", radians(angle) / (2 * Math.PI)],
+  stop: ([offset, rgb]) => ["stop", bare(offset), ...numbersOf(rgb, 3)],
 };
 
 const STATEMENTS_OF_FORMS = {

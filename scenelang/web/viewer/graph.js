@@ -141,6 +141,7 @@ function rowData({ token, leaf, k }, { dimension }) {
     paint: look.paint,
     place: look.place,
     paintSteps: look.paintSteps,
+    stops: look.stops,
     amount: bump?.amount ?? 0,
     frequency: bump?.frequency ?? 0,
     blend: k,

@@ -108,10 +108,24 @@ vec3 turned(vec3 rgb, float turns) {
   return value - chroma + chroma * clamp(shares, 0.0, 1.0);
 }
 
-/** The colour of a picture, which repeats, at leaf coordinates. */
-vec3 painted(vec2 q, int at) {
-  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
-  vec2 spot = fract(vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z)) * about.xy - 0.5;
+/** The colour of a gradient between stops at (u, v). */
+vec3 graded(vec2 spot, int at, int count, bool straight) {
+  float s = straight ? 0.5 * spot.x + 0.5 : length(spot);
+  vec4 before = texel(rows, at);
+  vec3 rgb = before.yzw;
+  for (int i = 1; i < count; i++) {
+    vec4 next = texel(rows, at + i);
+    float over = next.x - before.x;
+    rgb = mix(rgb, next.yzw, over > HARD ? clamp((s - before.x) / over, 0.0, 1.0) : step(next.x, s));
+    before = next;
+  }
+  SPEND(8 * count);
+  return rgb;
+}
+
+/** The colour of a picture, which repeats, at coordinates in it. */
+vec3 pictured(vec2 spot, vec4 about) {
+  spot = fract(spot) * about.xy - 0.5;
   ivec2 corner = ivec2(floor(spot)), sides = ivec2(about.xy);
   vec2 share = spot - vec2(corner);
   int first = int(about.z);
@@ -119,10 +133,19 @@ vec3 painted(vec2 q, int at) {
                    dot_of_picture(first, corner + ivec2(1, 0), sides), share.x);
   vec3 below = mix(dot_of_picture(first, corner + ivec2(0, 1), sides),
                    dot_of_picture(first, corner + ivec2(1, 1), sides), share.x);
-  vec3 rgb = mix(above, below, share.y);
   SPEND(20);
+  return mix(above, below, share.y);
+}
+
+/** The colour of a picture or a gradient at leaf coordinates. */
+vec3 painted(vec2 q, int at) {
+  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
+  vec2 spot = vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z);
+  bool picture = about.x > 0.0;
+  vec3 rgb = picture ? pictured(spot, about) : graded(spot, at + 3, int(about.y), about.x > -1.5);
+  at += picture ? 3 : 3 + int(about.y);
   for (int i = 0; i < int(about.w); i++) {
-    vec4 op = texel(rows, at + 3 + i);
+    vec4 op = texel(rows, at + i);
     if (op.x == COLOR) rgb *= op.yzw;
     else if (op.x == GRAYSCALE) rgb += op.y * (dot(LUMA, rgb) - rgb);
     else rgb = turned(rgb, op.y);

@@ -89,10 +89,16 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     for (const step of steps) numbers.push(...texelsOf(step));
     if (paint < 0) return;
     const [a, b, u, c, d, v] = row.place; // to shares of the picture's sides, from its upper left corner
-    numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
-    numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
-    const picture = pictures[paint];
-    numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    if (row.stops) {
+      numbers.push(a, b, u, 0, c, d, v, 0);
+      numbers.push(pictures[paint].kind === "linear" ? -1 : -2, row.stops.length, 0, row.paintSteps.length);
+      numbers.push(...row.stops.flat());
+    } else {
+      numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
+      numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
+      const picture = pictures[paint];
+      numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    }
     for (const [name, ...amounts] of row.paintSteps) {
       numbers.push(network.paintSteps.indexOf(name), ...amounts, ...Array(3 - amounts.length).fill(0));
     }
@@ -148,7 +154,7 @@ export function planeDrawer(gl, view) {
   const kinds = [];
   const grids = view.shapes.slice(network.decoders.length);
   const [nodes, ofGrid] = joined(grids.map(distances), Float32Array);
-  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels), Uint8Array);
+  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
     ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
     ...grids.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest, first: ofGrid[i] })),

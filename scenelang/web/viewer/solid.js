@@ -45,6 +45,7 @@ function tableOf(view, rows, joins, balls, elements) {
       : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
     const ops = (paint ? row.paintSteps : []).map(([kind, a, b = 0, c = 0]) => [COLOUR_STEPS[kind], a, b, c]);
+    const stops = row.stops ?? [];
     const [a, b, u, c, d, v] = row.place ?? [0, 0, 0, 0, 0, 0], grid = elements.grids[row.shape];
     const turn = (x) => x - Math.floor(x);
     blocks[i].set([
@@ -55,10 +56,11 @@ function tableOf(view, rows, joins, balls, elements) {
       ...box[0], ball * ball,
       ...box[1], rate,
       ...plainColour(view, row), material.medium,
-      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, places.get(joins[i].around),
-      // to shares of the picture's sides, from its upper left corner
-      a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
-      -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      paint ? paint.kind : 0, more([...stops, ...ops]), ops.length, places.get(joins[i].around),
+      // to (u, v), or to shares of the picture's sides, from its upper left corner
+      ...(row.stops ? [a, b, u, 0, c, d, v, stops.length] : [
+        a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0, -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      ]),
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
     ]);
   });
