@@ -28,6 +28,7 @@ from scenelang.language.words import (
     ANIMATED,
     FUNCTIONS,
     LANGUAGE,
+    NEWER,
     OPERATIONS,
     SETTINGS,
     SOLID_TRANSFORMS,
@@ -369,7 +370,7 @@ class Writer:
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             return None if name == "canvas" else [name, *args]
-        if name in LANGUAGE:
+        if name in LANGUAGE or (name in NEWER and not worn and (bound is None or bound.kind != "module")):
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
         if bound is None:
