@@ -27,7 +27,7 @@ from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.spaces import Stage
-from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.neural.frames import Frames, read_skins
 from scenelang.drawing.solid.passes import read_solid_frame
 
 MODULES: Final = (
@@ -167,7 +167,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     else:
         scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
-    rows = []
+    rows, skins = [], read_skins(parts)
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
         row = {
             "token": int(program.tokens[i]),
@@ -182,6 +182,8 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "blend": widths[i],
             "object": program.numbers[i],
         }
+        if skins is not None:
+            row["skin"] = [float(number) for number in skins.at(i)]
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()
         if worn >= 0:
