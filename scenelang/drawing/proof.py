@@ -40,7 +40,7 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import lift_many
 from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
-from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
 from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
@@ -103,7 +103,7 @@ def _seen(steps: Sequence[Step], far: float) -> float:
         if isinstance(step, Affine):
             _, back, moved = _sizes(step)
             size = back @ (size + moved)
-        else:
+        elif isinstance(step, Warp):
             size[:] = np.hypot(*size)
     return float(np.hypot(*size))
 
@@ -330,7 +330,13 @@ class Stream:
         raw = np.array([TOKENS[row.op] for row in rows], np.intp)
         widths = widths_of(raw, np.array([row.k for row in rows]))
         seen = felt(groups, widths)
-        reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
+        skins = [Skin.of(leaf.steps) for leaf in self._leaves]
+        beyond = 1.0 + seen.total / self.frames.scale + [skin.reach for skin in skins]
+        reach = np.where(seen.everywhere | anchored(groups), np.inf, beyond)
+        behind = [skin.grow * (skin.order & 1) for skin in skins]
+        # of each object how far it grows before it is a shell, half of that, and how far it grows behind it
+        self._skins = np.array([[skin.grow for skin in skins], [skin.shell / 2 for skin in skins], behind])
+        self._skins[0] -= self._skins[2]
         objects, far = placed_leaves(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
         written = {leaf.number: Written(leaf.look, steps) for leaf, steps, _ in objects}
         leaves = [written[leaf.number] for leaf in self._leaves]
@@ -379,7 +385,9 @@ class Stream:
             else:
                 result = self._known[name].exact(p)
             low[some], high[some] = result
-        return Interval(low, high)
+        return (
+            _worn(Interval(low, high), *self._skins[:, which]) if self._skins.any() else Interval(low, high)
+        )
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
         """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
@@ -395,6 +403,14 @@ class Stream:
                     off[np.any([abs(s - edge) <= torn for edge in look.element.edges or (np.inf,)], 0)] = 1.0
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
         return Interval(low, high)
+
+
+def _worn(d: Interval, first: Floats, wall: Floats, last: Floats) -> Interval:
+    """Intervals of ``|d - first| - wall - last``, or of ``d - first - last`` where there is no wall."""
+    low, high = d.low - first, d.high - first
+    nearest = np.maximum(np.maximum(low, -high), 0.0)
+    low, high = _chosen(wall > 0.0, (nearest, np.maximum(-low, high)), (low, high))
+    return Interval(low - (wall + last), high - (wall + last))
 
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel

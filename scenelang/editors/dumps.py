@@ -28,7 +28,7 @@ from scenelang.compiler.spaces import (
     encoded,
     stage_data,
 )
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Twist, Warp
 from scenelang.language import scene as schema
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Span, plural
@@ -132,6 +132,10 @@ def move_text(move: Move, space: Space) -> str:
         return f"twist({step.twist:.6g})"
     if isinstance(step, Displace):
         return f"displace({step.amount:.6g}; {step.frequency:.6g})"
+    if isinstance(step, Grow):
+        return f"grow({step.r:.6g})"
+    if isinstance(step, Shell):
+        return f"shell({step.w:.6g})"
     if step.rows == IDENTITY:
         return "[identity]"
     rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)

@@ -255,8 +255,10 @@ class Names:
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
         role: Role | None = None
-        own = scope.find(name) if name in STAGE else None
-        if name in SETTINGS and (own is None or (own.kind != "module" and stmt.args is not None)):
+        own = scope.find(name) if name in STAGE or name in NEWER else None
+        if own is not None and (own.kind == "module" or stmt.args is None):
+            role = None
+        elif name in SETTINGS:
             role = "setting"
         elif name in NEWER and kind != "material" and scope.find(name) is not None:
             pass

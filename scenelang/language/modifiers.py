@@ -102,6 +102,22 @@ def _factor(value: Any, operand: int) -> float:
     return factor
 
 
+def _growth(value: Any, operand: int) -> float:
+    growth = number(value, operand)
+    if not -0.5 <= growth <= 1.0:
+        help = "r is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a growth of {show(growth)} is outside -0.5..1", help, operand)
+    return growth
+
+
+def _wall(value: Any, operand: int) -> float:
+    wall = number(value, operand)
+    if not 0.0 < wall <= 1.0:
+        help = "w is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a wall of {show(wall)} is not above 0 and at most 1", help, operand)
+    return wall
+
+
 def _axis(value: Any, operand: int) -> tuple[float, ...]:
     axis = vector(value, 3, operand, "an axis")
     if not any(axis):
@@ -133,6 +149,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
     "factor": _factor,
+    "growth": _growth,
+    "wall": _wall,
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,

@@ -427,8 +427,30 @@ class Displace(Frozen):
         def __init__(self, amount: float, frequency: float) -> None: ...
 
 
+class Grow(Frozen):
+    """Takes ``r`` off the leaf's own distance, so that its edge moves out by it; first, before any move."""
+
+    kind: Literal["grow"] = "grow"
+    r: Annotated[Finite, Field(ge=-0.5, le=1, description="leaf units; below 0 the leaf shrinks")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, r: float) -> None: ...
+
+
+class Shell(Frozen):
+    """Keeps what is within ``w`` / 2 of the leaf's edge; first, before any move."""
+
+    kind: Literal["shell"] = "shell"
+    w: Annotated[Finite, Field(gt=0, le=1, description="leaf units; half on either side of the edge")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, w: float) -> None: ...
+
+
 Transform = Annotated[
-    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
+    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace | Grow | Shell,
     Field(discriminator="kind"),
 ]
 Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]

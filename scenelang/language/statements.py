@@ -433,7 +433,9 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
     if name in words.SETTINGS and not hides(binding, stmt):
         return prepare_setting(stmt, place)
-    if name in words.LANGUAGE or (name in words.NEWER and (binding is None or place.kind == "material")):
+    if name in words.LANGUAGE or (
+        name in words.NEWER and (place.kind == "material" or not hides(binding, stmt))
+    ):
         return prepare_move(stmt, place)
     if binding is None:
         if name in words.GEOMETRIES:

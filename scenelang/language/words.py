@@ -252,6 +252,22 @@ TRANSFORMS: Final = _BOTH | _table(
         ("how far", "f, radians per unit length"),
         "displace(${1:0.1}, ${2:8});",
     ),
+    _call(
+        "grow",
+        "r:growth",
+        "Takes r off the leaf's distance: its edge moves out, round about corners, or in; first in its "
+        "block, once.",
+        ("leaf units, −0.5 to 1",),
+        "grow(${1:0.1});",
+    ),
+    _call(
+        "shell",
+        "w:wall",
+        "Keeps a wall about the leaf's edge, half on either side: a 2D outline, a hollow body; first in its "
+        "block, once.",
+        ("how thick the wall is, leaf units, above 0, at most 1",),
+        "shell(${1:0.1});",
+    ),
 )
 OPERATIONS: Final = _BOTH | _table(
     _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
@@ -365,6 +381,10 @@ GEOMETRIES: Final = LEAVES[2] | LEAVES[3]
 MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
 SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
+OWN_TRANSFORMS: Final = "grow", "shell", "displace"
+"""Transforms of a leaf's own distance, which stand first in its block, each at most once."""
+NEWER: Final = frozenset(("grow", "shell", "stop"))
+"""Words that head a statement unless a scene's own module has their name."""
 SCENES: Final = {2: "flat", 3: "solid"}
 """Names for scenes of a dimension."""
 
@@ -374,8 +394,6 @@ def dimension_of(name: str) -> int | None:
     return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
 
 
-NEWER: Final = frozenset(("stop",))
-"""Words that head a statement unless the scene has something of its own of such a name."""
 LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS)) - NEWER
 """Words that head a statement; no module, material or geometry can have such a name."""
 

@@ -27,7 +27,7 @@ from scenelang.compiler.groups import OPERATOR, widths_of
 from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.neural.frames import Frames, read_skins
 from scenelang.drawing.solid.passes import read_solid_frame
 
 MODULES: Final = (
@@ -176,7 +176,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     else:
         scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
-    rows = []
+    rows, skins = [], read_skins(parts)
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
         row = {
             "token": int(program.tokens[i]),
@@ -191,6 +191,8 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "blend": widths[i],
             "object": program.numbers[i],
         }
+        if skins is not None:
+            row["skin"] = [float(number) for number in skins.at(i)]
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()
         if worn >= 0:

@@ -384,7 +384,8 @@ class Writer:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             word = (name,) if name == "animate" else ("set", name)
             return None if name == "canvas" else [*word, *args]
-        if name in LANGUAGE or (name in NEWER and (bound is None or kind == "material")):
+        hidden = worn or (bound is not None and bound.kind == "module")
+        if name in LANGUAGE or (name in NEWER and (kind == "material" or not hidden)):
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
         if bound is None:

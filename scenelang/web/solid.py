@@ -17,7 +17,7 @@ from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, 
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
-from scenelang.drawing.solid.passes import SLACK
+from scenelang.drawing.solid.passes import LOOSE, SLACK
 from scenelang.web.arrays import Store, web
 
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
@@ -61,6 +61,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
             "geometries": len(decoders),
             "blend": BLEND,
             "slack": SLACK,
+            "loose": LOOSE,
             "far": RADIUS,
             "products": width * (width + 4) + 2 * (1 + paint + kind),
         },

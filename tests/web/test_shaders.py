@@ -314,6 +314,15 @@ CORNERS = {
             intersect sphere { scale(1.1); translate(0.1, 0, 0); }
         }
         """,
+    "skins": """
+        canvas(64, 48);
+        chain {
+            sphere { shell(0.3); displace(0.05, 7); scale(0.7); translate(-0.7, 0, 0); }
+            subtract sphere { grow(-0.2); scale(0.8); translate(-0.7, 0.5, 0.5); }
+            torus { displace(0.04, 8); shell(0.2); grow(0.05); twist(0.5); scale(0.5); translate(0.7, 0.1, 0);
+                material volumetric { color(#8af); } }
+        }
+        """,
 }
 
 

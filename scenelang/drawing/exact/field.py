@@ -22,7 +22,7 @@ from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
-from scenelang.compiler.steps import Affine, Step, Warp
+from scenelang.compiler.steps import Affine, Grow, Own, Shell, Step, Warp
 from scenelang.drawing.image import decoded
 from scenelang.language.words import BLEND, TOKENS
 
@@ -132,6 +132,20 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
     return GEOMETRIES[geometry].distance(p)
 
 
+def worn(steps: Sequence[Step], d: Array, p: Array) -> Array:
+    """A leaf's own distances (M,) at its own points (d, M), behind those of its steps that change them."""
+    for step in steps:
+        if not isinstance(step, Own):
+            break
+        if isinstance(step, Grow):
+            d = d - step.r
+        elif isinstance(step, Shell):
+            d = abs(d) - step.w / 2
+        else:
+            d = d + step.amount * reduce(mul, [np.sin(step.frequency * x) for x in p])
+    return d
+
+
 def fold(
     distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
 ) -> Iterator[tuple[Array, Array]]:
@@ -236,7 +250,7 @@ def evaluate(
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         q = carry_back(steps, p)
-        d = leaf_distance(node.geometry, q, brought) * distance_scale(steps, len(p))
+        d = worn(steps, leaf_distance(node.geometry, q, brought), q) * distance_scale(steps, len(p))
         if node.look.element is not None and not owners:
             return d, colour_at(node.look, carry_back(node.look.texture, q[: node.look.element.dimension]))
         paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
@@ -312,7 +326,8 @@ def within(
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         q, spread = _carried(steps, centre, radius)
-        low = float(leaf_distance(node.geometry, q, brought)[0] - spread) * distance_scale(steps)
+        d = worn(steps, leaf_distance(node.geometry, q, brought), q)
+        low = float(d[0] - spread) * distance_scale(steps)
         return (-inf if isnan(low) else low), node
     last = max((index for index, link in enumerate(node.links) if link.width), default=-1)
     low = inf

@@ -18,7 +18,7 @@ from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, r
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
-from scenelang.drawing.neural.frames import FAR, Frames
+from scenelang.drawing.neural.frames import FAR, Frames, read_skins
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, Floats, FramedNetwork, Slopes
 
@@ -91,6 +91,7 @@ class Field:
         self.frames = Frames(vectors[:, : layout.geometry], layout)
         cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
         self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
+        self.skins = read_skins(self.parts)
         with self.xp.inference():
             self.slope = float(self.xp.exp(network.read_slope)) / 4
             self.unit = float(np.linalg.norm(self.xp.to_numpy(network.cell_weights()[2][UNION, 0])))
@@ -126,6 +127,8 @@ class Field:
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
+        if self.skins is not None:
+            beyond = beyond + self.skins.reach
         # in a block a row may hide all before it in its group, and be out of reach in a part of the block
         self.reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + SLACK + beyond)
         operators = [*self.tokens.tolist(), *groups.joins.tolist()]
@@ -220,6 +223,8 @@ class Field:
             for feature, values in zip(result, one, strict=True):
                 xp.put(feature, xp.array(index, q), values)
         assert result is not None
+        if self.skins is not None:
+            result = self.skins.at(objects).placed(xp, q).put_on(xp, result)
         scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
         result = result.swapaxes(0, 1) * scale
         return result.clip(-FAR, FAR) if self.frames.wild[objects].any() else result

@@ -185,6 +185,8 @@ function stepOf(name, values) {
   const [a, b] = values.map(bare);
   if (name === "twirl") return { twirl: a, x: 0, y: 0 };
   if (name === "bend") return { twirl: 0, x: a, y: 0 };
+  if (name === "grow") return a >= -0.5 && a <= 1 ? { grow: a } : refuse(`a growth of ${a}`);
+  if (name === "shell") return a > 0 && a <= 1 ? { shell: a } : refuse(`a wall of ${a}`);
   return name === "twist" ? { twist: a } : { amount: a, frequency: b };
 }
 

@@ -2,7 +2,7 @@
 // take four samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
 // decoders.
 
-uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture; of groups
+uniform sampler2D rows; // of each object: some texels, its steps, the place and the steps of its picture; of groups
 uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one
 uniform sampler2D nodes; // distances of elements
 uniform sampler2D texels; // of pictures
@@ -32,6 +32,11 @@ const float NEAR = 0.85; // pixels: farther from an outline a pixel has one colo
 const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change across the pixel
 const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
 const int BLENDS = 8, EVERYWHERE = 16, HIDES = 32; // flags of rows, over kinds of joins; as in plane.js
+#ifdef SKINS
+const int BODY = 5; // texels of a row before its steps, the last for its skin
+#else
+const int BODY = 4;
+#endif
 const int END = 1 << 24; // behind all texels
 const vec2 OFFSETS[5] =
     vec2[](vec2(0), vec2(-0.25, -0.25), vec2(0.25, -0.25), vec2(-0.25, 0.25), vec2(0.25, 0.25));
@@ -278,7 +283,7 @@ void meet(vec2 p, ivec2 span) {
       // no decoder where the leaf is proved so far away that nothing changes
       vec4 b = texel(rows, at + 1);
       room = gap;
-      vec2 q = local(p, at + 4, steps, room);
+      vec2 q = local(p, at + BODY, steps, room);
       room *= scale;
       float radius = length(q);
       float least = own.a * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
@@ -298,6 +303,11 @@ void meet(vec2 p, ivec2 span) {
         distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
 #else
         distance = learned(int(c.x), q);
+#endif
+#ifdef SKINS
+        vec4 skin = texel(rows, at + 4);
+        distance -= skin.x;
+        distance = (skin.y > 0.0 ? abs(distance) - skin.y : distance) - skin.z;
 #endif
         distance *= scale;
       }
@@ -325,7 +335,7 @@ void meet(vec2 p, ivec2 span) {
       int count = middle ? 4 : 1;
       for (int k = 0; k < count; k++) {
         vec2 spot = middle ? p + px * OFFSETS[k + 1] : p;
-        own.rgb += painted(local(spot, at + 4, steps, room), at + int(c.z)) / float(count);
+        own.rgb += painted(local(spot, at + BODY, steps, room), at + int(c.z)) / float(count);
       }
     }
 #endif

@@ -6,7 +6,7 @@ import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
 import { axesOf } from "./stage.js";
 
-const ROW_TEXELS = 13; // as the shader has it
+const ROW_TEXELS = 14; // as the shader has it
 const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around the light
@@ -62,6 +62,7 @@ function tableOf(view, rows, joins, balls, elements) {
         a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0, -c / 2, -d / 2, turn((1 - v) / 2), 0,
       ]),
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
+      ...(row.skin ?? [0, 0, 0, 0]),
     ]);
   });
   const data = new Float32Array(blocks.length * 4 * ROW_TEXELS);
@@ -89,6 +90,7 @@ function featuresOf(view, rows, joins, balls) {
     TURNS: balls.some((ball) => ball.rest.length > 0),
     FAR: balls.some((ball) => ball.radius > view.network.far),
     BUMPS: has((row) => row.amount !== 0),
+    SKINS: has((row) => row.skin?.some(Boolean)),
     OTHERS: joins.some(({ draws }) => !draws),
   }).filter(([, holds]) => holds).map(([name]) => name);
   return [...learned, ...others];
