@@ -163,6 +163,15 @@ PLAIN_SETTINGS: Final = _table(
         head="animate(seconds, fps, loop = true)",
     ),
 )
+SAMPLING: Final = _table(
+    _call(
+        "samples",
+        "n:samples",
+        "How many samples a pixel is the mean of, 4 or 16, 4 without it. `--samples` overrides it.",
+        ("4 or 16, on a regular grid",),
+        "samples(${1|16,4|});",
+    ),
+)
 STAGE: Final = _table(
     _call(
         "camera",
@@ -187,7 +196,7 @@ STAGE: Final = _table(
     ),
 )
 """Settings of 3D scenes; a scene's own module of such a name hides them."""
-SETTINGS: Final = PLAIN_SETTINGS | STAGE
+SETTINGS: Final = PLAIN_SETTINGS | SAMPLING | STAGE
 _BOTH: Final = _table(
     _call(
         "translate",
@@ -253,23 +262,37 @@ TRANSFORMS: Final = _BOTH | _table(
         "displace(${1:0.1}, ${2:8});",
     ),
 )
-OPERATIONS: Final = _BOTH | _table(
-    _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
+PROPERTIES: Final = _table(
     _call(
-        "color",
-        "c:colour",
-        "Multiplies the material's colour.",
-        ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
-        "color(${1:#d33});",
+        "opacity",
+        "a:share",
+        "2D: how much of what lies behind an object it hides; anywhere in the block, and once.",
+        ("0 shows all of it, 1 none",),
+        "opacity(${1:0.5});",
     ),
-    _call(
-        "grayscale",
-        "a",
-        "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
-        ("0 keeps the colour, 1 is grey",),
-        "grayscale(${1:1});",
-    ),
-    _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+)
+"""Properties of a material: they stand in its block, in no order with its operations."""
+OPERATIONS: Final = (
+    _BOTH
+    | PROPERTIES
+    | _table(
+        _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
+        _call(
+            "color",
+            "c:colour",
+            "Multiplies the material's colour.",
+            ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
+            "color(${1:#d33});",
+        ),
+        _call(
+            "grayscale",
+            "a",
+            "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
+            ("0 keeps the colour, 1 is grey",),
+            "grayscale(${1:1});",
+        ),
+        _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+    )
 )
 """Operations in a material's block."""
 
@@ -361,7 +384,9 @@ def dimension_of(name: str) -> int | None:
     return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
 
 
-LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS))
+NEWER: Final = frozenset((*STAGE, *SAMPLING, *PROPERTIES))
+"""Words that head a statement unless a scene's own module has the name."""
+LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS)) - NEWER
 """Words that head a statement; no module, material or geometry can have such a name."""
 
 
