@@ -58,12 +58,17 @@ function fewerInks(steps) {
 
 /**
  * What a row says of a material.
- * @param {Wearing} worn - its `ops` are maps {rows} and colour steps
+ * @param {Wearing} worn - its `ops` are maps {rows}, colour steps and opacities, of which the last one counts
  */
 export function lookOf(worn, form) {
   let moved = IDENTITY;
+  let opacity = 1;
   const steps = [];
   for (const op of worn.ops) {
+    if (op[0] === "opacity") {
+      opacity = op[1];
+      continue;
+    }
     if (Array.isArray(op)) {
       steps.push(form.dimension === 3 && op[0] === "color" ? ["color", ...linearColour(op.slice(1))] : op);
       continue;
@@ -75,7 +80,8 @@ export function lookOf(worn, form) {
     if (rows !== null) moved = composedMap(rows, moved);
   }
   if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
-  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1] };
+  if (opacity !== 1 && form.dimension === 3) refuse("in space nothing but mist is translucent");
+  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity };
   if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
   const paintSteps = fewerInks(steps);
   if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");

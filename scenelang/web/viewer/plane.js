@@ -82,7 +82,7 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    numbers.push(scale, narrow(joins[i]), flagsOf(joins[i]), steps.length);
+    numbers.push(scale, narrow(joins[i]), flagsOf(joins[i], row), steps.length + (1 - row.opacity) / 2);
     numbers.push(...bounds, Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0);
     numbers.push(...colour, Math.min(far, 1) * scale);
@@ -107,13 +107,15 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
 }
 
 /** How a row joins, as plane.glsl has it. */
-function flagsOf(join) {
+function flagsOf(join, row) {
   const far = join.always || (join.seen.hidden && join.operator < 2);
-  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join);
+  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join, row);
 }
 
 /** Whether nothing is seen of what was before, where a row is solid. */
-const hides = ({ operator, around, seen }) => operator === 0 && around === null && !seen.blends;
+const hides = ({ operator, around, seen }, { opacity }) => (
+  operator === 0 && around === null && !seen.blends && opacity === 1
+);
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
 function listed({ starts, objects }, begins) {
@@ -143,6 +145,7 @@ export function planeDrawer(gl, view) {
   const programs = new Map(); // by what they were compiled for
   const shapes = new Set(); // seen so far
   let depth = 0; // of groups, likewise
+  let clear = false; // whether something was not opaque
   const textures = ["rows", "lists", "nodes", "texels", "points"];
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
@@ -166,8 +169,10 @@ export function planeDrawer(gl, view) {
   function compiled(program, joins, define) {
     for (const { shape } of program.rows) shapes.add(shape);
     depth = Math.max(depth, groupsOf(joins).depth);
+    clear ||= program.rows.some(({ opacity }) => opacity < 1);
     const used = [...shapes].sort((a, b) => a - b);
-    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : []), ...(define ? [define] : [])];
+    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : []), ...(clear ? ["CLEAR"] : [])];
+    if (define) defines.push(define);
     const key = [...defines, ...used].join();
     if (!programs.has(key)) {
       const found = linked(gl, fragmentText(view, used, defines));
@@ -185,7 +190,7 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const reach = reaches(program.rows, joins, network);
     const widest = program.rows.reduce((most, { blend }) => Math.max(most, blend), network.blend);
-    const inner = program.rows.map(({ shape }, i) => (hides(joins[i]) ? leaves[shape].inner : 0));
+    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? leaves[row.shape].inner : 0));
     const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
@@ -204,7 +209,8 @@ export function planeDrawer(gl, view) {
     gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
     gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
     gl.uniform1f(place("widest"), widest);
-    gl.uniform1i(place("most"), 5);
+    gl.uniform1i(place("most"), 1 + program.samples);
+    gl.uniform1f(place("corner"), program.samples > 4 ? 0.54 : 0.36);
     gl.uniform1i(place("tile"), lists.tile);
     gl.uniform1i(place("across"), lists.across);
     gl.viewport(0, 0, width, height);

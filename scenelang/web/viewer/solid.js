@@ -187,6 +187,7 @@ export function solidDrawer(gl, view) {
       gl.uniform1i(at(name), unit);
     });
     gl.uniform1i(at("zero"), 0);
+    gl.uniform1i(at("along"), Math.sqrt(ready.program.samples));
     const vectors = {
       eye: stage.eye, forward: stage.axes[0].map((v) => v * ready.near),
       right: stage.axes[1], up: stage.axes[2],
@@ -216,7 +217,7 @@ export function solidDrawer(gl, view) {
     }
   }
 
-  /** One sample of each pixel, then four where these differ. */
+  /** One sample of each pixel, then all where these differ. */
   function* render(into, format, names) {
     const { width, height } = ready;
     if (!first || first.width !== width || first.height !== height || first.format !== format) {
