@@ -148,7 +148,7 @@ def lower(
         memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = WHITE if scene.background == "default" else scene.background
-    return Graph(root, scene.canvas, background, space, stage, brought.geometries)
+    return Graph(root, scene.canvas, background, space, stage, brought.geometries, scene.samples)
 
 
 def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics) -> None:
@@ -165,6 +165,9 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
     if manifest.white and scene.background not in (WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
+    if scene.samples != 4 and manifest.lifting != "exact":
+        help = "leave `samples` out, or draw with another model"
+        diagnostics.add("E0381", f"{model} takes four samples of a pixel and no others", place, help=help)
 
 
 Composite = Scene | schema.Group | schema.Boolean | schema.Chain
@@ -330,7 +333,14 @@ class _Lowering:
         colours = colour_steps(map(self.space.inked, material.ops))
         if len(normal(colours)) > MOST_STEPS and element is not None:
             self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
-        look = self.looks[id(material)] = Look(shading, colours, element=element, texture=moves)
+        if material.opacity != 1.0 and not manifest.translucent:
+            fact = f"model `{manifest.name}` has no `opacity`"
+            flat = "leave it out, or draw with another model"
+            help = flat if self.space.dimension == 2 else "in space mist is translucent: material volumetric"
+            self.say("E0380", fact, material, help)
+        look = self.looks[id(material)] = Look(
+            shading, colours, element=element, texture=moves, opacity=material.opacity
+        )
         return look
 
     def gradient(self, material: schema.Material) -> Gradient | None:

@@ -399,7 +399,7 @@ def check_seen(graph: Graph, context: Context) -> Graph:
         _say(context, fact, cut, "let what is cut reach out of what cuts it, or what intersects meet")
     elif not seen:
         _say(context, *_unseen(graph, rows[0].leaf))
-    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.element is None:
+    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.plain:
         cover = cover_of(last, graph.space)
         if cover is not None and covered(graph.window(), [cover]):
             fact = f"this `{last.geometry}` covers the whole canvas: the picture has one colour"

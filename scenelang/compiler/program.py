@@ -7,8 +7,8 @@ end column), all -1 where unknown, ``numbers`` I32 (N,) unless 1 to N. With elem
 header lists them, ``forms`` I32 (N,) has the index of each row's geometry, and ``element.0`` and so on are
 their bytes. Where some are materials it is format 3, with a table of paints (`Paint`) and ``worn`` I32 (N,),
 the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
-where the others would; with anything that needs one of the places `OTHERS` of its vectors format 5, likewise,
-and with gradients, whose ``stops`` F32 (S, 5) lie beside the paints.
+where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
+places `OTHERS` of vectors, or ``samples`` other than 4, which the header then has, it is format 5.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
 from scenelang.compiler.manifest import ALIASES, available, load_manifest
 from scenelang.compiler.spaces import Stage, read_stage, stage_data
 from scenelang.language.diagnostics import plural
+from scenelang.language.nodes import SAMPLES
 from scenelang.language.words import TOKENS
 
 GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
@@ -168,6 +169,7 @@ class Program:
         forms: int32 (N,), index of a row's element, -1 for a geometry of the model. None stands for all -1.
         palette: paints of the rows.
         worn: int32 (N,), index of a row's paint, -1 for the colour of its vector. None stands for all -1.
+        samples: of a pixel, 4 or 16 on a regular grid.
 
     Raises:
         ProgramError: anything is not as above.
@@ -188,6 +190,7 @@ class Program:
     forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
     palette: tuple[Paint, ...] = field(default=(), repr=False)
     worn: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+    samples: int = 4
 
     def __post_init__(self) -> None:
         count = len(self.objects)
@@ -232,6 +235,8 @@ class Program:
                 *settings,
                 *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
             )
+        if self.samples != 4:
+            settings = (*settings, "samples", self.samples)
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
@@ -259,9 +264,9 @@ class Program:
 
     @property
     def newest(self) -> bool:
-        """True where it has what files of format 5 alone have: gradients, or numbers in `OTHERS`."""
+        """True where it has what files of format 5 alone have: gradients, other samples, `OTHERS`."""
         layout = self._layout()
-        if layout is not None and self.vectors[:, layout.others].any():
+        if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
             return True
         return any(isinstance(paint.element, Gradient) for paint in self.palette)
 
@@ -326,6 +331,8 @@ def program_bytes(program: Program) -> bytes:
         header["format"] = NEWEST
     elif program.extended:
         header["format"] = GROUPED
+    if program.samples != 4:
+        header["samples"] = program.samples
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -378,6 +385,8 @@ def _check_settings(program: Program) -> None:
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
     if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
         raise ProgramError(fault)
+    if type(program.samples) is not int or program.samples not in SAMPLES:
+        raise ProgramError(f"{program.samples!r} samples of a pixel, where 4 and 16 are allowed")
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
@@ -440,7 +449,8 @@ def parse_program(data: bytes) -> Program:
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
-    if header.keys() - {"stage", "elements"} != _HEADER.keys() or not all(
+    newer = {"samples"} if header["format"] == NEWEST else set()
+    if header.keys() - {"stage", "elements", *newer} != _HEADER.keys() or not all(
         isinstance(header[k], _HEADER[k]) for k in _HEADER
     ):
         raise ProgramError("the header has missing, unknown or damaged fields")
@@ -474,6 +484,7 @@ def parse_program(data: bytes) -> Program:
         forms=tensors.get("forms"),
         palette=palette,
         worn=tensors.get("worn"),
+        samples=header.get("samples", 4),
     )
 
 

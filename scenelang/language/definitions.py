@@ -10,16 +10,7 @@ from typing import Any, Final, Literal
 from scenelang.assets.records import Record
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, SourceFile, Span, removal
-from scenelang.language.words import (
-    ANIMATED,
-    CONSTANTS,
-    FUNCTIONS,
-    NEWER,
-    OPERATIONS,
-    SETTINGS,
-    STAGE,
-    TRANSFORMS,
-)
+from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, NEWER, OPERATIONS, SETTINGS, TRANSFORMS
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -255,13 +246,12 @@ class Names:
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
         role: Role | None = None
-        own = scope.find(name) if name in STAGE or name in NEWER else None
-        if own is not None and (own.kind == "module" or stmt.args is None):
+        own = scope.find(name) if name in NEWER and kind != "material" else None
+        hidden = own is not None and (own.kind == "module" or stmt.args is None)
+        if hidden:
             role = None
         elif name in SETTINGS:
             role = "setting"
-        elif name in NEWER and kind != "material" and scope.find(name) is not None:
-            pass
         elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
             role = "operation"
         elif name in TRANSFORMS:

@@ -185,6 +185,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "steps": _row_steps(v.astype(np.float64), layout),
             "scale": scales[i],
             "colour": parts.rgb[i].tolist(),
+            "opacity": 1.0 - min(max(float(parts.clear[i]), 0.0), 1.0),
             "paint": -1,
             "amount": 0.0,
             "frequency": 0.0,

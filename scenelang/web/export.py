@@ -189,6 +189,7 @@ def view_of(
             "rows": rows_of(program, manifest, network.codes, network.material_codes),
             "stage": program.stage and stage_data(program.stage),
             "background": program.background,
+            "samples": program.samples,
         },
         "form": form and form.data,
         "params": form.params if form else [],

@@ -378,14 +378,15 @@ class Writer:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
         worn = bound is not None and bound.kind in _VALUES and stmt.args is None
-        if name in SETTINGS and not worn and (bound is None or bound.kind != "module"):
+        hidden = worn or (bound is not None and bound.kind == "module")
+        if name in SETTINGS and not hidden:
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             word = (name,) if name == "animate" else ("set", name)
             return None if name == "canvas" else [*word, *args]
-        hidden = worn or (bound is not None and bound.kind == "module")
-        if name in LANGUAGE or (name in NEWER and (kind == "material" or not hidden)):
+        moves = name in LANGUAGE or (name in NEWER and name not in SETTINGS)
+        if moves and (kind == "material" or not hidden):
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
         if bound is None:

@@ -143,6 +143,7 @@ function rowData({ token, leaf, k }, { dimension }) {
     steps,
     scale: scaleOfChain(leaf.steps, dimension),
     colour: look.colour,
+    opacity: look.opacity,
     paint: look.paint,
     place: look.place,
     paintSteps: look.paintSteps,

@@ -204,6 +204,7 @@ export function solidDrawer(gl, view) {
       gl.uniform1i(at(name), unit);
     });
     gl.uniform1i(at("zero"), 0);
+    gl.uniform1i(at("along"), Math.sqrt(ready.program.samples));
     const vectors = {
       forward: axes[0].map((v) => v * ready.near), right: axes[1], up: axes[2],
       canvas: [ready.width, ready.height, ready.pixel],
@@ -229,7 +230,7 @@ export function solidDrawer(gl, view) {
     }
   }
 
-  /** One sample of each pixel, then four where these differ. */
+  /** One sample of each pixel, then all where these differ. */
   function* render(into, format, names) {
     const { width, height } = ready;
     if (!first || first.width !== width || first.height !== height || first.format !== format) {
