@@ -207,7 +207,7 @@ _MOST_ITEMS: Final = 8
 
 def dimensions_of(document: Document) -> tuple[int, ...]:
     """The dimension of the model that a document names; both where it names none."""
-    for stmt in document.file.statements:
+    for stmt in document.heads:
         if isinstance(stmt, tree.Model) and isinstance(stmt.name, tree.String):
             with suppress(KeyError):
                 return (load_manifest(stmt.name.value).dimension,)
@@ -300,10 +300,10 @@ _SYMBOLS: Final = {
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
     """Proposals at an offset."""
-    names = document.names
+    names = document.names_at(offset)
     holders = ("let", "argument", "loop", "param")
     values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
-    cursor = cursor_at(document.tokens, offset, values)
+    cursor = cursor_at(document.tokens_to(offset), offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
         start += 1
@@ -410,7 +410,7 @@ class _Maker:
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
-            given = {type(stmt) for stmt in self.document.file.statements}
+            given = {type(stmt) for stmt in self.document.heads}
             if tree.Version not in given:
                 yield self._keyword("nsg", "c")
             if tree.Model not in given:
