@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, Final
 
 from lsprotocol import types
@@ -356,9 +356,9 @@ class _Maker:
             yield from self._members(before)
         elif not before:
             yield from self._statements()
-        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before == ("for", "("):
+        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before[-2:] == ("for", "("):
             return
-        elif before[:2] == ("for", "(") and len(before) == 3:
+        elif before[-3:-1] == ("for", "("):
             yield Item("in", Kind.Keyword, "in ")
         elif before[0] == "import":
             if len(before) == 2:
@@ -376,8 +376,11 @@ class _Maker:
             return
         elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
             return  # the name of a parameter
-        elif not _ends_operand(last):
+        elif (loops := _begins_item(before)) or not _ends_operand(last):
             yield from self._expressions()
+            for word, inside in (("for", "${1:i} in ${2:0..<5}"), ("if", "${1:condition}")) if loops else ():
+                about = words.KEYWORDS[word].text
+                yield Item(word, Kind.Keyword, f"{word} ({inside}) ", "n", about=about, snippet=True)
         elif ".." in before or "..<" in before:
             yield Item("step", Kind.Keyword, "step ")
 
@@ -543,6 +546,19 @@ class _Maker:
 def _calls(known: dict[str, words.Word], rank: str, kind: Kind = Kind.Method) -> Iterator[Item]:
     for _, word in sorted(known.items()):
         yield Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
+
+
+def _begins_item(before: tuple[str, ...]) -> bool:
+    """Test whether an item of a vector begins behind tokens, perhaps with a loop."""
+    heads, closed = [""], ""
+    for last, text in pairwise(("", *before)):
+        if text in ("(", "["):
+            heads.append(last + text)
+        elif text in (")", "]"):
+            closed = heads.pop() if heads[1:] else ""
+    if not heads[-1].endswith("[") or _ends_operand(heads[-1][:-1]):
+        return False
+    return before[-1] in ("[", ",") or (before[-1] == ")" and closed in ("for(", "if("))
 
 
 def _ends_operand(text: str) -> bool:

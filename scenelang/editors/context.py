@@ -265,7 +265,7 @@ def word_of(symbol: Symbol) -> Word:
         head = f"module {called}"
     elif isinstance(node, tree.Fn):
         head = f"fn {called} = {_short(node.body.span.text)}"
-    elif isinstance(node, tree.For):
+    elif isinstance(node, tree.For | tree.ForItem):
         head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
     elif isinstance(node, tree.Parameter):
         head = f"(parameter) {_short(node.span.text)}"
@@ -281,7 +281,7 @@ def _short(text: str) -> str:
 
 def comment_above(symbol: Symbol) -> str:
     """The lines of comment right above a definition, or behind it on its line."""
-    if isinstance(symbol.node, tree.Parameter | tree.For):
+    if isinstance(symbol.node, tree.Parameter | tree.For | tree.ForItem):
         return ""
     # The node's own text: it may be of an older version than the document's.
     span = symbol.node.span

@@ -197,9 +197,11 @@ class Names:
             case tree.Import():
                 self._add(node.path.span, node.path.value, "path")
                 self._define(node.alias, "import", node, scope, node.span.end)
-            case tree.For():
+            case tree.For() | tree.ForItem():
                 self._walk(node.iterable, scope, kind)
-                loop = self._scope(node.body.span.start, node.span.end, scope)
+                # An item may be about to be written, or to go on.
+                more = isinstance(node, tree.ForItem) + isinstance(node.body, tree.BadExpr)
+                loop = self._scope(node.body.span.start, node.span.end + more, scope)
                 self._define(node.variable, "loop", node, loop, node.body.span.start)
                 self._walk(node.body, loop, kind)
             case tree.If():

@@ -32,6 +32,8 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
     "fn": (tree.Fn, (1, 2, 4)),
     "module": (tree.Module, (1, 2, 3)),
     "for_": (tree.For, (2, 4, 6)),
+    "for_item": (tree.ForItem, (2, 4, 6)),
+    "if_item": (tree.IfItem, (2, 4)),
     "conditional": (tree.Conditional, (0, 2, 4)),
     "index": (tree.Index, (0, 2)),
     "member": (tree.Member, (0, 2)),
@@ -298,7 +300,7 @@ def _block(last: Any) -> tree.Block | None:
 MAX_DEPTH = 200
 """No tree is deeper, so no later stage can exhaust the stack."""
 
-_OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(8)
+_OTHER, _LOOP, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(9)
 
 
 _REACH: Final = 240
@@ -382,14 +384,15 @@ def _classes() -> tuple[int, ...]:
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
-    classes |= {"{": _BRACE, "}": _END_BRACE}
+    classes |= {"{": _BRACE, "}": _END_BRACE, "for": _LOOP, "if": _LOOP}
     return tuple(classes.get(name, _OTHER) for name in tables().kinds)
 
 
 def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up.
 
-    Open brackets and braces, operators between them and the arms of an `else if` chain make a tree deeper.
+    Open brackets and braces, operators between them, loops in vectors and the arms of an `else if` chain make
+    a tree deeper.
     """
     kinds = tokens.kinds
     classes = _classes()
@@ -400,7 +403,7 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
     blocks: list[tuple[int, int, int, list[int]]] = []  # the state outside each open block
     for at, kind in enumerate(kinds):
         c = classes[kind]
-        if c == _OTHER:
+        if c == _OTHER or (c == _LOOP and not brackets):  # a statement's block counts
             continue
         if c <= _BRACE:
             if depth == MAX_DEPTH:

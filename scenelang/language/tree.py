@@ -61,6 +61,21 @@ class Vector(Expr):
     items: tuple[Expr, ...]
 
 
+class ForItem(Expr):
+    """``for (i in …) item`` in a vector: the item's values, once for each turn."""
+
+    variable: Name
+    iterable: Expr
+    body: Expr
+
+
+class IfItem(Expr):
+    """``if (…) item`` in a vector: the item's values, or none."""
+
+    condition: Expr
+    body: Expr
+
+
 class Range(Expr):
     """``a..b`` (inclusive), ``a..<b`` (exclusive), with an optional step."""
 
