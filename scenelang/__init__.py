@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from scenelang.language.nodes import Grayscale as Grayscale
     from scenelang.language.nodes import Ground as Ground
     from scenelang.language.nodes import Group as Group
+    from scenelang.language.nodes import Grow as Grow
     from scenelang.language.nodes import Hue as Hue
     from scenelang.language.nodes import Light as Light
     from scenelang.language.nodes import Link as Link
@@ -57,6 +58,8 @@ if TYPE_CHECKING:
     from scenelang.language.nodes import Rotate as Rotate
     from scenelang.language.nodes import Scale as Scale
     from scenelang.language.nodes import Shear as Shear
+    from scenelang.language.nodes import Shell as Shell
+    from scenelang.language.nodes import Stop as Stop
     from scenelang.language.nodes import Translate as Translate
     from scenelang.language.nodes import Twirl as Twirl
     from scenelang.language.nodes import Twist as Twist
@@ -87,8 +90,8 @@ _HOME: Final = {
     "scenelang.language.evaluation": "load loads",
     "scenelang.language.formatting": "format_text",
     "scenelang.language.nodes": (
-        "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Hue Light Link "
-        "Material Matrix Object Rotate Scale Shear Translate Twirl Twist"
+        "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Grow Hue Light Link "
+        "Material Matrix Object Rotate Scale Shear Shell Stop Translate Twirl Twist"
     ),
     "scenelang.language.reports": "SceneError",
     "scenelang.language.scene": "Elements load_elements Scene",

@@ -449,9 +449,11 @@ class _Maker:
 
     def _materials(self, constant: Collection[str]) -> Iterator[Item]:
         """Materials, and files that may hold others."""
-        for name in sorted({*constant, *words.TEXTURES}):
+        for name in sorted({*constant, *words.PAINTS}):
             text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
-            yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
+            if name in words.GRADIENTS:
+                text, kind = f"{name} {{ stop(0, ${{1:#d33}}); stop(1, ${{2:#33d}}); }}", "gradient"
+            yield Item(name, Kind.EnumMember, text, "a", kind, (words.MATERIALS | words.PAINTS)[name], True)
         for symbol in self.names.visible(self.cursor.offset):
             stmt = symbol.node
             zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None

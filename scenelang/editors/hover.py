@@ -78,8 +78,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             node = next((n for n in _calls(document, use) if n.name.text == text), None)
             return about and about + _node_facts(document, node)
         case "material":
-            textures = dict.fromkeys(words.TEXTURES, "A texture, in flat and in solid scenes.")
-            return _offered(f"material {text}", text, words.MATERIALS | textures)
+            return _offered(f"material {text}", text, words.MATERIALS | words.PAINTS)
         case "model":
             try:
                 return _model(load_manifest(text))

@@ -28,7 +28,7 @@ from scenelang.language.nodes import blend_width
 from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object, objects_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
 from scenelang.language.values import MAX_VECTOR, POISON, Problem, RangeValue, Vec, number, show, unexpected
-from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
+from scenelang.language.words import KEYWORDS, LANGUAGE, NEWER, SETTINGS
 
 
 class Body(NamedTuple):
@@ -544,7 +544,8 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
     child, makes = stmt.child, isinstance(stmt.child, tree.Node)
     if isinstance(child, tree.Call):
         binding = lookup(child.name, place)
-        makes = child.name.text not in LANGUAGE and (binding is None or binding.kind not in VALUES)
+        moves = child.name.text in LANGUAGE or (child.name.text in NEWER and binding is None)
+        makes = not moves and (binding is None or binding.kind not in VALUES)
     if not makes:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from scenelang.assets.records import Record
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, SourceFile, Span, removal
-from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, OPERATIONS, SETTINGS, STAGE, TRANSFORMS
+from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, NEWER, OPERATIONS, SETTINGS, TRANSFORMS
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -258,8 +258,11 @@ class Names:
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
         role: Role | None = None
-        own = scope.find(name) if name in STAGE else None
-        if name in SETTINGS and (own is None or (own.kind != "module" and stmt.args is not None)):
+        own = scope.find(name) if name in NEWER and kind != "material" else None
+        hidden = own is not None and (own.kind == "module" or stmt.args is None)
+        if hidden:
+            role = None
+        elif name in SETTINGS:
             role = "setting"
         elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
             role = "operation"

@@ -140,6 +140,7 @@ class Settings(Record, frozen=False):
 
     canvas: tuple[int, int] = (256, 256)  # width and height in pixels
     background: tuple[float, float, float] | Unsaid | None = "default"  # as written; None for transparency
+    samples: int = 4  # of a pixel
     stage: dict[str, Any] = field(default_factory=dict)  # camera, light and ground, where they are stated
     animation: Animation | None = None
     model: str | None = None

@@ -96,7 +96,7 @@ def prepare_model(stmt: tree.Model, place: Place) -> Action | None:
 
 
 def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
-    """``canvas``, ``background``, ``animate``, ``camera``, ``light`` or ``ground``."""
+    """A statement of the top level that sets something for the whole picture."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
     if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
@@ -139,6 +139,8 @@ def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> N
         session.spans.record(node, where)
     elif name == "animate":
         _animate(spec.read(values), session)
+    elif name == "samples":
+        settings.samples = spec.read(values)["n"]
     elif name == "canvas":
         settings.canvas = tuple(spec.read(spread(values, spec.word)).values())
     else:
@@ -433,7 +435,8 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
     if name in words.SETTINGS and not hides(binding, stmt):
         return prepare_setting(stmt, place)
-    if name in words.LANGUAGE:
+    moves = name in words.LANGUAGE or (name in words.NEWER and name not in words.SETTINGS)
+    if moves and (place.kind == "material" or not hides(binding, stmt)):
         return prepare_move(stmt, place)
     if binding is None:
         if name in words.GEOMETRIES:

@@ -253,7 +253,7 @@ def _save(
     if prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
-                job.graphs, job.program.model, lambda: _draw(job, clock, progress), redraw
+                job.graphs, job.program.model, lambda: _draw(job, clock, progress), redraw, job.how
             )
     else:
         image = _draw(job, clock, progress)
@@ -277,13 +277,14 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
     if how.backend == "reference":
         assert job.scene is not None
         with clock("draw"):
-            image = draw_exact(job.scene, spans=job.spans, progress=progress)
-        job.notes.append("drew the exact picture, four samples a pixel")
+            scene = how.sampled(job.scene)
+            image = draw_exact(scene, spans=job.spans, progress=progress)
+        job.notes.append(f"drew the exact picture, {scene.samples} samples a pixel")
         return image
     assert program is not None
     from scenelang.drawing.small import choose_drawer
 
-    library, why = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+    library, why = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
     if library == "numpy":
         cores = how.threads or threads_for(program.canvas) if program.stage else 1
         device, place = "numpy", "one core" if cores == 1 else f"{cores} cores"

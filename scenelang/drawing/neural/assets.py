@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import HARD, Gradient
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import unpacked
 from scenelang.assets.tensors import TensorError
@@ -118,21 +120,31 @@ def grid_shape(element: Element, xp: Arrays, like: Array) -> GridShape:
     return GridShape(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
 
 
+EDGE = 64.0  # texels to a leaf unit that a hard edge counts as
 MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
 class Texture:
     """Colours of a paint at leaf coordinates, linear if ``light``; ``frame`` leads from x and y to the
-    picture (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
+    picture or the gradient (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
     """
 
     def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
         self._xp, self.steps = xp, paint.steps
+        if not abs(frame).max() < MOST:
+            raise ProgramError("a texture's frame beyond float32")
+        self.texels, self.sides = None, (0, 0)
+        if isinstance(paint.element, Gradient):
+            self._gradient = paint.element
+            self.place = Affine(tuple(map(tuple, frame.astype(np.float64).reshape(2, 3).tolist())))
+            across = abs(np.array([row[:2] for row in self.place.rows])).max()
+            self.detail = EDGE if paint.element.edges else min(float(across * paint.element.slope), EDGE)
+            self._at = self._graded
+            return
         values = _nodes(paint.element, light)
         flat = xp.array(values.reshape(3, -1), like)
         self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
-        if not abs(frame).max() < MOST:
-            raise ProgramError("a texture's frame beyond float32")
+        self._at = self._picture if self._lattice is None else self._colouring
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
         (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
         self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
@@ -142,8 +154,21 @@ class Texture:
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""
-        result = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
-        return stepped(self._xp, result, self.steps)
+        return stepped(self._xp, self._at(q), self.steps)
+
+    def _colouring(self, q: Array) -> Array:
+        return self._lattice.at(q.clip(-1.0, 1.0))
+
+    def _graded(self, q: Array) -> Array:
+        xp, (name, stops) = self._xp, self._gradient
+        u, v = self.place(xp, [q[0], q[1]])
+        s = (u + 1.0) * 0.5 if name == "linear" else xp.length([u, v])
+        rows = [xp.full((len(s),), value, s) for value in stops[0][1:]]
+        for (begin, *a), (end, *b) in pairwise(stops):
+            over = end - begin
+            share = ((s - begin) * (1.0 / over)).clip(0.0, 1.0) if over > HARD else xp.narrow(s >= end)
+            rows = [row + share * (y - x) for row, x, y in zip(rows, a, b, strict=True)]
+        return xp.stack(rows, 0)
 
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides

@@ -21,7 +21,8 @@ const preparedForms = new WeakMap();
  * @param form - of a view
  * @param {{params?: Object, frame?: number}} inputs - values of params by name: numbers, radians, seconds,
  *   booleans, strings, arrays; those left out have their defaults
- * @returns {{rows: Object[], stage: ?Object, background: ?number[]}} as docs/architecture.md has them
+ * @returns {{rows: Object[], samples: number, stage: ?Object, background: ?number[]}} as docs/architecture.md
+ *   has them
  * @throws {NotLive} there is no picture of these; the message says why
  */
 export function evaluateForm(form, inputs = {}) {
@@ -51,7 +52,8 @@ class SceneRun {
     const out = new Block();
     for (const act of this.body) act(undefined, out);
     const rows = rowsOf(out.links, this.form);
-    const made = { rows, ...stageFrom(this.settings, this.form.dimension) };
+    const samples = samplesFrom(this.settings.samples);
+    const made = { rows, samples, ...stageFrom(this.settings, this.form) };
     if (made.stage !== null) checkEye(made, this.form);
     return made;
   }
@@ -75,6 +77,7 @@ class SceneRun {
     return (slots) => {
       const out = new Block();
       act(slots, out);
+      if (out.steps.filter((step) => step[0] === "opacity").length > 1) refuse("`opacity` is given twice");
       return out.steps;
     };
   }
@@ -178,6 +181,8 @@ function stepOf(name, values) {
   const [a, b] = values.map(bare);
   if (name === "twirl") return { twirl: a, x: 0, y: 0 };
   if (name === "bend") return { twirl: 0, x: a, y: 0 };
+  if (name === "grow") return a >= -0.5 && a <= 1 ? { grow: a } : refuse(`a growth of ${a}`);
+  if (name === "shell") return a > 0 && a <= 1 ? { shell: a } : refuse(`a wall of ${a}`);
   return name === "twist" ? { twist: a } : { amount: a, frequency: b };
 }
 
@@ -185,13 +190,18 @@ const INKS = {
   color: ([rgb]) => ["color", ...numbersOf(rgb, 3)],
   grayscale: ([amount]) => ["grayscale", bare(amount)],
   hue: ([angle]) => ["hue", radians(angle) / (2 * Math.PI)],
+  stop: ([offset, rgb]) => ["stop", bare(offset), ...numbersOf(rgb, 3)],
+  opacity: ([share]) => ["opacity", opacityFrom(bare(share))],
 };
 
-const settingOf = (name) => (args, run) => {
-  const parts = args.map((arg) => optionalValue(arg, run));
-  return (slots) => {
-    run.settings[name] = parts.map((part) => part(slots));
-  };
+function opacityFrom(share) {
+  return share >= 0 && share <= 1 ? share : refuse(`an opacity of ${share} is outside 0..1`);
+}
+
+/** How many samples a pixel is the mean of. */
+function samplesFrom([count] = [4]) {
+  return [4, 16].includes(bare(count)) ? count : refuse(`${count} samples a pixel`);
+}
 };
 
 const STATEMENTS_OF_FORMS = {
@@ -305,10 +315,12 @@ const STATEMENTS_OF_FORMS = {
       run.animated = [run.frame / fps, u, run.frame, frames];
     };
   },
-  background: settingOf("background"),
-  camera: settingOf("camera"),
-  light: settingOf("light"),
-  ground: settingOf("ground"),
+  set: ([name, ...args], run) => {
+    const parts = args.map((arg) => optionalValue(arg, run));
+    return (slots) => {
+      run.settings[name] = parts.map((part) => part(slots));
+    };
+  },
 };
 
 /** The nearest whole number, of two the even one. */
