@@ -184,16 +184,6 @@ def prepare_number(expr: tree.Number, place: Place) -> Code:
     return constant(_LITERALS[expr.unit](value) if expr.unit else value)
 
 
-def prepare_vector(expr: tree.Vector, place: Place) -> Code:
-    def vector(*items: Any) -> Vec:
-        for index, item in enumerate(items):
-            if item.__class__ is RangeValue:
-                raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
-        return Vec(items)
-
-    return computed(place, vector, expr.span, expr.items, item_steps=0)
-
-
 def prepare_range(expr: tree.Range, place: Place) -> Code:
     def make(start: Any, stop: Any, step: Any = 1.0) -> RangeValue:
         for index, value in enumerate((start, stop, step)):

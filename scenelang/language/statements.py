@@ -588,7 +588,7 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.String: lambda expr, place: expressions.constant(expr.value),
     tree.Bool: lambda expr, place: expressions.constant(expr.value),
     tree.Color: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
-    tree.Vector: expressions.prepare_vector,
+    tree.Vector: blocks.prepare_vector,
     tree.Range: expressions.prepare_range,
     tree.NameRef: expressions.prepare_name,
     tree.Unary: expressions.prepare_unary,

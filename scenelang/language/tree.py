@@ -7,7 +7,7 @@ stages skip such nodes silently.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Span
@@ -59,6 +59,21 @@ class Color(Expr):
 
 class Vector(Expr):
     items: tuple[Expr, ...]
+
+
+class ForItem(Expr):
+    """``for (i in …) item`` in a vector: the item's values, once for each turn."""
+
+    variable: Name
+    iterable: Expr
+    body: Expr
+
+
+class IfItem(Expr):
+    """``if (…) item`` in a vector: the item's values, or none."""
+
+    condition: Expr
+    body: Expr
 
 
 class Range(Expr):
@@ -232,6 +247,28 @@ class MaterialUse(Stmt):
 
 class BadStmt(Stmt):
     """Text that recovery could not read as a statement."""
+
+
+class Kept(Stmt):
+    """A statement of an earlier text, as it was read there; the span is its place in this text."""
+
+    stmt: Stmt
+
+    def moved(self, deep: bool = True) -> Stmt:
+        """The statement at its place in this text, or that and its name alone."""
+        source, delta = self.span.source, self.span.start - self.stmt.span.start
+
+        def move(value: Any) -> Any:
+            cls = value.__class__
+            if cls is Span:
+                return Span(source, value.start + delta, value.end + delta)
+            if cls is tuple:
+                return tuple([move(item) for item in value])
+            if isinstance(value, Record) and (deep or cls is Name or value is self.stmt):
+                return cls(*[move(getattr(value, name)) for name in value.__match_args__])
+            return value
+
+        return cast(Stmt, move(self.stmt))
 
 
 class File(Spanned):

@@ -263,6 +263,12 @@ class Writer:
                 return ["#", *(round(255 * part) for part in expr.rgb)]
             case nodes.Vector():
                 return ["[", *self.given(expr.items, scope)]
+            case nodes.ForItem():
+                items, inside = self.expression(expr.iterable, scope), Scope(scope.frame, scope)
+                target = self._define(expr.variable, "loop", inside)
+                return ["for", *target, items, self.expression(expr.body, inside)]
+            case nodes.IfItem():
+                return ["if", self.expression(expr.condition, scope), self.expression(expr.body, scope)]
             case nodes.Range():
                 ends = self.given((expr.start, expr.stop, expr.step), scope)
                 return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]

@@ -1,10 +1,10 @@
 // A scene's form, prepared once and run for any params and any frame. `scenelang/web/form.py` makes forms;
 // what a statement means is in `scenelang/evaluate/prepare`.
 
-import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
+import { Time, Angle, Vec, Wearing } from "./values.js";
 import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
 import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
-import { entering, prepared } from "./expressions.js";
+import { entering, looping, prepared } from "./expressions.js";
 import { MAPS } from "./maps.js";
 import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
@@ -158,13 +158,6 @@ function placeCalled(inside, own, out) {
   out.add({ ...node, steps: [...node.steps, ...steps], worn: node.worn ?? worn });
 }
 
-function itemsOf(value) {
-  if (value instanceof Vec) return value.items;
-  if (!(value instanceof Progression)) refuse(`expected a range or a vector, found ${kindOf(value)}`);
-  if (value.unit !== 0 && value.step === undefined) refuse("a range of angles or times without a step");
-  return value;
-}
-
 /** A param's value from outside as one of the language, of the kind of its default. */
 function fromOutside(given, like) {
   if (like instanceof Angle) return new Angle(given);
@@ -237,18 +230,8 @@ const STATEMENTS_OF_FORMS = {
     };
   },
   for: ([where, slot, expr, block], run) => {
-    const [get, act] = [prepared(expr, run), actionsOf(block, run)];
-    const weight = 1 + block.length;
-    return (slots, out) => {
-      const target = where === "g" ? run.globals : slots;
-      const items = itemsOf(get(slots));
-      const count = items instanceof Progression ? items.count() : items.length;
-      for (let at = 0; at < count; at += 1) {
-        target[slot] = items instanceof Progression ? items.item(at) : items[at];
-        run.spend(weight);
-        act(slots, out);
-      }
-    };
+    const [loop, act] = [looping([where, slot, expr], 1 + block.length, run), actionsOf(block, run)];
+    return (slots, out) => loop(slots, () => act(slots, out));
   },
   if: ([test, then, otherwise], run) => {
     const [decide, first, second] = [prepared(test, run), actionsOf(then, run), actionsOf(otherwise, run)];
