@@ -348,7 +348,8 @@ class Space:
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
         """Radius of a disc or ball within a leaf, and the map from the world to the leaf; None if unknown."""
-        maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
+        row = GEOMETRIES.get(geometry)
+        maps = [isinstance(step, Affine) for step in steps if not isinstance(step, Own)]
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
         skin = Skin.of(steps)

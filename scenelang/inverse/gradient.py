@@ -237,6 +237,7 @@ def alike(a: Program, b: Program) -> bool:
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
     plain = (a.background is None) == (b.background is None)
     named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
+    plain = plain and a.samples == b.samples
     return tables and plain and named
 
 

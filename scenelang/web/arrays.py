@@ -193,6 +193,8 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "object": program.numbers[i],
         }
         if skins is not None:
+            if form >= 0 and skins.at(i).reach > 0:
+                raise ProgramError(f"`{program.objects[i]}` grows, and no page draws elements that do")
             row["skin"] = [float(number) for number in skins.at(i)]
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()

@@ -154,8 +154,8 @@ def test_boxes_and_balls_hold_leaves(geometry: str, level: float) -> None:
     hits = 0
     for _ in range(50):
         chain = [random_step(rng) for _ in range(rng.randrange(6))]
-        if rng.random() < 0.5:
-            chain.insert(0, Displace(rng.uniform(-0.3, 0.3), 4.0))
+        own = [Displace(rng.uniform(-0.3, 0.3), 4.0), Grow(rng.uniform(-0.2, 1)), Shell(rng.uniform(0.1, 1))]
+        chain = rng.sample(own, rng.randrange(3)) + chain
         moves = normal(map(Move, chain), SOLID)
         leaf = Leaf(geometry, Look("diffuse"), moves)
         xmin, ymin, xmax, ymax, zmin, zmax = SOLID.box(geometry, leaf.steps, level)

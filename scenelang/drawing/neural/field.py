@@ -121,11 +121,13 @@ class Field:
         """Codes of the leaves in use (K, C), whose decoders are computed together."""
         self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
+        more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
+        grown = {self.brought[i] for i in more}
         for element in dict.fromkeys(element for element in self.brought if element is not None):
             if network.config.features != 1:
                 raise ProgramError("elements for a network that knows more than distances")
             self.shape[[held == element for held in self.brought]] = len(self.shapes)
-            self.shapes.append(grid_shape(element, xp, self.like))
+            self.shapes.append(grid_shape(element, xp, self.like, element in grown))
             self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
 
     def _cells(self) -> None:

@@ -277,6 +277,7 @@ class SolidField:
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
         """Build the decoders of distances, and each object's index among them."""
         xp, network = self.xp, self.network
+        grown = {brought[i] for i in np.flatnonzero(self.skinned)}
         keys = [
             code.tobytes() if element is None else element
             for code, element in zip(codes, brought, strict=True)
@@ -291,7 +292,11 @@ class SolidField:
         ]
         self.decoders: list[Smooth | GridShape] = [
             *map(network.decoder, learned),
-            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
+            *(
+                grid_shape(key, xp, network.codes, key in grown)
+                for key in ordered
+                if isinstance(key, Element)
+            ),
         ]
         self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
         boxes = [
