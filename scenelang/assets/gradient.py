@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import ClassVar, Final
+
+from scenelang.assets.records import Record
 
 STOPS: Final = range(2, 9)  # how many a gradient may have
 HARD: Final = 1e-6  # of an offset: stops that are no farther apart are a hard edge
@@ -12,7 +14,7 @@ HARD: Final = 1e-6  # of an offset: stops that are no farther apart are a hard e
 Stops = tuple[tuple[float, float, float, float], ...]
 
 
-class Gradient(NamedTuple):
+class Gradient(Record):
     """A gradient over the (u, v) of textures.
 
     Args:
@@ -21,17 +23,17 @@ class Gradient(NamedTuple):
             offsets rise, and equal neighbours are a hard edge.
     """
 
-    name: str
-    stops: Stops
+    kind: ClassVar = "texture"  # a model that draws textures draws gradients
+    material: ClassVar = True
+    dimension: ClassVar = 2
 
-    kind = "texture"  # a model that draws textures draws gradients
-    material = True
-    dimension = 2
+    name: str
+    stops: Stops = ()
 
     @property
     def digest(self) -> str:
         """SHA-256, hex, of everything that determines its colours."""
-        return hashlib.sha256(repr(tuple(self)).encode()).hexdigest()
+        return hashlib.sha256(repr((self.name, self.stops)).encode()).hexdigest()
 
     @property
     def edges(self) -> tuple[float, ...]:

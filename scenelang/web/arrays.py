@@ -98,7 +98,7 @@ def shapes_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict
 def worn_of(program: Program) -> tuple[Element | Gradient, ...]:
     """The elements of a Program, and a gradient without stops for each kind that it has: those are rows'."""
     graded = {paint.element.name for paint in program.palette if isinstance(paint.element, Gradient)}
-    return *program.elements, *[Gradient(name, ()) for name in sorted(graded)]
+    return *program.elements, *map(Gradient, sorted(graded))
 
 
 def paints_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
@@ -201,7 +201,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
         if worn >= 0:
             element, steps = program.palette[worn]
             if isinstance(element, Gradient):
-                row["stops"], element = element.stops, Gradient(element.name, ())
+                row["stops"], element = element.stops, Gradient(element.name)
             row |= {"paint": paints.index(element), "paintSteps": steps}
             row["place"] = parts.texture[i].tolist()
         rows.append(row)

@@ -128,8 +128,8 @@ class Writer:
         self.files = {file.name: file.zoo for file in context.session.elements.values()}
         self.brought = Brought.of(tuple(context.session.elements.values()))
         self.textures = load_textures()
-        self.shapes = [element for element in listed if not element.material]
-        self.paints = [element for element in listed if element.material]
+        self.shapes = [e for e in listed if isinstance(e, Element) and not e.material]
+        self.paints: list[Element | Gradient] = [element for element in listed if element.material]
 
     def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
         """A block in a scope of its own."""
@@ -313,7 +313,7 @@ class Writer:
         alias, dot, rest = name.partition(".")
         element: Element | Gradient | None = self.textures.get(name)
         if name in GRADIENTS:
-            element = Gradient(name, ())  # whose stops are among the operations
+            element = Gradient(name)  # whose stops are among the operations
         if dot and (file := scope.find(alias)) is not None and file.file is not None:
             element = self.brought.materials[file.file.materials[rest]]
         try:

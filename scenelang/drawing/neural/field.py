@@ -17,7 +17,7 @@ from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, texture_of
 from scenelang.drawing.neural.frames import FAR, Frames, read_skins
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, Floats, FramedNetwork, Slopes
@@ -176,7 +176,7 @@ class Field:
                 continue
             self.texture[i] = known.setdefault((paint, parts.texture[i].tobytes()), len(known))
             if len(known) > len(self.textures):
-                self.textures.append(Texture(xp, paint, parts.texture[i], self.like, light=False))
+                self.textures.append(texture_of(xp, paint, parts.texture[i], self.like, light=False))
             self.colours[:, i] = 0.0
         if self.clear:
             opacity = xp.array(self.opacity, self.like)

@@ -30,7 +30,7 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
 from scenelang.drawing.arrays import Array, Arrays, Smooth
-from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted, element_box
 from scenelang.drawing.solid.passes import (
@@ -261,7 +261,7 @@ class SolidField:
         """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
         xp, like = self.xp, self.network.codes
         worn = {
-            i: Texture(xp, paint, frames[i], like, light=True)
+            i: texture_of(xp, paint, frames[i], like, light=True)
             for i, paint in enumerate(paints)
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
