@@ -84,6 +84,12 @@ class Element:
         return self.sizes[0] if self.form == "pyramid" else 2 if self.form == "picture" else 3
 
     @property
+    def size(self) -> float | None:
+        """Radius of its unit ball in units of the file that it was made of, None where it does not say."""
+        size = self.about.get("size")
+        return None if self.material or not isinstance(size, int | float) or not size > 0 else float(size)
+
+    @property
     def kind(self) -> str:
         """Its kind, as manifests name it."""
         return FORMS[self.form].kinds[self.dimension]

@@ -536,6 +536,8 @@ class _Maker:
             if element.material == worn:
                 name, about = element.name, element.told()
                 yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
+            if element.size is not None and not worn:
+                yield Item(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return

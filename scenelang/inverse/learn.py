@@ -89,8 +89,9 @@ class LearnOptions:
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
+        known = element.material or element.size is not None  # early files do not say
         ended = not cut_short or said.get("steps") == self.steps
-        return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
+        return known and ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
 ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "color_error", "parts"))
@@ -152,6 +153,9 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
         )
 
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    centre = [f"{x:.6g}" for x in shape.centre]
+    job.say(f"{name}: {name}_size is {shape.size:.6g}, the file's ({', '.join(centre)}) is the origin")
+    job = job._replace(about=job.about | {"size": shape.size, "centre": " ".join(centre)})
     element, tried = fit(
         shape,
         name,

@@ -358,6 +358,8 @@ def value_of(name: tree.Name, binding: Binding, place: Place) -> Code:
     slots, slot, report, span = binding.slots, binding.slot, place.report, name.span
     if binding.needs is not None:
         place.session.needs.on.append(binding.needs)
+    if slots is None and binding.known:
+        return constant(binding.value)
     if binding.kind == "poison" or slots is None:
         return POISONED
     if slots is place.scope.slots:

@@ -238,6 +238,10 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
     brought = FileContext(source, session, context.loader, context.defines, path)
     for name in (*zoo.geometries, *zoo.groups):
         brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
+    for name, element in zoo.geometries.items():
+        if element.size is not None and f"{name}_size" not in brought.scope.names:
+            size = Binding("let", stmt.alias.span, value=element.size, known=True)
+            brought.scope.names[f"{name}_size"] = size
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 

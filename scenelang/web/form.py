@@ -85,6 +85,7 @@ class Bound:
     at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
     uses: list[Bound] = field(default_factory=list)  # names of files
     element: str = ""  # the name in a Scene of a geometry from a file of elements
+    number: float | None = None  # the value of a size from one
 
 
 @dataclass(slots=True)
@@ -155,7 +156,11 @@ class Writer:
                     lines += self.file(brought, imported_tree, inside, imported=True)
                     continue
                 for name, binding in brought.scope.names.items():
-                    inside.names[name] = Bound("element", inside, file=brought, element=binding.value)
+                    inside.names[name] = bound = Bound(binding.kind, inside, file=brought)
+                    if binding.kind == "element":
+                        bound.element = binding.value
+                    else:
+                        bound.number = binding.value
             elif isinstance(stmt, nodes.Let | nodes.Param):
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
@@ -234,6 +239,8 @@ class Writer:
 
     def value(self, bound: Bound, scope: Scope) -> Json:
         """A variable."""
+        if bound.number is not None:
+            return bound.number
         if bound.scope.frame is None:
             self.uses.append(bound)
             return ["g", bound.slot]
