@@ -240,6 +240,10 @@ class Program:
         write_output(path, program_bytes(self))
 
 
+WIDER = 5
+"""Format of Programs that use what came after groups."""
+
+
 def program_bytes(program: Program) -> bytes:
     """The file of a Program; equal Programs give equal bytes."""
     from safetensors.numpy import save
@@ -279,6 +283,8 @@ def program_bytes(program: Program) -> bytes:
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
     if program.extended:
         header["format"] = 4
+    if any(element.form == "outline" for element in program.elements):
+        header["format"] = WIDER
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -380,7 +386,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
 def parse_program(data: bytes) -> Program:
     """The Program in a file's bytes, checked but for the weights' digest; raises `ProgramError`."""
     try:
-        file = read_tensors(data, MOST_PROGRAM_BYTES, (1, 2, 3, 4))
+        file = read_tensors(data, MOST_PROGRAM_BYTES, (1, 2, 3, 4, WIDER))
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
@@ -429,7 +435,7 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
     """The elements of a file of format 2 or above; their tensors are taken out of it."""
     if file.header["format"] == 1 and "elements" in file.header:
         raise TensorError("elements in a file of format 1")
-    if file.header["format"] == 1 or (file.header["format"] == 4 and "elements" not in file.header):
+    if file.header["format"] == 1 or (file.header["format"] > 3 and "elements" not in file.header):
         return ()
     listed = file.header.get("elements")
     if not isinstance(listed, list) or not all(
@@ -448,7 +454,7 @@ def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
     format = file.header["format"]
     newer = ({"forms"} if format > 1 else set()) | ({"worn", *_TABLES} if format > 2 else set())
-    if format == 4:  # these are there where scenes have elements, and where materials are among them
+    if format > 3:  # these are there where scenes have elements, and where materials are among them
         newer &= file.tensors.keys() if "elements" in file.header else set()
         if "worn" in newer:
             newer |= _TABLES.keys()
