@@ -206,15 +206,49 @@ def _boundary(curves: Curves) -> Curves:
         return curves if side[0, 0] == 1 else curves[::-1, ::-1]
     fine = winding(many.reshape(-1, 2, 2), odd=False)
     side = _sides(many, fine, size)
-    result = []
+    parts, crossings = list[list[Any]](), list[tuple[list[Any], int]]()
     for curve, own in zip(curves, side, strict=True):
         turns = (np.flatnonzero(own[1:] != own[:-1]) + 1).tolist()
         cuts = [0.0, *(_change(curve, at, own, fine, size) for at in turns), 1.0]
         for s, e, kind in zip(cuts, cuts[1:], own[[0, *turns]].tolist(), strict=False):
-            if kind and e > s:
-                piece = _part(curve, s, e)
-                result.append(piece if kind == 1 else piece[::-1])
-    return np.array(result).reshape(-1, 3, 2)
+            if kind:
+                parts.append([curve, s, e, kind])
+                crossings += [(parts[-1], at) for at, t in ((1, s), (2, e)) if 0 < t < 1]
+    _cross(crossings, size)
+    pieces = np.array([_part(curve, s, e)[::kind] for curve, s, e, kind in parts if e > s]).reshape(-1, 3, 2)
+    starts, ends = pieces[:, 0], pieces[:, 2]
+    loose = [
+        np.hypot(*(a[:, None] - b).transpose(2, 0, 1)).min(1) > 1e-6 * size
+        for a, b in ((starts, ends), (ends, starts))
+    ]
+    bridges = []
+    for end in ends[loose[1]] if loose[0].any() else ():  # what is left of contours that touch
+        start = min(starts[loose[0]], key=lambda at, end=end: float(np.hypot(*(at - end))))
+        bridges.append((end, (end + start) / 2, start))
+    return np.concatenate([pieces, np.array(bridges).reshape(-1, 3, 2)])
+
+
+def _cross(crossings: list[tuple[list[Any], int]], size: float) -> None:
+    """Move ends of parts, each (curve, from, to, …), to where their curves cross, by Newton's method."""
+    points = np.array([_part(part[0], part[at], part[at])[0] for part, at in crossings]).reshape(-1, 2)
+    for (part, at), point in zip(crossings, points, strict=True):
+        others = np.array([other[0] is not part[0] for other, _ in crossings])
+        gaps = np.where(others, np.hypot(*(points - point).T), np.inf)
+        if not gaps.min(initial=np.inf) < 0.05 * size:
+            continue
+        other, its = crossings[int(gaps.argmin())]
+        t = np.array([part[at], other[its]])
+        for _ in range(6):
+            (p, u), (q, v) = (_moving(curve, x) for curve, x in zip((part[0], other[0]), t, strict=True))
+            t = t - np.linalg.lstsq(np.stack([u, -v], 1), p - q, rcond=None)[0]
+        if abs(t[0] - part[at]) < 0.1 and 0 <= t[0] <= 1:
+            part[at] = float(t[0])
+
+
+def _moving(curve: Curves, t: float) -> tuple[Curves, Curves]:
+    """Point and derivative of a curve (3, 2)."""
+    u, w = 2 * (curve[1] - curve[0]), curve[0] - 2 * curve[1] + curve[2]
+    return curve[0] + t * (u + t * w), u + 2 * t * w
 
 
 def _sides(edges: Curves, inside: Any, size: float) -> npt.NDArray[np.int8]:
