@@ -163,19 +163,14 @@ FOLDER: Final = "SCENELANG_ORIGINALS"
 
 
 def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
-    """The true shapes of a scene's elements, by geometry, from files in the folder that the environment's
-    `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
+    """The true shapes of a scene's elements but outlines, by geometry, from files in the folder that the
+    environment's `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
     """
     shown = {leaf.geometry for leaf in leaves(graph.root)} & graph.elements.keys()
-    shapes: dict[str, Shape] = {
-        name: outline.of_curves(graph.elements[name])
-        for name in shown
-        if graph.elements[name].form == "outline"
-    }
-    shown -= shapes.keys()
+    shown = {name for name in shown if graph.elements[name].form != "outline"}
     beside = {file.name: file.zoo.folder for file in scene.elements if file.zoo is not None}
     folders = {name: os.environ.get(FOLDER) or beside[name.partition(".")[0]] for name in sorted(shown)}
-    return shapes | {name: _original(name, graph.elements[name], folder) for name, folder in folders.items()}
+    return {name: _original(name, graph.elements[name], folder) for name, folder in folders.items()}
 
 
 def _original(name: str, element: Element, folder: str | Path | None) -> Shape:

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
 
@@ -301,6 +302,7 @@ class Outline:
         return result, out, thin
 
 
+@lru_cache(maxsize=256)
 def of_curves(element: Element) -> Outline:
     """The outline of an element of quadratic curves, in its own disc."""
     a, b, c = curves_of(element).swapaxes(0, 1)
