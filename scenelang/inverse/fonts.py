@@ -216,16 +216,22 @@ def _boundary(curves: Curves) -> Curves:
                 crossings += [(parts[-1], at) for at, t in ((1, s), (2, e)) if 0 < t < 1]
     _cross(crossings, size)
     pieces = np.array([_part(curve, s, e)[::kind] for curve, s, e, kind in parts if e > s]).reshape(-1, 3, 2)
+    if not len(pieces):
+        return pieces
     starts, ends = pieces[:, 0], pieces[:, 2]
-    loose = [
-        np.hypot(*(a[:, None] - b).transpose(2, 0, 1)).min(1) > 1e-6 * size
-        for a, b in ((starts, ends), (ends, starts))
-    ]
+    loose = [_gaps(a, b) > 1e-6 * size for a, b in ((starts, ends), (ends, starts))]
     bridges = []
     for end in ends[loose[1]] if loose[0].any() else ():  # what is left of contours that touch
         start = min(starts[loose[0]], key=lambda at, end=end: float(np.hypot(*(at - end))))
         bridges.append((end, (end + start) / 2, start))
     return np.concatenate([pieces, np.array(bridges).reshape(-1, 3, 2)])
+
+
+def _gaps(points: Curves, others: Curves) -> Curves:
+    """Distances (n,) of points from the nearest of others."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(others).query(points)[0])
 
 
 def _cross(crossings: list[tuple[list[Any], int]], size: float) -> None:
@@ -275,12 +281,10 @@ def _change(curve: Curves, at: int, own: Any, inside: Any, size: float) -> float
 
 def _sound(outline: npt.NDArray[np.int16], curves: Curves, disc: tuple[float, float, float]) -> bool:
     """True where an outline is closed and covers what its contours do at almost all of some points."""
-    from scipy.spatial import cKDTree
-
     if not len(outline):
         return True
     starts, ends = outline[:, 0].astype(float), outline[:, 2].astype(float)
-    gaps, _ = cKDTree(starts).query(ends)
+    gaps = _gaps(ends, starts)
     p = np.random.default_rng(1).uniform(-1, 1, (_ASKED, 2))
     before = winding(_edges(curves, _SAMPLES[1]).reshape(-1, 2, 2), odd=False)(
         p * disc[2] + np.array(disc[:2])
