@@ -268,7 +268,8 @@ class Program:
         layout = self._layout()
         if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
             return True
-        return any(isinstance(paint.element, Gradient) for paint in self.palette)
+        outlines = any(element.form == "outline" for element in self.elements)
+        return outlines or any(isinstance(paint.element, Gradient) for paint in self.palette)
 
     def _layout(self) -> Layout | None:
         """The layout of its vectors, None where their numbers are those of a learned lifting."""

@@ -251,6 +251,8 @@ def report_problem(
     at = problem.operand
     operand = operands[at] if at is not None and at < len(operands) else None
     place = operand.span if operand else span
+    if problem.letter is not None and isinstance(operand, tree.String):
+        place = operand.character(problem.letter)
     if (place.source, place) in report.reported:
         return
     help, fix = problem.help, None

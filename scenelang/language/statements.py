@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.element_file import ElementFile
-from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, tree, words
+from scenelang.language import (
+    advice,
+    blocks,
+    expressions,
+    foreign,
+    letters,
+    library,
+    modifiers,
+    tree,
+    words,
+)
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
     Diagnostics,
@@ -242,6 +253,11 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
         if element.size is not None and f"{name}_size" not in brought.scope.names:
             size = Binding("let", stmt.alias.span, value=element.size, known=True)
             brought.scope.names[f"{name}_size"] = size
+    if zoo.font is not None:
+        font = letters.Letters(zoo.font, known)
+        brought.scope.names["text"] = Binding("text", stmt.alias.span, value=font)
+        width = partial(letters.prepare_width, font)
+        brought.scope.names["width"] = Binding("width", stmt.alias.span, value=width)
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 
@@ -452,6 +468,8 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
         return None
     if binding.kind == "module":
         return blocks.prepare_module_call(stmt, binding.value, place)
+    if binding.kind == "text":
+        return letters.prepare_text(stmt, place, binding.value)
     if binding.kind == "element":
         return blocks.prepare_element(stmt, place, binding.value)
     if binding.kind in advice.VALUES:
@@ -510,7 +528,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
         if alias is None:
             advice.unknown(name, place)
         elif alias.kind == "import":
-            advice.unknown_member(name, place, alias.value, kinds=("module", "element"))
+            advice.unknown_member(name, place, alias.value, kinds=("module", "text", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return

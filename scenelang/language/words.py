@@ -352,6 +352,24 @@ FUNCTIONS: Final = _table(
     _call("rgb", "r g b", "A colour; components in 0..1."),
     _call("hsv", "h s v", "A colour by hue (turns or an angle), saturation and value."),
 )
+LETTERS: Final = _table(
+    _call(
+        "text",
+        "text:string size? align?:string",
+        "A line of letters of an imported font, a union, with its baseline on y = 0.",
+        ("a string", "the em in world units, 1 by default", '`"left"`, `"center"` or `"right"` of x = 0'),
+        'text("$1", size = ${2:0.5});',
+        head='text("Ag", size = 1, align = "left")',
+    ),
+    _call(
+        "width",
+        "text:string size?",
+        "The width of a line of letters of an imported font, in world units.",
+        ("a string", "the em in world units, 1 by default"),
+        head='width("Ag", size = 1)',
+    ),
+)
+"""What a font brings, behind the name of its import."""
 CONSTANTS: Final = _table(
     _word("PI", "3.14159…, a number; half a turn is `0.5turn`."),
     _word("TAU", "2π, a number."),

@@ -21,6 +21,7 @@ from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, text
 from scenelang.drawing.neural.frames import FAR, Frames, read_skins
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, Floats, FramedNetwork, Slopes
+from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
@@ -119,16 +120,27 @@ class Field:
         codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
         self.codes = codes = codes.reshape(len(result), every.shape[1])
         """Codes of the leaves in use (K, C), whose decoders are computed together."""
-        self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
+        self.shapes: list[Decoder | GridShape | OutlineShapes] = [
+            *network.decoders(xp.array(codes, self.like))
+        ]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
         grown = {self.brought[i] for i in more}
-        for element in dict.fromkeys(element for element in self.brought if element is not None):
-            if network.config.features != 1:
-                raise ProgramError("elements for a network that knows more than distances")
-            self.shape[[held == element for held in self.brought]] = len(self.shapes)
-            self.shapes.append(grid_shape(element, xp, self.like, element in grown))
-            self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+        elements = dict.fromkeys(element for element in self.brought if element is not None)
+        if elements and network.config.features != 1:
+            raise ProgramError("elements for a network that knows more than distances")
+        outlines = {element: at for at, element in enumerate(e for e in elements if e.form == "outline")}
+        self.outline = np.array([outlines.get(held, -1) for held in self.brought], np.intp)  # type: ignore[arg-type]
+        """Numbers of outlines among all that are drawn together (N,), -1 for other shapes."""
+        for element in elements:
+            if element not in outlines:
+                self.shape[[held == element for held in self.brought]] = len(self.shapes)
+                self.shapes.append(grid_shape(element, xp, self.like, element in grown))
+                self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+        if outlines:
+            self.shape[self.outline >= 0] = len(self.shapes)
+            self.shapes.append(OutlineShapes(xp, [*outlines], self.like))
+            self.slopes.append(true_slopes())
 
     def _cells(self) -> None:
         """Cells by operator and width of the blend; behind them the same with gates that are open."""
@@ -234,9 +246,13 @@ class Field:
             index = None if len(used) == 1 else np.flatnonzero(shape == at)
             part = q if index is None else xp.take(q, xp.array(index, q))
             rim = far.any() if index is None else far[index].any()
-            one = self._decoded(self.shapes[at], part.reshape(2, -1), bool(rim)).reshape(
-                -1, groups, part.shape[2]
-            )
+            kind, flat = self.shapes[at], part.reshape(2, -1)
+            if isinstance(kind, OutlineShapes):
+                which = self.outline[objects if index is None else objects[index]]
+                one = kind.distance(flat, xp.array(np.tile(which, groups), q))[None]
+            else:
+                one = self._decoded(kind, flat, bool(rim))
+            one = one.reshape(-1, groups, part.shape[2])
             if index is None:
                 result = one
                 break
