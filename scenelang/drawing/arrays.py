@@ -1,7 +1,8 @@
 """The dozen functions by which numpy arrays and torch tensors differ; all else is written as both have it.
 
 The field is written once, for a network whose `xp` is `NUMPY` here or `TORCH` (`arrays_torch.py`). Points lie
-along the last axis, M. Functions leave their arguments as they are; `put`, `add` and `unit` write in place.
+along the last axis, M. Functions leave their arguments as they are; `put`, `add`, `above` and `unit` write in
+place.
 """
 
 from __future__ import annotations
@@ -78,6 +79,14 @@ class Arrays:
     def least(self, x: Array) -> Array:
         """The least of the first axis: (M,) of (R, M)."""
         return x.min(0)
+
+    def above(self, x: Array) -> Array:
+        """The parts above zero, in place."""
+        return np.maximum(x, 0.0, out=x)
+
+    def total(self, x: Array) -> Array:
+        """The sum over the first axis: (M,) of (R, M)."""
+        return np.add.reduce(x, 0)
 
     def unit(self, x: Array) -> Array:
         """Clamped to [0, 1], in place."""

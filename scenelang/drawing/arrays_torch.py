@@ -59,6 +59,12 @@ class Torch(Arrays):
     def least(self, x: Tensor) -> Tensor:
         return x.amin(0)
 
+    def above(self, x: Tensor) -> Tensor:
+        return x.relu_()
+
+    def total(self, x: Tensor) -> Tensor:
+        return x.sum(0)
+
     def unit(self, x: Tensor) -> Tensor:
         return x.clamp(0.0, 1.0)
 
