@@ -55,6 +55,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         forms=np.array([forms.get(leaf.geometry, -1) for leaf in leaves], dtype=np.int32),
         palette=palette,
         worn=worn,
+        samples=graph.samples,
     )
 
 
@@ -113,7 +114,8 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         nothing = (0.0,) * 4  # a row of an element names it by `forms`
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
         painted = [codes.material[leaf.look.material] for leaf in leaves]
-        vectors = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
+        moved, opacities = [leaf.look.moved for leaf in leaves], [leaf.look.opacity for leaf in leaves]
+        vectors = lift_colours(colours, painted, layout, moved, opacities)
         vectors += lift_many(levels, shapes, layout)  # these fill other places of the vectors
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")

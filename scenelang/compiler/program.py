@@ -7,7 +7,8 @@ end column), all -1 where unknown, ``numbers`` I32 (N,) unless 1 to N. With elem
 header lists them, ``forms`` I32 (N,) has the index of each row's geometry, and ``element.0`` and so on are
 their bytes. Where some are materials it is format 3, with a table of paints (`Paint`) and ``worn`` I32 (N,),
 the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
-where the others would. With gradients it is format 5, which has ``stops`` F32 (S, 5) beside the paints.
+where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
+places `OTHERS` of vectors, or ``samples`` other than 4, which the header then has, it is format 5.
 """
 
 from __future__ import annotations
@@ -30,12 +31,14 @@ from scenelang.assets.gradient import Gradient, stops_fault
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 from scenelang.compiler.graph import MOST_STEPS, ColourStep
 from scenelang.compiler.groups import OPERATOR, token_fault
-from scenelang.compiler.lifting import LAYOUTS, WIDTH
+from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
 from scenelang.compiler.manifest import ALIASES, available, load_manifest
 from scenelang.compiler.spaces import Stage, read_stage, stage_data
 from scenelang.language.diagnostics import plural
+from scenelang.language.nodes import SAMPLES
 from scenelang.language.words import TOKENS
 
+GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
 STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
 """Operations on a colour and how many numbers each has; files have their index here."""
 _GRADED: Final = {-1: "linear", -2: "radial"}
@@ -166,6 +169,7 @@ class Program:
         forms: int32 (N,), index of a row's element, -1 for a geometry of the model. None stands for all -1.
         palette: paints of the rows.
         worn: int32 (N,), index of a row's paint, -1 for the colour of its vector. None stands for all -1.
+        samples: of a pixel, 4 or 16 on a regular grid.
 
     Raises:
         ProgramError: anything is not as above.
@@ -186,6 +190,7 @@ class Program:
     forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
     palette: tuple[Paint, ...] = field(default=(), repr=False)
     worn: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+    samples: int = 4
 
     def __post_init__(self) -> None:
         count = len(self.objects)
@@ -230,6 +235,8 @@ class Program:
                 *settings,
                 *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
             )
+        if self.samples != 4:
+            settings = (*settings, "samples", self.samples)
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
@@ -250,16 +257,26 @@ class Program:
         """True where it has groups, or cuts with a width, as chains of sharp cuts and blends do not."""
         if (self.tokens > OPERATOR).any():
             return True
-        known = ALIASES.get(self.model, self.model)
-        if known in available() and load_manifest(known).lifting != "exact":
-            return False  # its numbers mean something else
-        layout = LAYOUTS[2 if self.stage is None else 3]
+        layout = self._layout()
+        if layout is None:
+            return False
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
     @property
     def newest(self) -> bool:
-        """True where it has what files of format 5 have alone."""
-        return any(isinstance(paint.element, Gradient) for paint in self.palette)
+        """True where it has what files of format 5 alone have: gradients, other samples, `OTHERS`."""
+        layout = self._layout()
+        if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
+            return True
+        outlines = any(element.form == "outline" for element in self.elements)
+        return outlines or any(isinstance(paint.element, Gradient) for paint in self.palette)
+
+    def _layout(self) -> Layout | None:
+        """The layout of its vectors, None where their numbers are those of a learned lifting."""
+        known = ALIASES.get(self.model, self.model)
+        if known in available() and load_manifest(known).lifting != "exact":
+            return None
+        return LAYOUTS[2 if self.stage is None else 3]
 
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
@@ -311,10 +328,12 @@ def program_bytes(program: Program) -> bytes:
     if program.palette and program.worn is not None:
         header["format"] = 3
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
-    if program.extended:
-        header["format"] = 4
     if program.newest:
-        header["format"] = 5
+        header["format"] = NEWEST
+    elif program.extended:
+        header["format"] = GROUPED
+    if program.samples != 4:
+        header["samples"] = program.samples
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -367,6 +386,8 @@ def _check_settings(program: Program) -> None:
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
     if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
         raise ProgramError(fault)
+    if type(program.samples) is not int or program.samples not in SAMPLES:
+        raise ProgramError(f"{program.samples!r} samples of a pixel, where 4 and 16 are allowed")
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
@@ -421,7 +442,7 @@ def load_program(path: str | Path, *, weights: str | None = None) -> Program:
 def parse_program(data: bytes) -> Program:
     """The Program in a file's bytes, checked but for the weights' digest; raises `ProgramError`."""
     try:
-        file = read_tensors(data, MOST_PROGRAM_BYTES, (1, 2, 3, 4, 5))
+        file = read_tensors(data, MOST_PROGRAM_BYTES, range(FORMAT, NEWEST + 1))
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
@@ -429,7 +450,8 @@ def parse_program(data: bytes) -> Program:
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
-    if header.keys() - {"stage", "elements"} != _HEADER.keys() or not all(
+    newer = {"samples"} if header["format"] == NEWEST else set()
+    if header.keys() - {"stage", "elements", *newer} != _HEADER.keys() or not all(
         isinstance(header[k], _HEADER[k]) for k in _HEADER
     ):
         raise ProgramError("the header has missing, unknown or damaged fields")
@@ -463,6 +485,7 @@ def parse_program(data: bytes) -> Program:
         forms=tensors.get("forms"),
         palette=palette,
         worn=tensors.get("worn"),
+        samples=header.get("samples", 4),
     )
 
 
@@ -470,7 +493,7 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
     """The elements of a file of format 2 or above; their tensors are taken out of it."""
     if file.header["format"] == 1 and "elements" in file.header:
         raise TensorError("elements in a file of format 1")
-    if file.header["format"] == 1 or (file.header["format"] > 3 and "elements" not in file.header):
+    if file.header["format"] == 1 or (file.header["format"] >= GROUPED and "elements" not in file.header):
         return ()
     listed = file.header.get("elements")
     if not isinstance(listed, list) or not all(
@@ -489,8 +512,8 @@ def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
     format = file.header["format"]
     newer = ({"forms"} if format > 1 else set()) | ({"worn", *_PAINTS} if format > 2 else set())
-    if format > 3:  # these are there where scenes have elements, and where materials are among them
-        newer &= file.tensors.keys() if "elements" in file.header or format > 4 else set()
+    if format >= GROUPED:  # these are there where scenes have elements, and where materials are among them
+        newer &= file.tensors.keys() if "elements" in file.header or format == NEWEST else set()
         if "worn" in newer:
             newer |= _PAINTS
         if format > 4 and "worn" in newer:

@@ -104,7 +104,8 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
     if zoo is None:
         return ""
-    result = [element for element in zoo.elements if element.name == name and element.material == worn]
+    names = (name, name.removesuffix("_size"))  # what an element says has its size
+    result = [element for element in zoo.elements if element.name in names and element.material == worn]
     parts = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
         parts.append(f"```text\n{name}(): {told(zoo.groups[name])}\n```")

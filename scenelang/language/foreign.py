@@ -186,7 +186,7 @@ STATEMENTS: Final = _each_word(
         "echo print": "nothing is printed while a scene is made",
         "return": "a function is one expression: fn f(x) = x ^ 2;",
         "while": "loops run over a range or a vector: for (i in 0..<n) { … }",
-        "opacity alpha": "objects are opaque, but for `volumetric` in 3D",
+        "alpha": "write opacity(a) in a material's block; in 3D `volumetric` is translucent",
         "rotatex rotate_x rotx": "write rotate(90deg, axis = X);",
         "rotatey rotate_y roty": "write rotate(90deg, axis = Y);",
         "rotatez rotate_z rotz": "write rotate(90deg);",

@@ -24,7 +24,7 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
+from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env, Session
@@ -81,6 +81,20 @@ def _side(value: Any, operand: int) -> int:
     return int(side)
 
 
+def _share(value: Any, operand: int) -> float:
+    share = number(value, operand)
+    if not 0.0 <= share <= 1.0:
+        raise Problem("E0311", f"an opacity of {show(share)} is outside 0..1", operand=operand)
+    return share
+
+
+def _samples(value: Any, operand: int) -> int:
+    count = number(value, operand)
+    if count not in SAMPLES:
+        raise Problem("E0311", f"{show(count)} samples a pixel, where it takes 4 or 16", operand=operand)
+    return int(count)
+
+
 def _positive(value: Any, operand: int, what: str) -> float:
     size = float(value.size) if value.__class__ is Time and what == "length" else number(value, operand)
     if size <= 0.0:
@@ -100,6 +114,22 @@ def _factor(value: Any, operand: int) -> float:
         help = "decimals stand behind a point, as in 0.5"
         raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand)
     return factor
+
+
+def _growth(value: Any, operand: int) -> float:
+    growth = number(value, operand)
+    if not -0.5 <= growth <= 1.0:
+        help = "r is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a growth of {show(growth)} is outside -0.5..1", help, operand)
+    return growth
+
+
+def _wall(value: Any, operand: int) -> float:
+    wall = number(value, operand)
+    if not 0.0 < wall <= 1.0:
+        help = "w is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a wall of {show(wall)} is not above 0 and at most 1", help, operand)
+    return wall
 
 
 def _axis(value: Any, operand: int) -> tuple[float, ...]:
@@ -133,6 +163,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
     "factor": _factor,
+    "growth": _growth,
+    "wall": _wall,
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,
@@ -140,6 +172,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "opaque": _opaque,
     "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
     "side": _side,
+    "share": _share,
+    "samples": _samples,
     "seconds": lambda value, at: _positive(value, at, "length"),
     "fps": lambda value, at: _positive(value, at, "frame rate"),
     "boolean": _boolean,
@@ -166,7 +200,7 @@ class Spec(Record):
     word: words.Word
     help: str | None  # advice for a wrong number of arguments; None prints the signature
     spread: bool  # whether one vector may stand for all arguments
-    node: type[Frozen] | None  # None for the size and the background of the picture
+    node: type[Frozen] | None  # None for a single value: of a material, or of the picture
     rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]  # field, reader, default, number
     stated: bool  # whether it is a setting
 
@@ -297,6 +331,8 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         if POISON in values:
             return None
         try:
+            if spec.word.name in words.PROPERTIES:
+                return spec.read(values)[spec.word.params[0]]
             node = _shear(spec, values) if spec.node is Shear else spec.build(values)
         except Problem as problem:
             advice.report_problem(session.report, problem, span, operands)
@@ -306,6 +342,11 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         return node
 
     def append(node: Any, out: Builder) -> None:
+        if (name := spec.word.name) in words.PROPERTIES:
+            first = out.properties.setdefault(name, (span, node))[0]
+            if first is not span:
+                _twice(name, span, first, session.report)
+            return
         if out.moved is None:
             out.moved = span  # even by a transform with a mistake: children have their order all the same
         if node is not None:
@@ -334,6 +375,11 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         append(construct([LEFT_OUT if get is None else get(env) for get in getters]), out)
 
     return action
+
+
+def _twice(name: str, span: Span, first: Span, report: Reporter) -> None:
+    labels = (Label(first, "first given here"),)
+    report.error("E0333", f"`{name}` is given twice", span, labels=labels, help="leave one of them out")
 
 
 def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
@@ -389,7 +435,8 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
     where = Written(name.span, written.span)
 
     def run(env: Env) -> Material:
-        material = make(Material, {"name": called, "ops": operations(env), "shading": shading})
+        ops, given = operations(env)
+        material = make(Material, {"name": called, "ops": ops, "shading": shading, "opacity": 1.0, **given})
         session.spans.record(material, where)
         _check_stops(material, where, session)
         return material
@@ -463,17 +510,20 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     return word.text
 
 
-def _operations(body: tree.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
-    """Function that returns the operations of a material's block."""
+def _operations(
+    body: tree.Block | None, place: Place
+) -> Callable[[Env], tuple[tuple[Any, ...], dict[str, Any]]]:
+    """Function that returns the operations of a material's block, and the properties that it gives."""
     if body is None:
-        return lambda env: ()
+        return lambda env: ((), {})
     prepared = prepare_inner(body, place.inner("material"))
     session, span = place.session, body.span
 
-    def run(env: Env) -> tuple[Any, ...]:
+    def run(env: Env) -> tuple[tuple[Any, ...], dict[str, Any]]:
         out = Builder()
         prepared.run(env, out, session, span)
-        return tuple(out.transforms)
+        given = {name: value for name, (_, value) in out.properties.items() if value is not None}
+        return tuple(out.transforms), given
 
     return run
 
@@ -541,8 +591,8 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         material = value.material
         if stmt.body is not None:
-            ops = (*material.ops, *operations(env))
-            material = make(Material, {"name": material.name, "ops": ops, "shading": material.shading})
+            ops, given = operations(env)
+            material = make(Material, {**material.__dict__, "ops": (*material.ops, *ops), **given})
             session.spans.record(material, where)
             _check_stops(material, where, session)
         _give(material, span, out, place)

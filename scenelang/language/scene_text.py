@@ -91,6 +91,8 @@ def vector(values: Iterable[float]) -> str:
 def material(value: Material) -> str:
     """A material statement."""
     ops = " ".join(map(transform, value.ops))
+    if value.opacity != 1.0:
+        ops += f" opacity({number(value.opacity)});"
     name = value.name if value.shading is None else f"{value.shading} {value.name}"
     return f"material {name} {{ {ops} }}" if ops else f"material {name};"
 

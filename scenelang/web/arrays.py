@@ -27,8 +27,7 @@ from scenelang.compiler.groups import OPERATOR, widths_of
 from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.compiler.spaces import Stage
-from scenelang.drawing.neural.frames import Frames
+from scenelang.drawing.neural.frames import Frames, read_skins
 from scenelang.drawing.solid.passes import read_solid_frame
 
 MODULES: Final = (
@@ -177,7 +176,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     else:
         scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
-    rows = []
+    rows, skins = [], read_skins(parts)
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
         row = {
             "token": int(program.tokens[i]),
@@ -186,12 +185,17 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "steps": _row_steps(v.astype(np.float64), layout),
             "scale": scales[i],
             "colour": parts.rgb[i].tolist(),
+            "opacity": 1.0 - min(max(float(parts.clear[i]), 0.0), 1.0),
             "paint": -1,
             "amount": 0.0,
             "frequency": 0.0,
             "blend": widths[i],
             "object": program.numbers[i],
         }
+        if skins is not None:
+            if form >= 0 and skins.at(i).reach > 0:
+                raise ProgramError(f"`{program.objects[i]}` grows, and no page draws elements that do")
+            row["skin"] = [float(number) for number in skins.at(i)]
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()
         if worn >= 0:
@@ -202,24 +206,6 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             row["place"] = parts.texture[i].tolist()
         rows.append(row)
     return rows
-
-
-def stage_of(stage: Stage) -> dict[str, Any]:
-    """A stage as JSON data, with the camera's axes."""
-    camera, light, ground = stage.camera, stage.light, stage.ground
-    return {
-        "eye": camera.eye,
-        "axes": camera.axes(),
-        "target": camera.target,
-        "fov": camera.fov_rad,
-        "light": light.position,
-        "power": light.power,
-        "lightRgb": light.rgb,
-        "ground": ground and {"y": ground.y, "rgb": ground.rgb},
-        "horizon": stage.horizon,
-        "zenith": stage.zenith,
-        "transparent": stage.transparent,
-    }
 
 
 def _index(known: np.ndarray, code: np.ndarray) -> int:

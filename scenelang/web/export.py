@@ -27,7 +27,7 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError, load_program
-from scenelang.compiler.spaces import encoded
+from scenelang.compiler.spaces import encoded, stage_data
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import FramedArrays
 from scenelang.drawing.render import render
@@ -38,7 +38,7 @@ from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
-from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, stage_of, web, worn_of
+from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
 
 if TYPE_CHECKING:
@@ -187,8 +187,9 @@ def view_of(
         "paints": paints_of(elements, store),
         "program": {
             "rows": rows_of(program, manifest, network.codes, network.material_codes),
-            "stage": program.stage and stage_of(program.stage),
+            "stage": program.stage and stage_data(program.stage),
             "background": program.background,
+            "samples": program.samples,
         },
         "form": form and form.data,
         "params": form.params if form else [],

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Final, TypeVar
 
 from scenelang.assets.element import Element
@@ -18,10 +19,13 @@ from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.spaces import Stage, stage_data
+from scenelang.language import scene
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
+from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
@@ -81,6 +85,7 @@ class Bound:
     at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
     uses: list[Bound] = field(default_factory=list)  # names of files
     element: str = ""  # the name in a Scene of a geometry from a file of elements
+    number: float | None = None  # the value of a size from one
 
 
 @dataclass(slots=True)
@@ -151,7 +156,11 @@ class Writer:
                     lines += self.file(brought, imported_tree, inside, imported=True)
                     continue
                 for name, binding in brought.scope.names.items():
-                    inside.names[name] = Bound("element", inside, file=brought, element=binding.value)
+                    inside.names[name] = bound = Bound(binding.kind, inside, file=brought)
+                    if binding.kind == "element":
+                        bound.element = binding.value
+                    else:
+                        bound.number = binding.value
             elif isinstance(stmt, nodes.Let | nodes.Param):
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
@@ -230,6 +239,8 @@ class Writer:
 
     def value(self, bound: Bound, scope: Scope) -> Json:
         """A variable."""
+        if bound.number is not None:
+            return bound.number
         if bound.scope.frame is None:
             self.uses.append(bound)
             return ["g", bound.slot]
@@ -259,6 +270,12 @@ class Writer:
                 return ["#", *(round(255 * part) for part in expr.rgb)]
             case nodes.Vector():
                 return ["[", *self.given(expr.items, scope)]
+            case nodes.ForItem():
+                items, inside = self.expression(expr.iterable, scope), Scope(scope.frame, scope)
+                target = self._define(expr.variable, "loop", inside)
+                return ["for", *target, items, self.expression(expr.body, inside)]
+            case nodes.IfItem():
+                return ["if", self.expression(expr.condition, scope), self.expression(expr.body, scope)]
             case nodes.Range():
                 ends = self.given((expr.start, expr.stop, expr.step), scope)
                 return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]
@@ -374,12 +391,15 @@ class Writer:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
         worn = bound is not None and bound.kind in _VALUES and stmt.args is None
-        if name in SETTINGS and not worn and (bound is None or bound.kind != "module"):
+        hidden = worn or (bound is not None and bound.kind == "module")
+        if name in SETTINGS and not hidden:
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
-            return None if name == "canvas" else [name, *args]
-        if name in LANGUAGE or (name in NEWER and (bound is None or kind == "material")):
+            word = (name,) if name == "animate" else ("set", name)
+            return None if name == "canvas" else [*word, *args]
+        moves = name in LANGUAGE or (name in NEWER and name not in SETTINGS)
+        if moves and (kind == "material" or not hidden):
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
         if bound is None:
@@ -484,6 +504,7 @@ def form_of(
         "slots": writer.slots,
         "calls": writer.calls,
         "plain": 0,
+        "stage": _stage(),
         "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
         "geometries": manifest.geometries,
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],
@@ -499,6 +520,18 @@ def form_of(
         tuple(writer.shapes),
         tuple(writer.paints),
     )
+
+
+@cache
+def _stage() -> Json:
+    """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
+    usual, fields = Stage(), {}
+    for name, word in STAGE.items():
+        schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
+        ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
+        columns = zip(getattr(usual, name).__match_args__, word.kinds, ranges, strict=True)
+        fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
+    return {"usual": stage_data(usual), "fields": fields}
 
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:

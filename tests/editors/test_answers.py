@@ -291,6 +291,27 @@ def test_rename_goes_across_imports_and_keeps_the_meaning(client: Client, uri: s
     assert client.applied(SCENE, changes[uri]) == SCENE.replace("size = r", "side = r")
 
 
+def test_loops_in_vectors_are_completed_told_and_renamed(client: Client, uri: str) -> None:
+    text = "let late = 1;\nlet v = [for (i in 0..3) if (i > 1) [i, late]];\nsquare { scale(len(v)); }\n"
+    client.replace(uri, text)
+    assert "for (i in 0..3)" in hover(client, client.at(uri, "[i,", 1))
+    edit = client.request("textDocument/rename", {**client.at(uri, "i in", 0), "newName": "turn"})
+    (changes,) = [c["edits"] for c in edit["documentChanges"]]
+    renamed = text.replace("(i in", "(turn in").replace("(i >", "(turn >").replace("[i,", "[turn,")
+    assert client.applied(text, changes) == renamed
+    client.replace(uri, text + "let w = [for (k in 0..3) , for (")
+    for before, offered, withheld in (
+        ("0..3) ,", "k late for if sin", "star"),
+        ("3) , ", "late for if sin", "k"),
+        ("3) , for (", "", "late for"),
+        ("(k ", "in", "late"),
+        ("(i > ", "i late", "for"),
+    ):
+        found = set(labels(client, client.at(uri, before, len(before) - before.endswith(","))))
+        assert set(offered.split()) <= found, before
+        assert not set(withheld.split()) & found, before
+
+
 def test_rename_refuses_what_would_change_the_meaning(client: Client, uri: str) -> None:
     for word, shift, new, why in (
         ("let r", 4, "k", "already defined in line 3"),

@@ -35,6 +35,7 @@ from scenelang.web.plane import leaves
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.browser import watched
 from tests.drawing.test_bounds import of_sets, rng_of, wild
+from tests.drawing.test_opacity import see_through
 from tests.drawing.test_trees import LEFT, scene_of
 from tests.pictures import premultiplied, psnr_db
 from tests.test_examples import SCENES, sized
@@ -122,7 +123,7 @@ def asked(program: Program, p: np.ndarray) -> np.ndarray:
     coverage, points = Coverage(field, skip=False), np.ascontiguousarray(p.T)[:, :, None]
     trace = field.trace(len(p), count)
     memory = coverage.ask(meetings, points, tile, trace)[2]
-    add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool), 0.0)
+    add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool))
     found: np.ndarray = memory[:, :, 0]
     found[:, 0] /= field.unit
     return found
@@ -242,6 +243,20 @@ def test_trees_are_the_networks(page: Any) -> None:
 
 
 @pytest.mark.browser
+def test_what_is_seen_through_and_sixteen_samples_are_the_networks(page: Any) -> None:
+    found = {}
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        scene = see_through(random_scene(rng, SETS["trees" if seed % 2 else "textures2d"]), rng)
+        changes = {"background": None if seed % 3 else "default", "samples": 16 if seed % 4 == 1 else 4}
+        program = nsg.compile(scene.sized((88, 80)).model_copy(update=changes))
+        found[seed] = compared(page, program)
+    assert min(found.values()) > LEAST_DB[2], found
+    solid = random_solid(np.random.default_rng(4), SOLID_SETS["diffuse"]).sized((48, 40))
+    assert compared(page, nsg.compile(solid.model_copy(update={"samples": 16}))) > LEAST_DB[3]
+
+
+@pytest.mark.browser
 def test_pyramids_unfold_as_elements_do(page: Any) -> None:
     elements = [
         *(element(square, d=2, levels=levels) for levels in (1, 2, 5)),
@@ -312,6 +327,15 @@ CORNERS = {
             smooth(0.3) sphere { scale(0.5); translate(0.7, 0.3, 0); }
             subtract torus { twirl(1.3); scale(0.7); translate(0.1, 0.2, 0.5); }
             intersect sphere { scale(1.1); translate(0.1, 0, 0); }
+        }
+        """,
+    "skins": """
+        canvas(64, 48);
+        chain {
+            sphere { shell(0.3); displace(0.05, 7); scale(0.7); translate(-0.7, 0, 0); }
+            subtract sphere { grow(-0.2); scale(0.8); translate(-0.7, 0.5, 0.5); }
+            torus { displace(0.04, 8); shell(0.2); grow(0.05); twist(0.5); scale(0.5); translate(0.7, 0.1, 0);
+                material volumetric { color(#8af); } }
         }
         """,
 }

@@ -107,6 +107,68 @@ class GridShape(Lattice):
         return xp.stack(rows, 0)
 
 
+NEARER = 4  # times that the point of a surface is sought that is nearest to a point outside of the cube
+ALONG = 0.6  # of the way along the surface to where a plane would be nearest: it may be round
+
+
+class GrownShape(GridShape):
+    """A grid of an object that reaches out of the cube, where its distances are true ones, too.
+
+    The point of the surface that is nearest to a point outside is sought: from that nearest to the nearest
+    point of the cube, along the surface to where it faces the point.
+    """
+
+    def slopes(self) -> Slopes:
+        """Infinite bounds: nothing is proved of where guesses end."""
+        return Slopes(np.full((len(RADII), CELLS, CELLS), np.inf), np.inf)
+
+    def distance(self, q: Array) -> Array:
+        xp, inside = self.xp, q.clip(-1.0, 1.0)
+        result = self.at(inside)
+        some = xp.where(((q - inside) * (q - inside)).sum(0) > 0)
+        if len(some):
+            xp.put(result, some, self._nearest(xp.take(q, some))[1])
+        return result
+
+    def field(self, q: Array, gradient: bool) -> Array:
+        result, xp = super().field(q, gradient), self.xp
+        some = xp.where(((q - q.clip(-1.0, 1.0)) * (q - q.clip(-1.0, 1.0))).sum(0) > 0)
+        if gradient and len(some):
+            away = self._nearest(xp.take(q, some))[0]
+            xp.put(result[1:], some, away / xp.length([*away]).clip(1e-9))
+        return result
+
+    def _nearest(self, q: Array) -> tuple[Array, Array]:
+        """Ways (d, M) to points outside of the cube from the nearest of the surface, about, and lengths."""
+        xp = self.xp
+        best, normal = self._foot(q.clip(-1.0, 1.0))
+        least = xp.length([*(q - best)])
+        for _ in range(NEARER):
+            away = q - best
+            along = away - (away * normal).sum(0) * normal
+            found, turned = self._foot((best + ALONG * along).clip(-1.0, 1.0))
+            far = xp.length([*(q - found)])
+            nearer = far < least
+            best, normal = xp.select(nearer, found, best), xp.select(nearer, turned, normal)
+            least = xp.select(nearer, far, least)
+        return q - best, least
+
+    def _foot(self, q: Array) -> tuple[Array, Array]:
+        """Points of the surface (d, M) that are nearest to points of the cube, and unit normals there."""
+        xp, step, rows = self.xp, 0.5 / self.half, []
+        for axis in range(self.d):
+            ends = []
+            for way in (step, -step):
+                moved = [*q]
+                moved[axis] = (q[axis] + way).clip(-1.0, 1.0)
+                ends.append((self.at(xp.stack(moved, 0)), moved[axis]))
+            (ahead, last), (behind, first) = ends
+            rows.append((ahead - behind) / (last - first))
+        slope = xp.stack(rows, 0)
+        normal = slope / xp.sqrt((slope * slope).sum(0)).clip(1e-9)
+        return q - self.at(q) * normal, normal
+
+
 @lru_cache(maxsize=8)
 def _grid(element: Element) -> np.ndarray:
     try:
@@ -115,10 +177,12 @@ def _grid(element: Element) -> np.ndarray:
         raise ProgramError(str(error)) from None
 
 
-def grid_shape(element: Element, xp: Arrays, like: Array) -> GridShape:
-    """The shape of an element, where an array lies; raises ProgramError where it is damaged."""
+def grid_shape(element: Element, xp: Arrays, like: Array, grown: bool = False) -> GridShape:
+    """The shape of an element, of objects that reach out of it if ``grown``, where an array lies; raises
+    ProgramError where it is damaged.
+    """
     grid = _grid(element)
-    return GridShape(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
+    return (GrownShape if grown else GridShape)(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
 
 
 EDGE = 64.0  # texels to a leaf unit that a hard edge counts as

@@ -58,15 +58,20 @@ function fewerInks(steps) {
 
 /**
  * What a row says of a material.
- * @param {Wearing} worn - its `ops` are maps {rows} and colour steps
+ * @param {Wearing} worn - its `ops` are maps {rows}, colour steps and opacities, of which the last one counts
  */
 export function lookOf(worn, form) {
   let moved = IDENTITY;
   const steps = [], stops = [];
+  let opacity = 1;
   for (const op of worn.ops) {
     if (op[0] === "stop") {
       const rgb = op.slice(2).map(shareOf);
       stops.push([op[1], ...(form.dimension === 3 ? linearColour(rgb) : rgb)]);
+      continue;
+    }
+    if (op[0] === "opacity") {
+      opacity = op[1];
       continue;
     }
     if (Array.isArray(op)) {
@@ -81,7 +86,8 @@ export function lookOf(worn, form) {
   }
   if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
   checkStops(stops, worn.paint >= 0 && form.graded[worn.paint]);
-  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1] };
+  if (opacity !== 1 && form.dimension === 3) refuse("in space nothing but mist is translucent");
+  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity };
   if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
   const paintSteps = fewerInks(steps);
   if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");
