@@ -477,7 +477,7 @@ class Workspace:
         library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
         if library is None:
             return None
-        result = library.names.top.symbols.get(use.text.partition(".")[0])
+        result = library.names.top.names.get(use.text.partition(".")[0])
         return (library, result) if result is not None and result.is_exported else None
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:
