@@ -202,7 +202,6 @@ function opacityFrom(share) {
 function samplesFrom([count] = [4]) {
   return [4, 16].includes(bare(count)) ? count : refuse(`${count} samples a pixel`);
 }
-};
 
 const STATEMENTS_OF_FORMS = {
   no: ([why]) => () => refuse(why),
