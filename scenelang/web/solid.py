@@ -67,7 +67,8 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
 
 def _struct(name: str, part: Record) -> str:
     """GLSL of the type of a part of the stage, behind those of its own parts."""
-    fields = {field: getattr(part, field) for field in part.__match_args__}
+    names: tuple[str, ...] = part.__match_args__
+    fields = {field: getattr(part, field) for field in names}
     inner = [_struct(field.title(), value) for field, value in fields.items() if isinstance(value, Record)]
     types = {tuple: "vec3", float: "float", bool: "bool"}
     lines = [f"{types.get(type(value), field.title())} {field};" for field, value in fields.items()]
