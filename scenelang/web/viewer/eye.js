@@ -55,7 +55,9 @@ function leafAt(row, distanceOf, eye) {
   if (distanceOf === undefined) return NOTHING_THERE;
   const [x, y, z] = carriedBack(row.steps, eye), f = row.frequency;
   const bump = row.amount * Math.sin(f * x) * Math.sin(f * y) * Math.sin(f * z);
-  return [(distanceOf(x, y, z) + bump) * row.scale, row];
+  const [first, wall, last, late] = row.skin ?? [0, 0, 0, 0];
+  const depth = distanceOf(x, y, z) + (1 - late) * bump - first;
+  return [((wall > 0 ? Math.abs(depth) - wall : depth) - last + late * bump) * row.scale, row];
 }
 
 /** Throws NotLive where the eye is inside an opaque object; what has no formula counts as far away. */

@@ -224,7 +224,8 @@ void main() {
 layout(location = 0) out vec4 picture;
 #ifdef FOUR
 uniform sampler2D once, shown;
-const float CONTRAST = 0.04; // pixels that differ more from between their neighbours are sampled four times
+uniform int along; // samples along a side of a pixel
+const float CONTRAST = 0.04; // pixels that differ more from between their neighbours are sampled so often
 
 vec4 near(ivec2 at) {
   return texelFetch(shown, clamp(at, ivec2(0), ivec2(canvas.xy) - 1), 0);
@@ -253,14 +254,16 @@ void main() {
     abs(near(pixel + ivec2(0, 1)) + near(pixel - ivec2(0, 1)) - here));
   bool even_ = max(max(bend.x, bend.y), max(bend.z, bend.w)) <= CONTRAST;
   if (even_ && min(canvas.x, canvas.y) > 1.0) return; // a line of pixels shows too little of what changes
-  const int samples = 4;
+  const bool whole = false; // whether a sample stands for all of its pixel
 #else
-  const int samples = 1;
+  const int along = 1;
+  const bool whole = true;
 #endif
+  int samples = along * along;
   for (int i = zero; i < samples; i++) {
-    vec2 off = samples == 1 ? vec2(0.0) : vec2(i & 1, i >> 1) * 0.5 - 0.25;
+    vec2 off = (vec2(i % along, i / along) + 0.5) / float(along) - 0.5;
     vec2 at = (gl_FragCoord.xy + off - 0.5 * canvas.xy) * canvas.z;
-    shade(normalize(forward + at.x * right + at.y * up), list, samples == 1 ? canvas.z : 0.0, one, plain);
+    shade(normalize(forward + at.x * right + at.y * up), list, whole ? canvas.z : 0.0, one, plain);
     light += one / float(samples);
   }
 #ifndef FOUR

@@ -6,7 +6,7 @@ import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
 import { axesOf } from "./stage.js";
 
-const ROW_TEXELS = 13; // as the shader has it
+const ROW_TEXELS = 14; // as the shader has it
 const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around the light
@@ -45,6 +45,7 @@ function tableOf(view, rows, joins, balls, elements) {
       : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
     const ops = (paint ? row.paintSteps : []).map(([kind, a, b = 0, c = 0]) => [COLOUR_STEPS[kind], a, b, c]);
+    const stops = row.stops ?? [];
     const [a, b, u, c, d, v] = row.place ?? [0, 0, 0, 0, 0, 0], grid = elements.grids[row.shape];
     const turn = (x) => x - Math.floor(x);
     blocks[i].set([
@@ -55,11 +56,13 @@ function tableOf(view, rows, joins, balls, elements) {
       ...box[0], ball * ball,
       ...box[1], rate,
       ...plainColour(view, row), material.medium,
-      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, places.get(joins[i].around),
-      // to shares of the picture's sides, from its upper left corner
-      a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
-      -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      paint ? paint.kind : 0, more([...stops, ...ops]), ops.length, places.get(joins[i].around),
+      // to (u, v), or to shares of the picture's sides, from its upper left corner
+      ...(row.stops ? [a, b, u, 0, c, d, v, stops.length] : [
+        a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0, -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      ]),
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
+      ...(row.skin ?? [0, 0, 0, 0]),
     ]);
   });
   const data = new Float32Array(blocks.length * 4 * ROW_TEXELS);
@@ -87,6 +90,7 @@ function featuresOf(view, rows, joins, balls) {
     TURNS: balls.some((ball) => ball.rest.length > 0),
     FAR: balls.some((ball) => ball.radius > view.network.far),
     BUMPS: has((row) => row.amount !== 0),
+    SKINS: has((row) => row.skin?.some(Boolean)),
     OTHERS: joins.some(({ draws }) => !draws),
   }).filter(([, holds]) => holds).map(([name]) => name);
   return [...learned, ...others];
@@ -200,6 +204,7 @@ export function solidDrawer(gl, view) {
       gl.uniform1i(at(name), unit);
     });
     gl.uniform1i(at("zero"), 0);
+    gl.uniform1i(at("along"), Math.sqrt(ready.program.samples));
     const vectors = {
       forward: axes[0].map((v) => v * ready.near), right: axes[1], up: axes[2],
       canvas: [ready.width, ready.height, ready.pixel],
@@ -225,7 +230,7 @@ export function solidDrawer(gl, view) {
     }
   }
 
-  /** One sample of each pixel, then four where these differ. */
+  /** One sample of each pixel, then all where these differ. */
   function* render(into, format, names) {
     const { width, height } = ready;
     if (!first || first.width !== width || first.height !== height || first.format !== format) {
