@@ -517,13 +517,13 @@ def form_of(
 @cache
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
-    usual, fields = Stage(), {}
+    usual, fields = stage_data(Stage()), {}
     for name, word in STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
-        columns = zip(getattr(usual, name).__match_args__, word.kinds, ranges, strict=True)
+        columns = zip(usual[name], word.kinds, ranges, strict=True)
         fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
-    return {"usual": stage_data(usual), "fields": fields}
+    return {"usual": usual, "fields": fields}
 
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
