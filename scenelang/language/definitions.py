@@ -253,6 +253,8 @@ class Names:
             role = "operation"
         elif name in TRANSFORMS:
             role = "transform"
+        elif (module := scope.find(name)) and module.kind == "module" and tree.is_leaf(stmt, module.node):
+            role = "geometry"
         span = stmt.name.span
         head = self._add(span, name, role) if role else self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)

@@ -435,6 +435,8 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
         return prepare_setting(stmt, place)
     if name in words.LANGUAGE:
         return prepare_move(stmt, place)
+    if binding is not None and binding.kind == "module" and tree.is_leaf(stmt, binding.value.node):
+        binding = None
     if binding is None:
         if name in words.GEOMETRIES:
             return blocks.prepare_object(stmt, place)

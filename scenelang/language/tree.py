@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Span
-from scenelang.language.words import Combine
+from scenelang.language.words import GEOMETRIES, Combine
 
 
 class Spanned(Record):
@@ -239,6 +239,13 @@ class File(Spanned):
 
 
 # ---------------------------------------------------------------- walking
+
+
+def is_leaf(call: Call, module: Stmt) -> bool:
+    """Test whether ``disc { … }``, inside the module of that name, is the leaf: without parentheses."""
+    here, there = call.span, module.span
+    within = here.source is there.source and there.start <= here.start < there.end
+    return within and call.args is None and call.name.text in GEOMETRIES
 
 
 def children(node: Any) -> Iterator[Any]:

@@ -372,7 +372,7 @@ class Writer:
         if name in LANGUAGE:
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
-        if bound is None:
+        if bound is None or (bound.kind == "module" and nodes.is_leaf(stmt, bound.node)):
             if name not in self.manifest.geometries:
                 return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
             return ["object", self.manifest.geometries.index(name), body or []]
