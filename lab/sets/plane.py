@@ -25,6 +25,7 @@ from scenelang.language.scene import (
     Flip,
     Grayscale,
     Group,
+    Grow,
     Hue,
     Link,
     Material,
@@ -35,6 +36,7 @@ from scenelang.language.scene import (
     Scene,
     SceneNode,
     Shear,
+    Shell,
     Transform,
     Translate,
     Twirl,
@@ -66,6 +68,7 @@ class SetConfig:
     # how objects are put together: "chain", "groups" (each in two nested groups), "tree", which needs no
     # group of a stream, "any" tree, or the "leaves" of such a tree as a chain
     nest: str = "chain"
+    skins: bool = False  # whether objects grow, or are shells, or both
 
 
 SETS: dict[str, SetConfig] = {
@@ -87,6 +90,7 @@ SETS: dict[str, SetConfig] = {
     "crowd": SetConfig(objects=(100, 100), size=0.4),
     "strong": SetConfig(warp=2.4),
     "large": SetConfig(size=3.0),
+    "skins": SetConfig(skins=True),
     "textures2d": SetConfig(
         unions=1.0, deformed=False, geometries=("square",), rotated=False, textures="few"
     ),
@@ -160,10 +164,17 @@ def _texture(rng: Rng, config: SetConfig) -> Material:
     )
 
 
+def random_skin(rng: Rng) -> list[Transform]:
+    """Growth, a shell, or both in either order."""
+    grow, shell = Grow(_uniform(rng, -0.2, 1.0)), Shell(_uniform(rng, 0.04, 0.8))
+    kinds: tuple[list[Transform], ...] = [grow], [shell], [grow, shell], [shell, grow]
+    return kinds[int(rng.integers(len(kinds)))]
+
+
 def random_object(rng: Rng, config: SetConfig) -> Object:
     colour = _colour(rng)
     geometry = config.geometries[int(rng.integers(len(config.geometries)))]
-    moves = tuple(_moves(rng, config))
+    moves = (*(random_skin(rng) if config.skins else ()), *_moves(rng, config))
     if config.textures == "few" or (config.textures and rng.random() < 0.8):
         return Object(geometry, moves, _texture(rng, config))
     return Object(geometry, moves, Material("flat", (colour,)))

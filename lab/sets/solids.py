@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lab.sets.plane import Rng, any_tree
+from lab.sets.plane import Rng, any_tree, random_skin
 from scenelang.language.scene import (
     Bend,
     Brought,
@@ -58,6 +58,7 @@ class SolidConfig:
     staged: bool = False  # a random camera, light, ground and sky
     canvas: tuple[int, int] = (128, 128)  # pixels
     meshes: str = ""  # a file of elements whose solids take the place of spheres and tori
+    skins: bool = False  # whether objects grow, or are shells, or both
     trees: bool = False  # any trees of booleans; see `lab.sets.plane.any_tree`
     leaves: tuple[str, ...] = ("sphere", "torus")
 
@@ -70,6 +71,7 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "booleans": SolidConfig(unions=0.0, objects=(2, 4), spread=0.5),
     "trees": SolidConfig(trees=True, media=0.3, spread=0.5),
     "shuffled": SolidConfig(shuffled=True),
+    "skins": SolidConfig(skins=True, unions=0.5, size=0.7),
     "wide": SolidConfig(canvas=(160, 96)),
     "staged": SolidConfig(staged=True),
     "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
@@ -130,7 +132,8 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
     def solid() -> Object:
         kind = "volumetric" if rng.random() < config.media else "diffuse"
         material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
-        return Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
+        moves = [*(random_skin(rng) if config.skins else ()), *_moves(rng, config)]
+        return Object(geometries[int(rng.integers(len(geometries)))], moves, material)
 
     if config.trees:
         return Scene(model="solids3d", canvas=config.canvas, nodes=(any_tree(rng, solid),))

@@ -41,6 +41,7 @@ class Arrays:
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     order: ClassVar[Any] = staticmethod(lambda x: x.argsort(kind="stable"))  # indices that sort (M,)
+    frozen: ClassVar[Any] = staticmethod(lambda x: x)  # the same numbers, without their gradients
     exp: ClassVar[Any] = np.exp
     log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos

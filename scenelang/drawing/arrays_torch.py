@@ -30,6 +30,7 @@ class Torch(Arrays):
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
     order = staticmethod(lambda x: x.argsort(stable=True))
+    frozen = staticmethod(Tensor.detach)
     exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin
     sqrt, floor = torch.sqrt, torch.floor
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where

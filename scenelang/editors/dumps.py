@@ -13,6 +13,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
@@ -27,7 +28,7 @@ from scenelang.compiler.spaces import (
     encoded,
     stage_data,
 )
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Twist, Warp
 from scenelang.language import scene as schema
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Span, plural
@@ -115,11 +116,12 @@ def dump(graph: Graph) -> str:
 
 def look_text(look: Look, space: Space) -> str:
     """A colour; or a texture with its moves and the operations on its colours."""
+    clear = "" if look.opacity == 1.0 else f" opacity({look.opacity:.6g})"
     if look.element is None:
-        return hex_text(space.written(look.colour()))
+        return hex_text(space.written(look.colour())) + clear
     moves = [move_text(Move(step), PLANE) for step in look.texture]
     steps = [f"{kind}({' '.join(f'{v:.6g}' for v in numbers)})" for kind, *numbers in look.colours]
-    return " ".join([look.element.name, *moves, *steps])
+    return " ".join([look.element.name, *moves, *steps]) + clear
 
 
 def move_text(move: Move, space: Space) -> str:
@@ -131,6 +133,10 @@ def move_text(move: Move, space: Space) -> str:
         return f"twist({step.twist:.6g})"
     if isinstance(step, Displace):
         return f"displace({step.amount:.6g}; {step.frequency:.6g})"
+    if isinstance(step, Grow):
+        return f"grow({step.r:.6g})"
+    if isinstance(step, Shell):
+        return f"shell({step.w:.6g})"
     if step.rows == IDENTITY:
         return "[identity]"
     rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)
@@ -176,6 +182,7 @@ def graph_data(graph: Graph) -> dict[str, Any]:
         "canvas": list(graph.canvas),
         "background": None if graph.background is None else list(graph.background),
         "dimension": graph.space.dimension,
+        **({} if graph.samples == 4 else {"samples": graph.samples}),
         **({} if graph.stage is None else {"stage": stage_data(graph.stage)}),
         "root": root,
     }
@@ -189,6 +196,8 @@ def _node(node: Node) -> dict[str, Any]:
             "material": node.look.material,
             "rgb": list(node.look.colour()),
         }
+        if node.look.opacity != 1.0:
+            look["opacity"] = node.look.opacity
         if (element := node.look.element) is not None:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
@@ -199,7 +208,9 @@ def _node(node: Node) -> dict[str, Any]:
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
-def _texture(element: Element) -> dict[str, Any]:
+def _texture(element: Element | Gradient) -> dict[str, Any]:
+    if isinstance(element, Gradient):
+        return {"name": element.name, "stops": [list(stop) for stop in element.stops]}
     return {"name": element.name, "digest": element.digest}
 
 
@@ -223,6 +234,7 @@ def program_data(program: Program) -> dict[str, Any]:
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),
+        **({} if program.samples == 4 else {"samples": program.samples}),
         **({} if program.stage is None else {"stage": stage_data(program.stage)}),
         "model": program.model,
         "weights": program.weights,

@@ -75,10 +75,16 @@ class Definition(Record, frozen=False):
     needs: Needs = field(default_factory=Needs)  # what its body depends on besides its arguments
 
 
+Brought = Literal["text", "width"]
+"""Kinds of bindings of what a font brings."""
+
+
 class Binding(Record, frozen=False):
     """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 
-    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
+    kind: Literal[
+        "let", "param", "argument", "loop", "fn", "module", "import", "element", "text", "width", "poison"
+    ]
     span: Span | None = None  # None for the language's own names
     slots: Slots | None = None  # what holds its slot
     slot: int = 0
@@ -140,6 +146,7 @@ class Settings(Record, frozen=False):
 
     canvas: tuple[int, int] = (256, 256)  # width and height in pixels
     background: tuple[float, float, float] | Unsaid | None = "default"  # as written; None for transparency
+    samples: int = 4  # of a pixel
     stage: dict[str, Any] = field(default_factory=dict)  # camera, light and ground, where they are stated
     animation: Animation | None = None
     model: str | None = None

@@ -11,13 +11,15 @@ from typing import Any, Final
 
 import numpy as np
 
+from scenelang.assets.gradient import HARD
+from scenelang.assets.records import Record
 from scenelang.compiler.groups import INTERSECT, SUBTRACT
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
 from scenelang.drawing.solid.norms import Norms
-from scenelang.drawing.solid.passes import SLACK
+from scenelang.drawing.solid.passes import LOOSE, SLACK
 from scenelang.web.arrays import Store, web
 
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
@@ -31,6 +33,7 @@ _CONSTANTS: Final = {
     "LIFT": LIFT,
     "AMBIENT_EVEN": AMBIENT[0],
     "AMBIENT_UP": AMBIENT[1],
+    "HARD": HARD,
 }
 
 
@@ -45,6 +48,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
+    parts += [_struct("Stage", Stage())]
     parts += [
         f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
@@ -59,10 +63,20 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
             "geometries": len(decoders),
             "blend": BLEND,
             "slack": SLACK,
+            "loose": LOOSE,
             "far": RADIUS,
             "products": max(map(_products, decoders)) + 2 * (1 + paint + kind),
         },
     }
+
+
+def _struct(name: str, part: Record) -> str:
+    """GLSL of the type of a part of the stage, behind those of its own parts."""
+    fields = {field: getattr(part, field) for field in part.__match_args__}
+    inner = [_struct(field.title(), value) for field, value in fields.items() if isinstance(value, Record)]
+    types = {tuple: "vec3", float: "float", bool: "bool"}
+    lines = [f"{types.get(type(value), field.title())} {field};" for field, value in fields.items()]
+    return "\n".join([*inner, f"struct {name} {{ {' '.join(lines)} bool on; }};"])
 
 
 def _products(layers: Smooth | Norms) -> int:

@@ -17,7 +17,7 @@ from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Leaf, Look, Move
 from scenelang.compiler.lifting import SOLID_LAYOUT, lift_many
 from scenelang.compiler.spaces import SPACES, Camera, Ground, Light, Stage, decoded
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Step, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.solid import Body
 from scenelang.drawing.solid.passes import read_solid_frame
@@ -123,16 +123,16 @@ def test_normal_form_and_levels_keep_the_map() -> None:
 
 
 def test_the_longest_chain_fits() -> None:
-    """A displacement, two deformations, a map, two deformations and a map, whatever trades places."""
+    """What changes the leaf's distance, two deformations, a map, and both again, whatever trades places."""
     rng = random.Random(4)
     turns = Warp(0.3, (0.0, 0.0)), Warp(0.0, (0.4, 0.0)), Twist(0.5)
-    bulge = Displace(0.1, 4.0)
+    own = Shell(0.2), Displace(0.1, 4.0), Grow(0.3)
     for _ in range(80):
-        chain = [bulge, *rng.choices(turns, k=2), random_map(rng), *rng.choices(turns, k=2), random_map(rng)]
+        chain = [*own, *rng.choices(turns, k=2), random_map(rng), *rng.choices(turns, k=2), random_map(rng)]
         levels = split_levels(steps_of(normal(map(Move, chain), SOLID)), LIMITS, SOLID)
-        assert levels.bulge == bulge
+        assert levels.skin == Skin(0.3, 0.2, 3, 0.1, 4.0)
     with pytest.raises(LevelsError, match="stand first"):
-        split_levels([Affine(affine.scaling(2, 2, 2)), bulge], LIMITS, SOLID)
+        split_levels([Affine(affine.scaling(2, 2, 2)), own[0]], LIMITS, SOLID)
 
 
 def random_map(rng: random.Random) -> Affine:
@@ -155,8 +155,8 @@ def test_boxes_and_balls_hold_leaves(geometry: str, level: float) -> None:
     hits = 0
     for _ in range(50):
         chain = [random_step(rng) for _ in range(rng.randrange(6))]
-        if rng.random() < 0.5:
-            chain.insert(0, Displace(rng.uniform(-0.3, 0.3), 4.0))
+        own = [Displace(rng.uniform(-0.3, 0.3), 4.0), Grow(rng.uniform(-0.2, 1)), Shell(rng.uniform(0.1, 1))]
+        chain = rng.sample(own, rng.randrange(3)) + chain
         moves = normal(map(Move, chain), SOLID)
         leaf = Leaf(geometry, Look("diffuse"), moves)
         xmin, ymin, xmax, ymax, zmin, zmax = SOLID.box(geometry, leaf.steps, level)

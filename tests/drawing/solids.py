@@ -17,7 +17,7 @@ from scenelang.compiler.lifting import SOLID_LAYOUT as LAYOUT
 from scenelang.compiler.lifting import Parts, inverse_frame
 from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage, Triple
-from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed
+from scenelang.compiler.steps import Affine, Displace, Grow, Shell, Step, Twist, Warp, composed
 from scenelang.compiler.weights import open_weights, shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
 from scenelang.drawing.neural.load import Solids
@@ -96,10 +96,14 @@ def torch_network() -> Solids:
 def vector(o: Object, net: SolidNetwork) -> np.ndarray:
     """The 64 numbers of an object."""
     maps, turns = [np.eye(4)], [[]]  # maps and turns take turns, nearest the leaf first
-    bulge = 0.0, 0.0
+    bulge, grow, shell, order = (0.0, 0.0), 0.0, 0.0, 0
     for step in o.steps:
         if isinstance(step, Displace):
-            bulge = step.amount, step.frequency
+            bulge, order = (step.amount, step.frequency), order + 2 * (shell > 0)
+        elif isinstance(step, Grow):
+            grow, order = step.r, order + (shell > 0)
+        elif isinstance(step, Shell):
+            shell = step.w
         elif isinstance(step, Affine):
             maps[-1] = np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)]) @ maps[-1]
         else:
@@ -125,6 +129,9 @@ def vector(o: Object, net: SolidNetwork) -> np.ndarray:
         texture=np.linalg.inv(np.vstack([rows, (0, 0, 1)]))[:2].ravel(),
         rgb=o.rgb,
         material=net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)],
+        grow=grow,
+        shell=shell,
+        order=order,
     )
     return LAYOUT.pack(1, **parts._asdict())[0].astype(np.float32)
 

@@ -380,8 +380,11 @@ class MarchSettings(NamedTuple):
 
 
 CAREFUL = MarchSettings()
-MARCH_SETTINGS = {"quick": MarchSettings(0.04, 2, 0.15), "one": MarchSettings(0.04, 2)}
-"""Settings of the ways to sample solids; the others are `CAREFUL`."""
+MARCH_SETTINGS = {
+    **{"four": CAREFUL, "adaptive": CAREFUL},
+    **{"quick": MarchSettings(0.04, 2, 0.15), "one": MarchSettings(0.04, 2)},
+}
+"""Settings of each way to sample solids."""
 
 
 def march(
