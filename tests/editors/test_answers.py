@@ -124,10 +124,8 @@ def test_completion_of_arguments_members_paths_models_and_units(client: Client, 
     assert not {"ring", "n ="} & set(found)
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
-    assert labels(client, client.at(uri, 'import "" as', 8)) == [
-        *("std/letters", "std/meshes", "std/shapes"),
-        "lib.nsg",
-    ]
+    files = ["std/letters", "std/meshes", "std/shapes", "lib.nsg"]
+    assert labels(client, client.at(uri, 'import "" as', 8)) == files
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
     client.replace(uri, 'model "shapes2d";\nsquare { material flat; }\n// squ\nlet \n/* sc */\n')
@@ -267,7 +265,8 @@ def test_references_and_highlights_mean_the_same_name(client: Client, uri: str, 
 
 
 def test_a_font_brings_text_and_width(client: Client, folder: Path) -> None:
-    text = 'import "std/letters" as abc;\nlet w = abc.width("A");\nabc.text("A", size = w);\nsquare { scale(abc.); }\nabc.;\n'
+    text = 'import "std/letters" as abc;\nlet w = abc.width("A");\nabc.text("A", size = w);\n'
+    text += "square { scale(abc.); }\nabc.;\n"
     uri = client.open((folder / "letters.nsg").as_uri(), text)
     assert labels(client, client.at(uri, "abc.);", 4)) == ["width"]
     assert labels(client, client.at(uri, "abc.;", 4)) == ["text"]
