@@ -124,7 +124,8 @@ def test_completion_of_arguments_members_paths_models_and_units(client: Client, 
     assert not {"ring", "n ="} & set(found)
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
-    assert labels(client, client.at(uri, 'import "" as', 8)) == ["std/meshes", "std/shapes", "lib.nsg"]
+    files = ["std/letters", "std/meshes", "std/shapes", "lib.nsg"]
+    assert labels(client, client.at(uri, 'import "" as', 8)) == files
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
     client.replace(uri, 'model "shapes2d";\nsquare { material flat; }\n// squ\nlet \n/* sc */\n')
@@ -261,6 +262,19 @@ def test_references_and_highlights_mean_the_same_name(client: Client, uri: str, 
     client.close(library)
     marks = client.request("textDocument/documentHighlight", client.at(uri, "(k)", 1))
     assert sorted(mark["kind"] for mark in marks) == [2, 2, 3]
+
+
+def test_a_font_brings_text_and_width(client: Client, folder: Path) -> None:
+    text = 'import "std/letters" as abc;\nlet w = abc.width("A");\nabc.text("A", size = w);\n'
+    text += "square { scale(abc.); }\nabc.;\n"
+    uri = client.open((folder / "letters.nsg").as_uri(), text)
+    assert labels(client, client.at(uri, "abc.);", 4)) == ["width"]
+    assert labels(client, client.at(uri, "abc.;", 4)) == ["text"]
+    says(client, uri, [("text", 1, ['text("Ag", size = 1, align = "left")', "letters", "Open Font License"])])
+    says(client, uri, [("width", 1, ['width("Ag", size = 1)', "in world units"])])
+    found = client.request("textDocument/signatureHelp", client.at(uri, "size = w", 7))
+    assert found["signatures"][0]["label"] == 'text("Ag", size = 1, align = "left")'
+    client.close(uri)
 
 
 def test_the_library_that_ships_is_read_and_never_changed(client: Client, folder: Path) -> None:
