@@ -84,7 +84,8 @@ class Sampler:
         rates = [s.rate * stretch for s, stretch in zip(self.solids, self._stretch, strict=True)]
         self.steep = STEEP * max([1.0, *rates])
         ends = [np.asarray(s.centre, np.float64) + side * s.extent for s in drawn for side in (-1, 1)]
-        self.low, self.high = (np.array(ends or [[0.0] * 3]).min(0), np.array(ends or [[0.0] * 3]).max(0))
+        corners = np.array(ends).reshape(-1, 3) if ends else np.zeros((1, 3))
+        self.low, self.high = corners.min(0), corners.max(0)
         self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
 
     def widen(self, by: float) -> None:
@@ -95,38 +96,31 @@ class Sampler:
         ]
 
     def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
-        """As `SolidField.meet`, at points (M, 3) but for those that meet nothing: these are far outside."""
-        each = range(0, max(len(p), 1), POINTS)
-        parts = [self._meet(p[i : i + POINTS], wanted, gradient, owners)[:5] for i in each]
-        joined = [None if x[0] is None else np.concatenate(x, -1) for x in zip(*parts, strict=True)]
-        return Meeting(*joined)
-
-    def _meet(self, p: Floats, wanted: Wanted, gradient: bool, owners: bool) -> Meeting:
-        field, points = self.field, np.reshape(p, (-1, 3)).T.astype(np.float32)
-        way = points - self._origin[:, None]
-        t = np.sqrt((way * way).sum(0)).clip(1e-9)
-        with field.xp.inference():
-            some, passes = field.passes(self._origin, way / t, t, tight=False)
-            met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
-        count = len(p)
-        distance, register = np.full(count, EMPTY), np.zeros((len(met.register), count))
-        distance[some], register[:, some] = met.distance, met.register
-        slope = np.zeros((3, count)) if gradient else None
-        owner = np.zeros(count) if owners else None
-        if slope is not None:
-            slope[:, some] = met.gradient
-        if owner is not None:
-            owner[some] = met.owner
-        return Meeting(distance, register, slope, None, owner)
+        """As `SolidField.meet`, at points (M, 3); those that meet nothing are far outside."""
+        field, count = self.field, len(p)
+        register = np.zeros(((0, 1, len(field.looks))[wanted], count))
+        result = Meeting(np.full(count, EMPTY), register, np.zeros((3, count)), None, np.zeros(count))
+        for start in range(0, count, POINTS):
+            points = p[start : start + POINTS].T.astype(np.float32)
+            way = points - self._origin[:, None]
+            t = np.sqrt((way * way).sum(0)).clip(1e-9)
+            with field.xp.inference():
+                some, passes = field.passes(self._origin, way / t, t, tight=False)
+                met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
+            some = some + start
+            result.distance[some], result.register[:, some] = met.distance, met.register
+            if gradient:
+                result.gradient[:, some] = met.gradient
+            if owners:
+                result.owner[some] = met.owner
+        return result
 
     def at(self, p: Floats) -> Floats:
         """Distances (M,) at points (M, 3), negative in what is opaque alone."""
-        if not len(p):
-            return np.zeros(0)
-        met = self.meet(p, Wanted.KIND if self.field.media else Wanted.DISTANCE)
-        if not self.field.media:
-            return met.distance
-        return np.where((met.distance < 0) & (met.register[-1] > 0.5), TINY - met.distance, met.distance)
+        media = self.field.media
+        met = self.meet(p, Wanted.KIND if media else Wanted.DISTANCE)
+        inside = (met.distance < 0) & (met.register[-1] > 0.5) if media else False
+        return np.asarray(np.where(inside, TINY - met.distance, met.distance))
 
 
 class Sheets(NamedTuple):
@@ -134,7 +128,7 @@ class Sheets(NamedTuple):
 
     crossed: npt.NDArray[np.bool_]  # (256, 12) edges that it crosses
     sheet: Index  # (256, 12) of each
-    count: Index  # (256,)
+    number: Index  # (256,) of sheets
     pinched: npt.NDArray[np.bool_]  # (256, 6) faces that one sheet crosses twice: low x, high x, low y, …
 
 
@@ -164,7 +158,7 @@ def sheets() -> Sheets:
         cut = [e for e, (a, b) in enumerate(_ENDS.tolist()) if (case >> a ^ case >> b) & 1]
         table.crossed[case, cut] = True
         number = {one: at for at, one in enumerate(dict.fromkeys(owner[e] for e in cut))}
-        table.sheet[case, cut], table.count[case] = [number[owner[e]] for e in cut], len(number)
+        table.sheet[case, cut], table.number[case] = [number[owner[e]] for e in cut], len(number)
         table.pinched[case] = [len(face) == 4 and owner[face[0]] == owner[face[2]] for face in twice]
     return table
 
@@ -175,7 +169,7 @@ def _others(numbers: Index, known: Index) -> Index:
     fresh = np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]
     if len(known):
         fresh &= known[np.searchsorted(known, numbers).clip(0, len(known) - 1)] != numbers
-    return numbers[fresh]
+    return np.asarray(numbers[fresh])
 
 
 class Grid:
@@ -200,17 +194,19 @@ class Grid:
         sampler.widen(2 * self.side)
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values = np.zeros(0, np.intp), np.zeros(0)
-        while True:  # the field may be steeper than it should be
+        while True:
             fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
             order = np.argsort(nodes)
             self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
-            self.nodes = nodes[order]
-            left = _others(self._around(), np.sort(self.cells))
-            if not len(left):
+            self.nodes, self.cells = nodes[order], np.sort(self.cells)
+            left = _others(self._around(), self.cells)  # the field may be steeper than it should be
+            if len(left):
+                self.cells = np.concatenate([self.cells, left])
+            elif len(taken := self._pinched()):
+                self.values[np.searchsorted(self.nodes, taken)] = TINY
+            else:
                 break
-            self.cells = np.concatenate([self.cells, left])
-        self._unpinch()
 
     def number(self, place: Index) -> Index:
         """Numbers of nodes, or of cells by their first nodes, at places (…, 3)."""
@@ -236,23 +232,18 @@ class Grid:
             found += [some - self.bits[i] for i in others]
         return np.concatenate(found)
 
-    def _unpinch(self) -> None:
-        """Take nodes out of the solid until no sheets of two neighbours cross the face between them twice."""
-        pinched, self.cells = sheets().pinched, np.sort(self.cells)
-        while True:
-            cases, taken = self.cases(), [self.cells[:0]]
-            for axis in range(3):
-                low = np.flatnonzero(pinched[cases, 2 * axis])
-                before = self.cells[low] - self.bits[1 << axis]
-                there = np.searchsorted(self.cells, before)
-                both = low[(self.cells[there] == before) & pinched[cases[there], 2 * axis + 1]]
-                corner = np.flatnonzero(_BITS[:, axis] == 0)
-                inside = cases[both, None] >> corner & 1
-                taken.append(self.cells[both] + self.bits[corner[inside.argmax(1)]])
-            some = np.concatenate(taken)
-            if not len(some):
-                return
-            self.values[np.searchsorted(self.nodes, some)] = TINY
+    def _pinched(self) -> Index:
+        """Nodes inside to take out, so that no sheets of two neighbours cross the face between them twice."""
+        pinched, cases, taken = sheets().pinched, self.cases(), [self.cells[:0]]
+        for axis in range(3):
+            low = np.flatnonzero(pinched[cases, 2 * axis])
+            before = self.cells[low] - self.bits[1 << axis]
+            there = np.searchsorted(self.cells, before)
+            both = low[(self.cells[there] == before) & pinched[cases[there], 2 * axis + 1]]
+            corner = np.flatnonzero(_BITS[:, axis] == 0)
+            inside = cases[both, None] >> corner & 1
+            taken.append(self.cells[both] + self.bits[corner[inside.argmax(1)]])
+        return np.concatenate(taken)
 
 
 def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMesh, dict[str, str]]:
@@ -272,7 +263,7 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     if not len(active):
         return empty, said
     cases, cells = cases[active], grid.cells[active]
-    first = np.concatenate([[0], np.cumsum(table.count[cases])])
+    first = np.concatenate([[0], np.cumsum(table.number[cases])])
     at, edge = np.nonzero(table.crossed[cases])  # cells, and edges of them that are crossed
     vertex = first[at] + table.sheet[cases[at], edge]
     a, b = (cells[at] + grid.bits[_ENDS[edge, end]] for end in (0, 1))
@@ -283,7 +274,7 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     a, b = (ends[order].reshape(-1, 4)[:, 0] for ends in (a, b))
     p, n = _crossings(grid, a, b)
     places = _places(quad, p, n, first[-1], side)
-    box = grid.points(np.repeat(cells, table.count[cases]))
+    box = grid.points(np.repeat(cells, table.number[cases]))
     places = np.clip(places, box, box + side)
     rising = grid.values[np.searchsorted(grid.nodes, a)] < 0  # from inside to outside
     back = rising == (turns == 1)
@@ -324,7 +315,7 @@ def _summed(quad: Index, values: Floats, count: int) -> Floats:
     """Sums (V, …) at vertices of the values (E, …) of quads around them."""
     flat = values.reshape(len(values), -1)
     rows = [np.bincount(quad.ravel(), np.repeat(column, 4), count) for column in flat.T]
-    return np.stack(rows, 1).reshape(count, *values.shape[1:])
+    return np.stack(rows, 1).reshape(count, *values.shape[1:]).astype(np.float64)
 
 
 def _normals(quad: Index, n: Floats, count: int) -> Floats:

@@ -153,7 +153,7 @@ class Shapes:
                 q = field.frames.local(xp, objects, points)
                 memory = field.fold(meetings, field.features(objects, q, np.ones(len(objects), bool)))
             result[:, meetings.columns] = memory[:, 0]
-        return result * (self.unit / field.unit)
+        return np.asarray(result * (self.unit / field.unit))
 
 
 class Region:
@@ -165,7 +165,7 @@ class Region:
         self.wins = [(shapes.fold(one), shapes.fold(other), floor) for one, other, floor in layer.wins]
         fields = [self.bound, *(field for one, other, _ in self.wins for field in (one, other))]
         self.steep = STEEP * max(float(field.frames.stretch.max()) for field in fields)
-        low, high = np.inf, -np.inf
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for operand in layer.shape:
             if operand.operator < SUBTRACT or operand is layer.shape[0]:
                 box = shapes.program.bounds[operand.rows.start : operand.rows.stop].astype(np.float64)
@@ -182,7 +182,7 @@ class Region:
         for one, other, floor in self.wins:
             rest = shapes.ask(other, p, half_px)
             result = np.maximum(result, shapes.ask(one, p, half_px) - (rest.clip(0.0) if floor else rest))
-        return result
+        return np.asarray(result)
 
     def grid(self) -> tuple[Floats, Floats, float]:
         """Values (rows, columns) at nodes, the first of these (2,), and the way between two."""
@@ -239,9 +239,9 @@ _WAYS: Final = {
 def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
     """Closed outlines on a grid whose border is outside, as pairs of neighbours inside and outside (n, 2)."""
     rows, columns = inside.shape
-    flat, number = inside.ravel(), np.arange(rows * columns).reshape(rows, columns)
+    flat, number = inside.ravel().astype(np.intp), np.arange(rows * columns).reshape(rows, columns)
     corner = [number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]]
-    kind = sum(flat[nodes].astype(np.intp) << bit for bit, nodes in enumerate(corner))
+    kind = np.sum([flat[nodes] << bit for bit, nodes in enumerate(corner)], 0)
     # sides by their first node, those that go right before those that go down
     side = [corner[0], corner[1] + rows * columns, corner[3], corner[0] + rows * columns]
     after: dict[int, int] = {}
@@ -259,7 +259,7 @@ def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
         node = np.array(loop)
         down, node = np.divmod(node, rows * columns)
         ends = np.stack([node, node + np.where(down > 0, columns, 1)], 1)
-        result.append(np.where(flat[ends[:, :1]], ends, ends[:, ::-1]))
+        result.append(np.where(flat[ends[:, :1]] > 0, ends, ends[:, ::-1]))
     return result
 
 
@@ -284,7 +284,7 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
     sharp = np.flatnonzero((along * then).sum(1) < np.cos(np.radians(SHARP_DEG)))
     if not len(sharp):
         cuts = [len(p) * i // 4 for i in range(5)]
-        smooth = sum(np.roll(along, i, 0) for i in (-2, -1, 0, 1, 2))
+        smooth = np.sum([np.roll(along, i, 0) for i in (-2, -1, 0, 1, 2)], 0)
         parts = [np.arange(a, b + 1) % len(p) for a, b in pairwise(cuts)]
         return [(p[part], smooth[part] / np.hypot(*smooth[part].T)[:, None]) for part in parts]
     places = _meet(p[sharp], along[sharp], ahead[sharp], then[sharp], most)
