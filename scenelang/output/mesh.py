@@ -27,6 +27,7 @@ from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.image import decoded, encoded
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import EMPTY, Wanted
+from scenelang.output.roots import zeros
 
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -218,10 +219,13 @@ class Grid:
         z, y = np.divmod(rest, self.shape[1])
         return np.asarray(self.first + np.stack([x, y, z], -1) * self.side)
 
+    def value(self, number: Index) -> Floats:
+        """Values at nodes."""
+        return self.values[np.searchsorted(self.nodes, number)]
+
     def cases(self) -> Index:
         """Corners of the cells that are inside, as bits (K,)."""
-        inside = self.values[np.searchsorted(self.nodes, self.cells[:, None] + self.bits)] < 0
-        return np.asarray(inside @ (1 << np.arange(8)))
+        return np.asarray((self.value(self.cells[:, None] + self.bits) < 0) @ (1 << np.arange(8)))
 
     def _around(self) -> Index:
         """Numbers of the cells around edges that the surface crosses, also more than once."""
@@ -276,7 +280,7 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     places = _places(quad, p, n, first[-1], side)
     box = grid.points(np.repeat(cells, table.number[cases]))
     places = np.clip(places, box, box + side)
-    rising = grid.values[np.searchsorted(grid.nodes, a)] < 0  # from inside to outside
+    rising = grid.value(a) < 0  # from inside to outside
     back = rising == (turns == 1)
     quad[back] = quad[back][:, ::-1]
     triangles = _cut(sampler, quad, places, side)
@@ -288,23 +292,16 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
-    sampler = grid.sampler
-    low, high = grid.points(a), grid.points(b)
-    f, g = (grid.values[np.searchsorted(grid.nodes, ends)] for ends in (a, b))
-    mixed = sampler.field.mixed  # a value jumps where a medium begins
-    for _ in range(HALVINGS if mixed else STEPS):
-        share = 0.5 if mixed else (f / (f - g))[:, None].clip(0.01, 0.99)
-        middle = low + share * (high - low)
-        value = sampler.at(middle)
-        same = (value < 0) == (f < 0)
-        f, g = np.where(same, value, f / 2), np.where(same, g / 2, value)  # of Illinois
-        low, high = np.where(same[:, None], middle, low), np.where(same[:, None], high, middle)
-    p = (low + high) / 2 if mixed else low + (f / (f - g))[:, None] * (high - low)
+    sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
+    ends, values = (grid.points(a).T, grid.points(b).T), [grid.value(end) for end in (a, b)]
+    steps = HALVINGS if mixed else STEPS
+    zero, _, beyond = zeros(lambda p: sampler.at(p.T), *ends, *values, steps, mixed)
+    p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
     if mixed:  # what ends where a medium begins ends as the medium's own distance says
         some = np.flatnonzero(met.distance < -0.05 * grid.side)
-        outside = np.where((f < 0)[:, None], high, low)[some]
+        outside = beyond.T[some]
         owner = np.asarray(sampler.meet(outside, Wanted.KIND, owners=True).owner, np.intp) - 1
         kept = owner >= 0
         n[some[kept]] = -sampler.field.normals(owner[kept], outside[kept].T.astype(np.float32)).T
