@@ -175,7 +175,9 @@ class Region:
         half = shapes.half[:, 0, 0]
         corners = np.array([[low[0], -high[1]], [high[0], -low[1]]]) * shapes.unit + half
         self.low, self.high = corners.clip(-2 * BORDER, shapes.size + 2 * BORDER)
-        self.step = float(np.clip(self.bound.frames.scale.min() * shapes.unit / 8, FINEST, 0.5))
+        shell = np.asarray(getattr(self.bound.parts, "shell", 0.0))  # how thick leaves are, 0 for whole ones
+        fine = np.where(shell > 0, np.minimum(shell / 2, 1 / 8), 1 / 8) * self.bound.frames.scale
+        self.step = float(np.clip(fine.min() * shapes.unit, FINEST, 0.5))
 
     def at(self, p: Floats, half_px: float = 0.0) -> Floats:
         """Values (G, B) at points (2, G, B)."""
