@@ -55,8 +55,8 @@ class Parts(NamedTuple):
     width: Array  # of the blend by which it joins
     texture: Array
     rgb: Array
-    clear: Array  # (…,) 1 - opacity
     material: Array
+    clear: Array = 0.0  # (…,) 1 - opacity
 
 
 class Layout:
