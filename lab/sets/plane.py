@@ -2,9 +2,10 @@
 
 ``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
 rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
-uniform. The others change one thing each. `textures2d` has 1 to 4 squares with one of the textures
-each: scale and translation, and of the texture flip, rotation and hue; `textures2d-mixed` has the four
-shapes, warps and booleans, and any moves and colours of textures, one object in five being plain.
+uniform. The others change one thing each: `leaves2d` has discs and hexagons. `textures2d` has 1 to 4 squares
+with one of the textures each: scale and translation, and of the texture flip, rotation and hue;
+`textures2d-mixed` has the four shapes, warps and booleans, and any moves and colours of textures, one object
+in five being plain.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scenelang.language.scene import (
     Flip,
     Grayscale,
     Group,
+    Grow,
     Hue,
     Link,
     Material,
@@ -34,6 +36,7 @@ from scenelang.language.scene import (
     Scene,
     SceneNode,
     Shear,
+    Shell,
     Transform,
     Translate,
     Twirl,
@@ -65,10 +68,12 @@ class SetConfig:
     # how objects are put together: "chain", "groups" (each in two nested groups), "tree", which needs no
     # group of a stream, "any" tree, or the "leaves" of such a tree as a chain
     nest: str = "chain"
+    skins: bool = False  # whether objects grow, or are shells, or both
 
 
 SETS: dict[str, SetConfig] = {
     "shapes2d": SetConfig(),
+    "leaves2d": SetConfig(geometries=("disc", "hexagon")),
     "unions": SetConfig(unions=1.0),
     "affine": SetConfig(unions=1.0, deformed=False),
     "chains": SetConfig(unions=0.0, objects=(2, 4)),
@@ -85,6 +90,7 @@ SETS: dict[str, SetConfig] = {
     "crowd": SetConfig(objects=(100, 100), size=0.4),
     "strong": SetConfig(warp=2.4),
     "large": SetConfig(size=3.0),
+    "skins": SetConfig(skins=True),
     "textures2d": SetConfig(
         unions=1.0, deformed=False, geometries=("square",), rotated=False, textures="few"
     ),
@@ -158,10 +164,17 @@ def _texture(rng: Rng, config: SetConfig) -> Material:
     )
 
 
+def random_skin(rng: Rng) -> list[Transform]:
+    """Growth, a shell, or both in either order."""
+    grow, shell = Grow(_uniform(rng, -0.2, 1.0)), Shell(_uniform(rng, 0.04, 0.8))
+    kinds: tuple[list[Transform], ...] = [grow], [shell], [grow, shell], [shell, grow]
+    return kinds[int(rng.integers(len(kinds)))]
+
+
 def random_object(rng: Rng, config: SetConfig) -> Object:
     colour = _colour(rng)
     geometry = config.geometries[int(rng.integers(len(config.geometries)))]
-    moves = tuple(_moves(rng, config))
+    moves = (*(random_skin(rng) if config.skins else ()), *_moves(rng, config))
     if config.textures == "few" or (config.textures and rng.random() < 0.8):
         return Object(geometry, moves, _texture(rng, config))
     return Object(geometry, moves, Material("flat", (colour,)))

@@ -48,7 +48,8 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
     """Generators of random scenes, by set, for models of a dimension."""
     if manifest.dimension == 3:
         return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
-    known = {name: config for name, config in SETS.items() if manifest.elements or not config.textures}
+    plain = {name: config for name, config in SETS.items() if not (config.textures or config.skins)}
+    known = SETS if manifest.elements else plain
     return {name: partial(random_scene, config=config) for name, config in known.items()}
 
 

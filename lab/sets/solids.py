@@ -2,8 +2,9 @@
 
 ``solids3d`` is the base set: 1 to 3 spheres and tori, diffuse or volumetric, scaled by 0.35 to 0.85 per axis,
 turned about any axis and moved by ±1.2 (y: -0.5 to 0.9), in that order, colours uniform in 0.1 to 1 as
-written, all unions, on the default stage. The others change one thing each, ``mixed`` several. ``meshes3d``
-has 1 to 4 of the meshes that ship, diffuse; they are scaled, turned and moved in random order.
+written, all unions, on the default stage. The others change one thing each, ``mixed`` several; ``leaves3d``
+has the leaves with edges, and capsules. ``meshes3d`` has 1 to 4 of the meshes that ship, diffuse; they are
+scaled, turned and moved in random order.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lab.sets.plane import Rng, any_tree
+from lab.sets.plane import Rng, any_tree, random_skin
 from scenelang.language.scene import (
     Bend,
     Brought,
@@ -39,6 +40,7 @@ from scenelang.language.words import COMBINE
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"
 SIDES = 0.35, 0.85  # smallest and largest scale
+EDGED = "box", "cylinder", "cone", "capsule", "octahedron"
 WARP = 0.8  # of deformed objects
 
 
@@ -56,7 +58,9 @@ class SolidConfig:
     staged: bool = False  # a random camera, light, ground and sky
     canvas: tuple[int, int] = (128, 128)  # pixels
     meshes: str = ""  # a file of elements whose solids take the place of spheres and tori
+    skins: bool = False  # whether objects grow, or are shells, or both
     trees: bool = False  # any trees of booleans; see `lab.sets.plane.any_tree`
+    leaves: tuple[str, ...] = ("sphere", "torus")
 
 
 SOLID_SETS: dict[str, SolidConfig] = {
@@ -67,10 +71,12 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "booleans": SolidConfig(unions=0.0, objects=(2, 4), spread=0.5),
     "trees": SolidConfig(trees=True, media=0.3, spread=0.5),
     "shuffled": SolidConfig(shuffled=True),
+    "skins": SolidConfig(skins=True, unions=0.5, size=0.7),
     "wide": SolidConfig(canvas=(160, 96)),
     "staged": SolidConfig(staged=True),
     "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
     "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
+    "leaves3d": SolidConfig(media=0.3, canvas=(256, 256), leaves=EDGED),
     "meshes3d": SolidConfig(objects=(1, 4), media=0.0, meshes="std/meshes"),
 }
 
@@ -121,12 +127,13 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
     unions = rng.random() < config.unions
     zoo = load_elements(config.meshes, "zoo") if config.meshes else None
     brought = Brought.of((zoo,)).geometries if zoo is not None else {}
-    geometries = [name for name, it in brought.items() if it.dimension == 3] or ["sphere", "torus"]
+    geometries = [name for name, it in brought.items() if it.dimension == 3] or config.leaves
 
     def solid() -> Object:
         kind = "volumetric" if rng.random() < config.media else "diffuse"
         material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
-        return Object(geometries[int(rng.integers(len(geometries)))], _moves(rng, config), material)
+        moves = [*(random_skin(rng) if config.skins else ()), *_moves(rng, config)]
+        return Object(geometries[int(rng.integers(len(geometries)))], moves, material)
 
     if config.trees:
         return Scene(model="solids3d", canvas=config.canvas, nodes=(any_tree(rng, solid),))

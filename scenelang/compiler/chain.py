@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from scenelang.assets.records import Record
 from scenelang.compiler.graph import Move
 from scenelang.compiler.spaces import PLANE, Space
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Rows, Step, Turn, Twist, Warp, compose
+from scenelang.compiler.steps import BARE, IDENTITY, Affine, Rows, Skin, Step, Turn, Twist, Warp, compose
 
 Moves = tuple[Move, ...]
 
@@ -83,7 +83,7 @@ class Levels(Record):
     """A chain of steps as a model's lifting takes it.
 
     A world point goes back through ``affine``, then ``outer`` from its last to its first, ``middle``, and
-    ``inner`` likewise, to the leaf with its ``bulge``. A lifting has room for turns in slots of three
+    ``inner`` likewise, to the leaf with its ``skin``. A lifting has room for turns in slots of three
     strengths: in the plane a warp's twirl and bend; in space its twirl, its bend along x, and the twist
     after it on the way back.
     """
@@ -92,7 +92,7 @@ class Levels(Record):
     middle: Rows = IDENTITY
     outer: tuple[Turn, ...] = ()
     affine: Rows = IDENTITY
-    bulge: Displace = Displace(0.0, 0.0)
+    skin: Skin = BARE
 
 
 class LevelsError(ValueError):
@@ -125,19 +125,17 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space 
     def taken(turns: Sequence[Turn]) -> int:
         return len(slots(turns, space.dimension))
 
-    bulge = Levels().bulge
     runs: list[list[Turn]] = [[]]
     maps: list[Rows] = []
-    for at, step in enumerate(steps):
+    for step in steps:
         if isinstance(step, Turn):
             runs[-1].append(step)
         elif isinstance(step, Affine):
             maps.append(step.rows)
             runs.append([])
-        elif at:
-            raise LevelsError("a `displace` that does not stand first")
-        else:
-            bulge = step
+        elif maps or runs[0]:
+            raise LevelsError(f"a `{type(step).__name__.lower()}` that does not stand first")
+    skin = Skin.of(steps)
     # w… | w… A | w… A w… | w… A w… A, where the first run may be empty and the last one is if A is last.
     first = runs[0]
     if len(maps) == 0 or (len(maps) == 1 and not runs[1]):
@@ -145,7 +143,7 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space 
             raise LevelsError(f"{len(first)} deformations in a row, at most {most_inner + most_outer} fit")
         inside = next(n for n in range(len(first), -1, -1) if taken(first[:n]) <= most_inner)
         last = maps[0] if maps else IDENTITY
-        return Levels(tuple(first[:inside]), IDENTITY, tuple(first[inside:]), last, bulge)
+        return Levels(tuple(first[:inside]), IDENTITY, tuple(first[inside:]), last, skin)
     second = runs[1]
     if len(maps) > 2 or (len(maps) == 2 and runs[2]):
         raise LevelsError(
@@ -158,4 +156,4 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space 
         raise LevelsError(f"{len(first)} deformations before an affine map, at most {most_inner} fit")
     if taken(second) > most_outer:
         raise LevelsError(f"{len(second)} deformations after an affine map, at most {most_outer} fit")
-    return Levels(tuple(first), maps[0], tuple(second), maps[1] if len(maps) == 2 else IDENTITY, bulge)
+    return Levels(tuple(first), maps[0], tuple(second), maps[1] if len(maps) == 2 else IDENTITY, skin)

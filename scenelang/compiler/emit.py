@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS
@@ -30,7 +34,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
     forms = {name: at for at, name in enumerate(listed)}
     palette, worn = _palette(leaves)
-    materials = dict.fromkeys(paint.element for paint in palette)
+    materials = dict.fromkeys(paint.element for paint in palette if isinstance(paint.element, Element))
     vectors = _vectors(leaves, manifest, codes)
     for at, row in enumerate(rows):
         if row.k and row.op != "union":  # a width that is not the usual one belongs to a row, not to a leaf
@@ -66,9 +70,17 @@ def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int3
     for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
         known[id(look)] = -1
         if look.element is not None:
-            steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
-            known[id(look)] = result.setdefault(Paint(look.element, tuple(steps)), len(result))
+            steps = [(kind, *_rounded(numbers)) for kind, *numbers in look.colours]
+            element = look.element
+            if isinstance(element, Gradient):
+                element = Gradient(element.name, tuple(map(_rounded, element.stops)))
+            known[id(look)] = result.setdefault(Paint(element, tuple(steps)), len(result))
     return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
+
+
+def _rounded(numbers: Sequence[float]) -> Any:
+    """Numbers in float32."""
+    return tuple(np.asarray(numbers, np.float32).tolist())
 
 
 def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:

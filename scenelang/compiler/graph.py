@@ -23,6 +23,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record
 from scenelang.compiler.spaces import Box, Space, Stage
 from scenelang.compiler.steps import Affine, Rows, Step, composed
@@ -42,15 +43,15 @@ ColourStep = tuple[str, *tuple[float, ...]]
 class Look(Record):
     """The material of an object: how it is lit, and the colour as written that operations start from.
 
-    ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture (``element``) stand
-    instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was written first first.
-    ``opacity`` is the share, in [0, 1], that it hides of what lies behind.
+    ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture or a gradient
+    (``element``) stand instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was
+    written first first. ``opacity`` is the share, in [0, 1], that it hides of what lies behind.
     """
 
     material: str
     colours: tuple[ColourStep, ...] = ()
     rgb: Triple = WHITE
-    element: Element | None = None
+    element: Element | Gradient | None = None
     texture: tuple[Affine, ...] = ()
     opacity: float = 1.0
 

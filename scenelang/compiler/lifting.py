@@ -9,7 +9,8 @@ the length of a point, then by its coordinates x and y (in space the turn by y i
 the other); the outermost of a group comes first. Behind them lie, in the order of each dimension, the amount
 and frequency of a displacement (in space), the width of a blend (0 where it is the usual one, or none), the
 frame of the texture, the colour and the code of the material. The colour is the diagonal of a 3 x 4 matrix,
-row by row. Of its other nine places, `OTHERS`, the third has 1 - opacity, and the rest are free.
+row by row, whose other nine places, `OTHERS`, hold what is rarely written: how far the leaf grows, how thick
+its shell is, 1 - opacity, and the order of growing and shell (`Skin`); the others are free.
 
 Every part is a function of the scene alone, and each transformation acts on the vector linearly: an affine
 map multiplies its frame by its inverse; a warp shifts the warps of its group by one place and writes itself
@@ -37,13 +38,15 @@ from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
 WIDTH: Final = 64  # numbers of an object
 STRENGTHS: Final = 3  # of a warp
 OTHERS: Final = 1, 2, 3, 4, 6, 7, 8, 9, 11
-"""Places of the colour's matrix off its diagonal. Parts to come take them, one each: 0 means not written."""
+"""Places of the colour's matrix off its diagonal, each of one part: 0 means not written."""
 
 Array = Any  # numpy array or torch tensor
 
 
 class Parts(NamedTuple):
-    """Parts of vectors (…, 64), each (…, its size) but ``width`` and ``clear`` (…,)."""
+    """Parts of vectors (…, 64), each (…, its size), but ``width``, ``clear`` and what follows ``material``
+    (…,).
+    """
 
     code: Array
     one: Array
@@ -57,6 +60,9 @@ class Parts(NamedTuple):
     rgb: Array
     material: Array
     clear: Array = 0.0  # (…,) 1 - opacity
+    grow: Array = 0.0  # this and what follows as in `Skin`
+    shell: Array = 0.0
+    order: Array = 0.0
 
 
 class Layout:
@@ -73,9 +79,9 @@ class Layout:
         colour = at.pop("colour").start
         at.pop("free", None)
         one, width = at.pop("one").start, at.pop("width").start
-        diagonal, clear = slice(colour, colour + 12, 5), colour + OTHERS[2]
-        self.places = Parts(**at, one=one, width=width, rgb=diagonal, clear=clear)
-        self.others = np.array([colour + place for place in OTHERS])
+        grow, shell, clear, order, *_ = self.others = [colour + place for place in OTHERS]
+        own = {"rgb": slice(colour, colour + 12, 5), "clear": clear, "grow": grow, "shell": shell}
+        self.places = Parts(**at, **own, one=one, width=width, order=order)  # of colours the diagonal
         self.dimension, self.geometry = dimension, int(self.places.bulge.stop)
         self.outer, self.inner = sizes["outer"] // STRENGTHS, sizes["inner"] // STRENGTHS
         rows = range(dimension)
@@ -130,9 +136,12 @@ def lift_many(
         numbers += _slots(level.outer, layout.outer, d)
         numbers += inverse_frame(level.middle, d)
         numbers += _slots(level.inner, layout.inner, d)
+        skin, at = level.skin, layout.places
         if d == 3:
-            numbers += [level.bulge.amount, level.bulge.frequency]
+            numbers += [skin.amount, skin.frequency]
         row[: len(numbers)] = numbers
+        if skin.grow or skin.shell:
+            row[at.grow], row[at.shell], row[at.order] = skin.grow, skin.shell, skin.order
     return out
 
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.graph import (
     MOST_STEPS,
     WHITE,
@@ -18,6 +19,7 @@ from scenelang.compiler.graph import (
     Look,
     Move,
     colour_steps,
+    coloured,
     normal,
 )
 from scenelang.compiler.manifest import Manifest
@@ -26,7 +28,9 @@ from scenelang.compiler.steps import (
     IDENTITY,
     Affine,
     Displace,
+    Grow,
     Rows,
+    Shell,
     Step,
     Twist,
     Warp,
@@ -39,7 +43,17 @@ from scenelang.compiler.steps import (
 from scenelang.language import nodes as schema
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
 from scenelang.language.scene import Brought, Scene
-from scenelang.language.words import BLEND, SCENES, STAGE, TEXTURES, Combine, dimension_of
+from scenelang.language.words import (
+    BLEND,
+    GRADIENTS,
+    OWN_TRANSFORMS,
+    PAINTS,
+    SCENES,
+    STAGE,
+    TEXTURES,
+    Combine,
+    dimension_of,
+)
 
 
 def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
@@ -50,6 +64,10 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
         return Warp(transform.k, (0.0, 0.0))
     if isinstance(transform, schema.Bend):
         return Warp(0.0, (transform.k, 0.0))
+    if isinstance(transform, schema.Grow):
+        return Grow(transform.r)
+    if isinstance(transform, schema.Shell):
+        return Shell(transform.w)
     if isinstance(transform, (schema.Twist, schema.Displace)):
         if space.dimension == 2:
             fact = f"`{transform.kind}` leaves the plane"
@@ -267,12 +285,18 @@ class _Lowering:
         return element
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
-        result = []
-        for at, transform in enumerate(node.transforms):
-            if isinstance(transform, schema.Displace) and (at or not isinstance(node, schema.Object)):
-                fact = "`displace` does not stand first in the block of an object"
-                self.say("E0407", fact, transform, "it changes the leaf's own distance, before any transform")
-                continue
+        result, own, first = [], set[str](), isinstance(node, schema.Object)
+        for transform in node.transforms:
+            if (kind := transform.kind) not in OWN_TRANSFORMS:
+                first = False
+            else:
+                if not first or kind in own:
+                    fact = f"`{kind}` does not stand first in the block of an object"
+                    fact = f"a second `{kind}` of an object" if first else fact
+                    help = "it changes the leaf's own distance, before any transform"
+                    self.say("E0407", fact, transform, help)
+                    continue
+                own.add(kind)
             step = self.steps.get(id(transform))  # the Scene holds it, so that its id stays its own
             if step is None:
                 step = self.steps[id(transform)] = step_of(transform, self.space)
@@ -289,18 +313,21 @@ class _Lowering:
         known = self.looks.get(id(material))
         if known is not None:
             return known
-        name, manifest, element = material.name, self.manifest, None
+        name, manifest = material.name, self.manifest
+        element: Element | Gradient | None = None
         shading = material.shading or manifest.materials[0]
         if "." in name:
             element = self.element(name, self.brought.materials, material, "E0502")
         elif name in TEXTURES:
             element = self.element(name, load_textures(), material, "E0502")
+        elif name in GRADIENTS:
+            element = self.gradient(material)
         else:
             shading = name
             if material.shading is not None:
                 self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
         if shading not in manifest.materials:
-            offered = (*manifest.materials, *TEXTURES) if shading is name else manifest.materials
+            offered = (*manifest.materials, *PAINTS) if shading is name else manifest.materials
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
         colours = colour_steps(map(self.space.inked, material.ops))
@@ -316,11 +343,22 @@ class _Lowering:
         )
         return look
 
-    def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
+    def gradient(self, material: schema.Material) -> Gradient | None:
+        """The gradient of a material, with colours in the space that they are averaged in."""
+        if Gradient.kind not in self.manifest.elements:
+            fact = f"model `{self.manifest.name}` does not draw `{material.name}`, a gradient"
+            self.say("E0502", fact, material)
+            return None
+        inked = [op for op in map(self.space.inked, material.ops) if isinstance(op, schema.Stop)]
+        return Gradient(material.name, tuple([(op.offset, *coloured((("color", *op.rgb),))) for op in inked]))
+
+    def texture_moves(
+        self, material: schema.Material, element: Element | Gradient | None
+    ) -> Iterator[Affine]:
         """The moves of a texture; a constant material's are checked too, colours of space have none."""
         rows = IDENTITY
         for op in material.ops:
-            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
+            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue | schema.Stop):
                 continue
             if element is not None and element.dimension == 3:
                 fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"

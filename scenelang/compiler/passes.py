@@ -9,10 +9,11 @@ from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
 from operator import attrgetter, itemgetter
 from typing import Final, NamedTuple
 
+from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
 from scenelang.compiler import steps
 from scenelang.compiler.chain import LevelsError, split_levels
-from scenelang.compiler.geometries import GEOMETRIES
+from scenelang.compiler.geometries import GEOMETRIES, Geometry
 from scenelang.compiler.graph import (
     Fold,
     Graph,
@@ -43,7 +44,19 @@ from scenelang.compiler.rewrites import (
     push_transforms,
 )
 from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
-from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp, composed, inverted
+from scenelang.compiler.steps import (
+    Affine,
+    Displace,
+    Grow,
+    Own,
+    Shell,
+    Skin,
+    Step,
+    Twist,
+    Warp,
+    composed,
+    inverted,
+)
 from scenelang.language.diagnostics import Diagnostics, Label, Span
 from scenelang.language.scene import Scene
 
@@ -58,6 +71,15 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
     manifest = context.manifest
+    own = next((move for move in leaf.moves if isinstance(move.step, Grow | Shell)), None)
+    if own is not None and manifest.lifting != "exact":
+        fact = f"model `{manifest.name}` does not draw `{type(own.step).__name__.lower()}`"
+        help = "leave `model` out, or draw with another one"
+        context.diagnostics.add("E0506", fact, own.span or leaf.span, help=help)
+    skin, row = Skin.of(leaf.steps), GEOMETRIES.get(leaf.geometry)
+    if own is not None and row is not None and _nothing(skin, row.inner or row.thickness / 2):
+        fact, help = f"nothing is left of this `{leaf.geometry}`", "shrink it less, or make its shell thicker"
+        context.diagnostics.add("W0404", fact, own.span or leaf.span, help=help)
     if manifest.lifting == "exact" and any(not isinstance(move.step, Affine) for move in leaf.moves):
         try:  # other liftings take any chain
             split_levels(leaf.steps, manifest.limits, space)
@@ -86,12 +108,18 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
     context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
 
 
+def _nothing(skin: Skin, depth: float) -> bool:
+    """True where a skin provably leaves nothing of a leaf that is nowhere deeper than so many leaf units."""
+    within = min(skin.level, skin.level - skin.inner) if skin.inner is not None else inf
+    return min(skin.level + depth, within) + abs(skin.amount) <= 0.0
+
+
 def _mild(step: Step) -> bool:
     if isinstance(step, Warp):
         return abs(step.twirl) < REACH and hypot(*step.bend) < REACH
     if isinstance(step, Twist):
         return abs(step.twist) < REACH
-    return isinstance(step, Affine) or max(abs(step.amount), abs(step.frequency)) < REACH
+    return not isinstance(step, Displace) or max(abs(step.amount), abs(step.frequency)) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:
@@ -121,6 +149,7 @@ _CODES = {
     "frequency": "W0510",
     "texels": "W0511",
     "width": "W0512",
+    "level": "W0513",
 }
 _SUBJECTS = {
     "twirl": "a `twirl` of {value} on {name}",
@@ -132,6 +161,7 @@ _SUBJECTS = {
     "thin": "{name}, {value} times as long as wide,",
     "thickness": "{name}, {value} thick,",
     "texels": "a texture of {value} texels to a pixel on {name}",
+    "level": "an edge of {name} at {value} from that of its leaf",
 }
 """Subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
@@ -209,9 +239,11 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     result = [("scale", smallest), ("scale", largest)]
     if smallest > 0:
         result.append(("thin", largest / smallest))
+    skin, row = Skin.of(leaf.steps), GEOMETRIES.get(leaf.geometry)
     if leaf.look.material == "diffuse":
-        row = GEOMETRIES.get(leaf.geometry)
-        result.append(("thickness", smallest * (row.thickness if row else inf)))
+        result.append(("thickness", smallest * _thickness(skin, row)))
+    if skin.grow or skin.shell:
+        result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:
         if isinstance(step, Warp):
             if step.twirl:
@@ -225,10 +257,16 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     return result
 
 
+def _thickness(skin: Skin, row: Geometry | None) -> float:
+    """The least thickness of a leaf with a skin, leaf units."""
+    grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
+    return (skin.shell or (row.thickness if row else inf)) + 2 * grown
+
+
 def _texels(leaf: Leaf, graph: Graph) -> Measures:
     """Texels to a pixel of the picture that an object wears, where they are densest."""
     element, affines = leaf.look.element, steps.composed(leaf.steps)
-    if element is None or element.dimension == 3:
+    if not isinstance(element, Element) or element.dimension == 3:
         return []
     a, b, c, _, d, e, f, *_ = steps.inverted(steps.compose(affines, leaf.look.moved))
     p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
@@ -311,24 +349,31 @@ def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
 
 
 def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
-    """The leaf's own distance at a world point."""
+    """The leaf's own distance at a world point, with what its steps make of it."""
     for step in reversed(steps):
         x, y, z = p
         if isinstance(step, Affine):
             a, b, c, u, d, e, f, v, g, h, i, w = inverted(step.rows)
             p = a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
-        elif isinstance(step, Displace):
-            f = step.frequency
-            bump = step.amount * sin(f * x) * sin(f * y) * sin(f * z)
-            return float(GEOMETRIES[geometry].distance(p)) + bump
         elif isinstance(step, Twist):
             s, c = sin(step.twist * y), cos(step.twist * y)
             p = c * x + s * z, y, c * z - s * x
-        else:
+        elif isinstance(step, Warp):
             angle = step.twirl * hypot(x, y, z) + step.bend[0] * x + step.bend[1] * y
             s, c = sin(angle), cos(angle)
             p = c * x + s * y, c * y - s * x, z
-    return float(GEOMETRIES[geometry].distance(p))
+    depth, (x, y, z) = float(GEOMETRIES[geometry].distance(p)), p
+    for step in steps:
+        if not isinstance(step, Own):
+            break
+        if isinstance(step, Grow):
+            depth -= step.r
+        elif isinstance(step, Shell):
+            depth = abs(depth) - step.w / 2
+        else:
+            f = step.frequency
+            depth += step.amount * sin(f * x) * sin(f * y) * sin(f * z)
+    return depth
 
 
 _FAR: Final = 8.0

@@ -13,7 +13,7 @@ the turn by an angle w if w(M u) is an angle of the same kind:
 - A twirl has w = k |M u|, which is k s |u| where |m| = s and c = 0.
 
 Bounds. A leaf lies in the unit disc or ball and its distance grows no faster than 1, so the points below a
-level lie within a radius of 1 + level / stretch; a displacement widens that by its amount. A turn keeps
+level lie within a radius of 1 + level / stretch; a `Skin` widens that by its reach. A turn keeps
 lengths, so that it carries a ball into the one about the origin that encloses it. In the plane, where it
 turns each point by an angle that is bounded over any sector about the origin, it carries a sector into one.
 """
@@ -31,8 +31,9 @@ from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.steps import (
     IDENTITY,
     Affine,
-    Displace,
+    Own,
     Rows,
+    Skin,
     Step,
     Turn,
     Twist,
@@ -238,7 +239,9 @@ class Space:
 
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
         """An operation of a material in the space that colours are averaged in; here linear, as light is."""
-        return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
+        if isinstance(op, scene.Color | scene.Stop):
+            return op.model_copy(update={"rgb": decoded(op.rgb)})
+        return op
 
     def written(self, rgb: Triple) -> Triple:
         """The inverse of `inked` for a colour: as it is written."""
@@ -328,17 +331,15 @@ class Space:
 
     def _ball(self, steps: Sequence[Step], level: float) -> tuple[Triple, float, Rows]:
         """Centre and radius of a ball around all points below a level, and the affine map behind it."""
-        radius, pending = 1.0, IDENTITY
+        radius, pending = 1.0 + Skin.of(steps).reach, IDENTITY
         if level > 0.0:
             stretch = self.stretches(composed(steps))[0]
             radius += level / stretch if stretch else inf
         centre = 0.0, 0.0, 0.0
         for step in steps:
-            if isinstance(step, Displace):
-                radius += abs(step.amount)
-            elif isinstance(step, Affine):
+            if isinstance(step, Affine):
                 pending = compose(step.rows, pending)
-            else:
+            elif not isinstance(step, Own):
                 if pending is not IDENTITY:
                     centre, radius = _mapped(pending, centre), radius * self.stretches(pending)[1]
                     pending = IDENTITY
@@ -347,11 +348,14 @@ class Space:
 
     def disc(self, geometry: str, steps: Sequence[Step]) -> tuple[float, Rows] | None:
         """Radius of a disc or ball within a leaf, and the map from the world to the leaf; None if unknown."""
-        maps, row = [isinstance(step, Affine) for step in steps], GEOMETRIES.get(geometry)
+        row = GEOMETRIES.get(geometry)
+        maps = [isinstance(step, Affine) for step in steps if not isinstance(step, Own)]
         if row is None or any(maps[:-1]) or not all(maps[-1:]):
             return None
-        inner = row.inner - sum(abs(step.amount) for step in steps if isinstance(step, Displace))
-        return (inner, inverted(composed(steps))) if inner > 0.0 else None
+        skin = Skin.of(steps)
+        inner = row.inner + skin.grow - abs(skin.amount)
+        filled = inner > 0.0 and row.inner > 0.0 and not skin.shell
+        return (inner, inverted(composed(steps))) if filled else None
 
     def usable(self, rows: Rows) -> bool:
         """True where the map has an inverse in float64 that float32 can hold."""
@@ -428,12 +432,12 @@ class Plane(Space):
         return Warp(sign * scale * turn.twirl, bend)
 
     def box(self, geometry: str, steps: Sequence[Step], level: float) -> Box:
-        rows, reach = composed(steps), 0.0
+        rows, reach = composed(steps), Skin.of(steps).reach
         if level > 0.0:
             stretch = self.stretches(rows)[0]
             if stretch == 0.0:
                 return EVERYWHERE
-            reach = level / stretch
+            reach += level / stretch
         if any(isinstance(step, Warp) for step in steps):
             return _grown(_warped(steps, 1.0 + reach))
         row = GEOMETRIES.get(geometry)
@@ -545,6 +549,7 @@ def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, 
     for step in steps:
         if isinstance(step, Affine):
             pending = compose(step.rows, pending)
+        if isinstance(step, Affine | Own):
             continue
         if not isinstance(step, Warp):
             return EVERYWHERE[:4]

@@ -4,14 +4,15 @@ Chains of steps are written nearest the leaf first. A world point is carried bac
 last to the first: through an `Affine` by its inverse, through a `Warp` by
 ``p -> R(twirl |p| + bend . p) p`` with ``R(a) p = (cos a p.x + sin a p.y, -sin a p.x + cos a p.y)``.
 ``twirl(k)`` is ``Warp(k, (0, 0))`` and ``bend(k)`` is ``Warp(0, (k, 0))``. A `Twist` turns (p.x, p.z) in the
-same sense, and a `Displace` leaves points alone: it adds to the leaf's distance.
+same sense. A `Displace`, a `Grow` and a `Shell` leave points alone: they stand first, each at most once, and
+change the leaf's own distance, in the order that they are written in.
 
 The compiler's front half does not import numpy: these few closed forms are all it needs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import cos, hypot, sin
 
 from scenelang.assets.records import Record
@@ -55,10 +56,7 @@ class Twist(Record):
 
 
 class Displace(Record):
-    """Adds ``amount sin(f x) sin(f y) sin(f z)`` to the leaf's distance, f the ``frequency``.
-
-    It stands first in a chain, and once: (x, y, z) is the leaf's own point.
-    """
+    """Adds ``amount sin(f x) sin(f y) sin(f z)`` to the leaf's distance at (x, y, z), f the ``frequency``."""
 
     amount: float
     frequency: float
@@ -68,8 +66,79 @@ class Displace(Record):
         return self.amount == 0.0 or self.frequency == 0.0
 
 
+class Grow(Record):
+    """Takes ``r`` off the leaf's distance."""
+
+    r: float
+
+    @property
+    def idle(self) -> bool:
+        return self.r == 0.0
+
+
+class Shell(Record):
+    """Makes the leaf's distance d to ``|d| - w / 2``."""
+
+    w: float
+
+    @property
+    def idle(self) -> bool:
+        return self.w == 0.0
+
+
 Turn = Warp | Twist
-Step = Affine | Turn | Displace
+Own = Grow | Shell | Displace
+"""Steps that change a leaf's own distance."""
+Step = Affine | Turn | Own
+
+
+class Skin(Record):
+    """All that a chain does to its leaf's own distance, in leaf units; 0 for what it does not do.
+
+    ``order`` is of two bits: 1 says that the `Grow` stands behind the `Shell`, 2 that the `Displace` does.
+    """
+
+    grow: float = 0.0
+    shell: float = 0.0
+    order: int = 0
+    amount: float = 0.0
+    frequency: float = 0.0
+
+    @staticmethod
+    def of(steps: Sequence[Step]) -> Skin:
+        """The skin of a chain."""
+        if not steps or not isinstance(steps[0], Own):
+            return BARE
+        grow = shell = amount = frequency = 0.0
+        order = 0
+        for step in steps:
+            if isinstance(step, Shell):
+                shell = step.w
+            elif isinstance(step, Grow):
+                grow, order = step.r, order | (1 if shell else 0)
+            elif isinstance(step, Displace):
+                amount, frequency, order = step.amount, step.frequency, order | (2 if shell else 0)
+        return Skin(grow, shell, order, amount, frequency)
+
+    @property
+    def reach(self) -> float:
+        """How much farther out the leaf reaches at most, below 0 where it shrinks."""
+        return self.grow + self.shell / 2 + abs(self.amount)
+
+    @property
+    def level(self) -> float:
+        """The outermost level of the leaf's own distance that is an edge, but for a displacement."""
+        return self.grow + self.shell / 2
+
+    @property
+    def inner(self) -> float | None:
+        """The innermost level that is one, None where the leaf is filled."""
+        if not self.shell:
+            return None
+        return (-1.0 if self.order & 1 else 1.0) * self.grow - self.shell / 2
+
+
+BARE = Skin()
 
 
 def compose(outer: Rows, inner: Rows) -> Rows:

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import HARD, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
 from scenelang.compiler.graph import Graph, Look
@@ -39,9 +40,9 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import lift_many
 from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
-from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, compose
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
-from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance, placed_leaves
+from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -76,13 +77,17 @@ class Written(NamedTuple):
         """Leaf units by which points within a reach of the leaf, and ``far`` from the world's, may be off."""
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
-    def discoloured(self, reach: float, far: float) -> float:
-        """Greatest error of a channel of a texture's colours there."""
+    def mispainted(self, reach: float, far: float) -> float:
+        """Distance by which (u, v) of a texture may be off there."""
+        reach = min(reach, _seen(self.steps, far))
+        return _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
+
+    def discoloured(self, off: float) -> float:
+        """Greatest error of a channel of a texture's colours, apart from hard edges, where (u, v) is off."""
         if self.look.element is None:
             return 0.0
-        reach = min(reach, _seen(self.steps, far))
-        off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
-        off *= max(self.look.element.sizes)
+        element = self.look.element
+        off *= element.slope if isinstance(element, Gradient) else max(element.sizes)
         for kind, *numbers in self.look.colours:
             if kind == "hue":
                 off = 6 * (off + EPS * abs(numbers[0]))
@@ -98,7 +103,7 @@ def _seen(steps: Sequence[Step], far: float) -> float:
         if isinstance(step, Affine):
             _, back, moved = _sizes(step)
             size = back @ (size + moved)
-        else:
+        elif isinstance(step, Warp):
             size[:] = np.hypot(*size)
     return float(np.hypot(*size))
 
@@ -335,7 +340,13 @@ class Stream:
         raw = np.array([TOKENS[row.op] for row in rows], np.intp)
         widths = widths_of(raw, np.array([row.k for row in rows]))
         seen = felt(groups, widths)
-        reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + seen.total / self.frames.scale)
+        skins = [Skin.of(leaf.steps) for leaf in self._leaves]
+        beyond = 1.0 + seen.total / self.frames.scale + [skin.reach for skin in skins]
+        reach = np.where(seen.everywhere | anchored(groups), np.inf, beyond)
+        behind = [skin.grow * (skin.order & 1) for skin in skins]
+        # of each object how far it grows before it is a shell, half of that, and how far it grows behind it
+        self._skins = np.array([[skin.grow for skin in skins], [skin.shell / 2 for skin in skins], behind])
+        self._skins[0] -= self._skins[2]
         objects, far = placed_leaves(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
         written = {leaf.number: Written(leaf.look, steps) for leaf, steps, _ in objects}
         leaves = [written[leaf.number] for leaf in self._leaves]
@@ -357,7 +368,10 @@ class Stream:
         opacity = np.array([leaf.look.opacity for leaf in self._leaves])
         self._opacity = opacity if (opacity < 1.0).any() else None
         self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
-        self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
+        self._mispainted = [leaf.mispainted(w, far) if leaf.look.element else 0.0 for leaf, w in own]
+        self._discoloured = [
+            leaf.discoloured(off) for leaf, off in zip(leaves, self._mispainted, strict=True)
+        ]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
         """Mean number of objects that reach a place on the canvas."""
@@ -383,7 +397,9 @@ class Stream:
             else:
                 result = self._known[name].exact(p)
             low[some], high[some] = result
-        return Interval(low, high)
+        return (
+            _worn(Interval(low, high), *self._skins[:, which]) if self._skins.any() else Interval(low, high)
+        )
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
         """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or in regions about them, which
@@ -394,12 +410,24 @@ class Stream:
             some, look = which == at, self._leaves[at].look
             low[:, some], high[:, some] = 0.0, 1.0
             if sampled:
-                seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
+                p = carry_back(look.texture, q[:, some])
+                seen, off = colour_at(look, p).T, self._discoloured[at] * np.ones(len(p[0]))
+                if isinstance(look.element, Gradient):
+                    s, torn = along(look.element, p[0], p[1]), self._mispainted[at] + HARD
+                    off[np.any([abs(s - edge) <= torn for edge in look.element.edges or (np.inf,)], 0)] = 1.0
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
         if self._opacity is None:
             return Interval(low, high)
         opacity = self._opacity[which]
         return Interval(*(np.vstack([side * opacity, opacity]) for side in (low, high)))
+
+
+def _worn(d: Interval, first: Floats, wall: Floats, last: Floats) -> Interval:
+    """Intervals of ``|d - first| - wall - last``, or of ``d - first - last`` where there is no wall."""
+    low, high = d.low - first, d.high - first
+    nearest = np.maximum(np.maximum(low, -high), 0.0)
+    low, high = _chosen(wall > 0.0, (nearest, np.maximum(-low, high)), (low, high))
+    return Interval(low - (wall + last), high - (wall + last))
 
 
 SIDES = 16, 8, 4, 2, 1  # of regions, samples

@@ -13,6 +13,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
@@ -27,7 +28,7 @@ from scenelang.compiler.spaces import (
     encoded,
     stage_data,
 )
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Twist, Warp
 from scenelang.language import scene as schema
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, Span, plural
@@ -132,6 +133,10 @@ def move_text(move: Move, space: Space) -> str:
         return f"twist({step.twist:.6g})"
     if isinstance(step, Displace):
         return f"displace({step.amount:.6g}; {step.frequency:.6g})"
+    if isinstance(step, Grow):
+        return f"grow({step.r:.6g})"
+    if isinstance(step, Shell):
+        return f"shell({step.w:.6g})"
     if step.rows == IDENTITY:
         return "[identity]"
     rows = (" ".join(f"{step.rows[i] + 0.0:.6g}" for i in row) for row in space.shown)
@@ -203,7 +208,9 @@ def _node(node: Node) -> dict[str, Any]:
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
-def _texture(element: Element) -> dict[str, Any]:
+def _texture(element: Element | Gradient) -> dict[str, Any]:
+    if isinstance(element, Gradient):
+        return {"name": element.name, "stops": [list(stop) for stop in element.stops]}
     return {"name": element.name, "digest": element.digest}
 
 

@@ -58,7 +58,7 @@ _LEAST: Final = 1e-30  # of a square, whose root has no derivative at 0
 class _Parts(NamedTuple):
     """Numbers of N objects and of the background, or n rates of these."""
 
-    geometry: Tensor  # geometry vectors (N, G, n)
+    geometry: Tensor  # geometry vectors, and behind them how far leaves grow and their shells (N, G + 2, n)
     colours: Tensor  # (N, 3, n)
     widths: Tensor  # of the blends by which objects join (N, n)
     clear: Tensor  # 1 - opacities (N, n)
@@ -80,6 +80,7 @@ class SoftPlane:
         self.cell = [part[tokens][..., None] for part in network.cell_weights()]
         self.smooth, self.union = (torch.from_numpy(tokens == token) for token in (SMOOTH, UNION))
         parts = layout.unpack(program.vectors)
+        self.late = torch.from_numpy(parts.order % 2).to(dtype)[:, None]  # of leaves that grow behind a shell
         self.widest = float(parts.width[tokens == SMOOTH].max(initial=BLEND))
         codes, self.shapes = np.unique(parts.code, axis=0, return_inverse=True)
         self.decoders = network.decoders(torch.from_numpy(codes).to(dtype))
@@ -100,6 +101,7 @@ class SoftPlane:
             for at in range(warps.start, warps.stop, STRENGTHS)
             if any(part.geometry[:, at : at + STRENGTHS].any() for part in (still, moving))
         ]
+        self.skinned = any(bool(part.geometry[:, -2:].any()) for part in (still, moving))
         self.clear = bool(still.clear.any() or moving.clear.any())
         moving.colours.mul_((still.colours >= 0) & (still.colours <= 1))
         still.colours.clamp_(0.0, 1.0)
@@ -116,8 +118,9 @@ class SoftPlane:
         """Parts of numbers (K, n), or of rates: all are linear in them."""
         vectors, behind = numbers[:-3].reshape(self.count, WIDTH, -1), numbers[-3:]
         colours = vectors[:, self.layout.places.rgb] * self.albedo[:, :, None]
-        widths, clear = vectors[:, self.layout.places.width], vectors[:, self.layout.places.clear]
-        return _Parts(vectors[:, : self.layout.geometry], colours, widths, clear, behind)
+        at = self.layout.places
+        geometry = vectors[:, [*range(self.layout.geometry), at.grow, at.shell]]
+        return _Parts(geometry, colours, vectors[:, at.width], vectors[:, at.clear], behind)
 
     def _changes(self, p: Tensor, still: _Parts, moving: _Parts) -> tuple[Tensor, Tensor]:
         """Colours (3, M) of points (2, M), and their derivatives (3, M, n)."""
@@ -143,7 +146,7 @@ class SoftPlane:
         return shown.detach(), slopes
 
     def _distances(self, p: Tensor, geometry: Tensor) -> Tensor:
-        """World distances (N, M) of objects with geometry vectors (N, G, M or 1) at world points (2, M)."""
+        """World distances (N, M) of objects with numbers (N, G + 2, M or 1) at world points (2, M)."""
         layout = self.layout
         steps: list[Affine | Warp] = []
         maps = []
@@ -164,7 +167,12 @@ class SoftPlane:
             decoded = self.network.decode(own, TORCH.length(list(own)), 1.0, decoder)
             for at, row in zip(which, decoded.reshape(len(which), -1), strict=True):
                 result[at] = row
-        return torch.stack(result) * _scale(*maps)
+        d = torch.stack(result)
+        if self.skinned:
+            grow, shell = geometry[:, -2], geometry[:, -1]
+            d = d - (1 - self.late) * grow
+            d = torch.where(shell > 0, d.abs() - shell / 2, d) - self.late * grow
+        return d * _scale(*maps)
 
     def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, clear: Tensor, behind: Tensor) -> Tensor:
         """Channels (3, M) of points, by distances, colours, widths and 1 - opacities (3, N, M) and what is

@@ -88,7 +88,9 @@ class Use(Record, frozen=False):
 class Names:
     """All names of a file."""
 
-    def __init__(self, file: tree.File) -> None:
+    def __init__(self, file: tree.File, at: int | None = None) -> None:
+        """Find all names, or those in sight of an offset: of statements elsewhere what they define."""
+        self._at = at
         self.source: SourceFile = file.span.source
         self.top = Scope(0, file.span.end + 1)
         self.uses: list[Use] = []
@@ -160,16 +162,23 @@ class Names:
                 which: Kind = "fn" if isinstance(stmt, tree.Fn) else "module"
                 bodies.append((stmt, self._define(stmt.name, which, stmt, scope, scope.start)))
         for stmt in statements:
-            if not isinstance(stmt, tree.Fn | tree.Module):
+            near = isinstance(stmt, tree.Let | tree.Param | tree.Import) or self._is_near(stmt, scope)
+            if near and not isinstance(stmt, tree.Fn | tree.Module):
                 self._walk(stmt, scope, kind)
         for definition, symbol in bodies:
             around = self._scope(definition.name.span.end, definition.span.end, scope)
             for param in definition.params:
-                if param.default is not None:
+                if param.default is not None and self._is_near(definition, scope):
                     self._walk(param.default, around, "group")
                 formal = self._define(param.name, "argument", param, around, param.span.end, symbol)
                 symbol.params.append(formal)
-            self._walk(definition.body, around, "group")
+            if self._is_near(definition, scope):
+                self._walk(definition.body, around, "group")
+
+    def _is_near(self, stmt: tree.Stmt, scope: Scope) -> bool:
+        """Test whether what is inside a statement is looked at."""
+        at, span = self._at, stmt.span
+        return at is None or scope is not self.top or span.start <= at <= span.end
 
     def _walk(self, node: Any, scope: Scope, kind: str) -> None:
         """Note the names in a statement or an expression, in a block of some kind."""
@@ -181,15 +190,18 @@ class Names:
                 if isinstance(node.name, tree.String):
                     self._add(node.name.span, node.name.value, "model")
             case tree.Let() | tree.Param():
-                self._children(node, scope, kind)
+                if self._is_near(node, scope):
+                    self._children(node, scope, kind)
                 which: Kind = "let" if isinstance(node, tree.Let) else "param"
                 self._define(node.name, which, node, scope, node.span.end)
             case tree.Import():
                 self._add(node.path.span, node.path.value, "path")
                 self._define(node.alias, "import", node, scope, node.span.end)
-            case tree.For():
+            case tree.For() | tree.ForItem():
                 self._walk(node.iterable, scope, kind)
-                loop = self._scope(node.body.span.start, node.span.end, scope)
+                # An item may be about to be written, or to go on.
+                more = isinstance(node, tree.ForItem) + isinstance(node.body, tree.BadExpr)
+                loop = self._scope(node.body.span.start, node.span.end + more, scope)
                 self._define(node.variable, "loop", node, loop, node.body.span.start)
                 self._walk(node.body, loop, kind)
             case tree.If():
@@ -246,11 +258,13 @@ class Names:
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
         role: Role | None = None
-        own = scope.find(name) if name in NEWER else None
+        own = scope.find(name) if name in NEWER and kind != "material" else None
         hidden = own is not None and (own.kind == "module" or stmt.args is None)
-        if name in SETTINGS and not hidden:
+        if hidden:
+            role = None
+        elif name in SETTINGS:
             role = "setting"
-        elif name in OPERATIONS and not hidden and (kind == "material" or name not in TRANSFORMS):
+        elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
             role = "operation"
         elif name in TRANSFORMS:
             role = "transform"

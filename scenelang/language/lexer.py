@@ -183,18 +183,31 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     return re.compile(pattern), kinds, ["", *groups]
 
 
-def scan(source: SourceFile, report: Report) -> Tokens:
-    """All tokens of a text; slips go to ``report``."""
+@cache
+def blank() -> re.Pattern[str]:
+    """White space and comments."""
+    return re.compile(_SKIP)
+
+
+def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
+    """All tokens of a text, or those before an offset between tokens; slips go to ``report``."""
+    tokens, end = Tokens(source), len(source.text) if stop is None else stop
+    scan_part(tokens, report, 0, end)
+    tokens.append(END, end, end)
+    return tokens
+
+
+def scan_part(tokens: Tokens, report: Report, begin: int, stop: int) -> None:
+    """Append the tokens of a part of the text that begins and ends between tokens."""
     pattern, group_kinds, names = _master()
     literals = tables().literals
     name_group, sign_group = names.index("NAME"), names.index("sign")
     name_kind = group_kinds[name_group]
-    tokens = Tokens(source)
     kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
-    text = source.text
+    text = tokens.source.text
     keyword = literals.get
     slips = _Slips(tokens, report)
-    for match in pattern.finditer(text):
+    for match in pattern.finditer(text, begin, stop):
         group = match.lastindex
         if group is None:
             break
@@ -213,8 +226,6 @@ def scan(source: SourceFile, report: Report) -> Tokens:
         kinds.append(kind)
         starts.append(start)
         ends.append(end)
-    tokens.append(END, len(text), len(text))
-    return tokens
 
 
 class _Slips:

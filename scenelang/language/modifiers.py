@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from scenelang.assets.gradient import STOPS
 from scenelang.assets.records import Record
 from scenelang.language import advice, nodes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
@@ -23,10 +24,10 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, singular
+from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
-from scenelang.language.session import Binding, Env
+from scenelang.language.session import Binding, Env, Session
 from scenelang.language.values import (
     POISON,
     Angle,
@@ -115,6 +116,22 @@ def _factor(value: Any, operand: int) -> float:
     return factor
 
 
+def _growth(value: Any, operand: int) -> float:
+    growth = number(value, operand)
+    if not -0.5 <= growth <= 1.0:
+        help = "r is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a growth of {show(growth)} is outside -0.5..1", help, operand)
+    return growth
+
+
+def _wall(value: Any, operand: int) -> float:
+    wall = number(value, operand)
+    if not 0.0 < wall <= 1.0:
+        help = "w is in units of the leaf, before any scale"
+        raise Problem("E0311", f"a wall of {show(wall)} is not above 0 and at most 1", help, operand)
+    return wall
+
+
 def _axis(value: Any, operand: int) -> tuple[float, ...]:
     axis = vector(value, 3, operand, "an axis")
     if not any(axis):
@@ -146,6 +163,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
     "factor": _factor,
+    "growth": _growth,
+    "wall": _wall,
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,
@@ -318,8 +337,8 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         except Problem as problem:
             advice.report_problem(session.report, problem, span, operands)
             return None
-        if node.__class__ is Color or node.__class__ is Grayscale:
-            _warn(node, session.report, first.span if first else span)
+        if isinstance(node, Color | Grayscale | Stop):
+            _warn(node, session.report, next((o.span for o in reversed(operands) if o is not None), span))
         return node
 
     def append(node: Any, out: Builder) -> None:
@@ -363,9 +382,9 @@ def _twice(name: str, span: Span, first: Span, report: Reporter) -> None:
     report.error("E0333", f"`{name}` is given twice", span, labels=labels, help="leave one of them out")
 
 
-def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
+def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
     """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
-    components = node.rgb if isinstance(node, Color) else (node.amount,)
+    components = (node.amount,) if isinstance(node, Grayscale) else node.rgb
     outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
     if outside is not None:
         help = "components run from 0 to 1; the result is clamped to that"
@@ -419,16 +438,41 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
         ops, given = operations(env)
         material = make(Material, {"name": called, "ops": ops, "shading": shading, "opacity": 1.0, **given})
         session.spans.record(material, where)
+        _check_stops(material, where, session)
         return material
 
     return run
+
+
+def _check_stops(material: Material, where: Written, session: Session) -> None:
+    """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
+    fault = paint_fault(material)
+    if fault is None:
+        return
+    stop, message = fault
+    statement, report = where.statement, session.report
+    if len([op for op in material.ops if op.kind == "stop"]) < STOPS[0] and any(
+        error.span is not None
+        and error.span.source is statement.source
+        and statement.start <= error.span.start < statement.end
+        for error in report.diagnostics
+        if error.severity == "error"
+    ):
+        return  # a stop was refused already
+    span = (session.spans.span(stop) if stop is not None else None) or where.name
+    if material.name in words.GRADIENTS:
+        help = "as in material linear { stop(0, #d33); stop(0.5, #fff); stop(1, #33d); }: 2 to 8, in order"
+        report.error("E0360", message, span, help=help)
+    else:
+        help = "stops stand in the block of material linear or material radial"
+        report.error("E0330", message, span, help=help)
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
-        known = {*words.MATERIALS, *words.TEXTURES}
+        known = {*words.MATERIALS, *words.PAINTS}
         if alias in known:
             return alias
         _unknown(name, place, known)
@@ -550,6 +594,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             ops, given = operations(env)
             material = make(Material, {**material.__dict__, "ops": (*material.ops, *ops), **given})
             session.spans.record(material, where)
+            _check_stops(material, where, session)
         _give(material, span, out, place)
         session.count_parts(1 + len(material.ops), span)
 

@@ -29,8 +29,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from scenelang.assets.gradient import stops_fault
 from scenelang.language.diagnostics import plural
-from scenelang.language.words import BLEND, RESERVED, Combine
+from scenelang.language.words import BLEND, GRADIENTS, RESERVED, Combine
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
@@ -435,8 +436,30 @@ class Displace(Frozen):
         def __init__(self, amount: float, frequency: float) -> None: ...
 
 
+class Grow(Frozen):
+    """Takes ``r`` off the leaf's own distance, so that its edge moves out by it; first, before any move."""
+
+    kind: Literal["grow"] = "grow"
+    r: Annotated[Finite, Field(ge=-0.5, le=1, description="leaf units; below 0 the leaf shrinks")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, r: float) -> None: ...
+
+
+class Shell(Frozen):
+    """Keeps what is within ``w`` / 2 of the leaf's edge; first, before any move."""
+
+    kind: Literal["shell"] = "shell"
+    w: Annotated[Finite, Field(gt=0, le=1, description="leaf units; half on either side of the edge")]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, w: float) -> None: ...
+
+
 Transform = Annotated[
-    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace,
+    Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace | Grow | Shell,
     Field(discriminator="kind"),
 ]
 Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
@@ -490,8 +513,20 @@ class Hue(_Turn):
         return cls(angle=math.radians(angle_deg))
 
 
+class Stop(Frozen):
+    """A stop of a gradient: the colour ``rgb`` at ``offset``."""
+
+    kind: Literal["stop"] = "stop"
+    offset: Share
+    rgb: Rgb
+
+    if TYPE_CHECKING:
+
+        def __init__(self, offset: float, rgb: str | tuple[float, float, float]) -> None: ...
+
+
 MaterialOp = Annotated[
-    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue | Stop,
     Field(discriminator="kind"),
 ]
 
@@ -569,8 +604,8 @@ SampleCount = Annotated[Literal[4, 16], Field(description="samples of a pixel"),
 class Material(Frozen):
     """A material, with its texture and colour operations in order.
 
-    One of the model that is a texture, or an element's, is lit as its ``shading`` says. ``opacity`` is of
-    flat scenes.
+    One of the model that is a texture, a gradient, or an element's, is lit as its ``shading`` says.
+    ``opacity`` is of flat scenes.
     """
 
     name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
@@ -600,6 +635,22 @@ class Material(Frozen):
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
         return given
+
+    @model_validator(mode="after")
+    def _has_stops(self) -> Self:
+        fault = paint_fault(self)
+        if fault is not None:
+            raise ValueError(fault[1])
+        return self
+
+
+def paint_fault(material: Material) -> tuple[Stop | None, str] | None:
+    """What is wrong with the stops of a material, if anything, and the stop it is wrong with."""
+    stops = [op for op in material.ops if op.kind == "stop"]
+    if material.name not in GRADIENTS:
+        return (stops[0], f"a stop in `{material.name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
 
 
 class Object(Frozen):

@@ -6,7 +6,7 @@ one becomes a `BadExpr`, a statement without its name a `BadStmt`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import accumulate
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
-from scenelang.language.lexer import Report, Tokens, run, scan
-from scenelang.language.tables import tables
+from scenelang.language.lexer import Report, Tokens, blank, run, scan, scan_part
+from scenelang.language.tables import END, tables
 from scenelang.language.words import RESERVED
 
 if TYPE_CHECKING:
@@ -32,11 +32,12 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
     "fn": (tree.Fn, (1, 2, 4)),
     "module": (tree.Module, (1, 2, 3)),
     "for_": (tree.For, (2, 4, 6)),
+    "for_item": (tree.ForItem, (2, 4, 6)),
+    "if_item": (tree.IfItem, (2, 4)),
     "conditional": (tree.Conditional, (0, 2, 4)),
     "index": (tree.Index, (0, 2)),
     "member": (tree.Member, (0, 2)),
     "bad_expression": (tree.BadExpr, ()),
-    "bad_statement": (tree.BadStmt, ()),
     "bad_block": (tree.BadStmt, ()),
 }
 """Rules whose node has some of their parts as they are: its class, and which parts."""
@@ -50,9 +51,10 @@ _LITERALS = (tree.Number, tree.String, tree.Bool, tree.Color, tree.NameRef, tree
 class Builder:
     """Makes the nodes of one file; ``report`` takes what is found in literals."""
 
-    def __init__(self, tokens: Tokens, report: Report) -> None:
+    def __init__(self, tokens: Tokens, report: Report, kept: Mapping[int, tree.Stmt] = {}) -> None:
         self.tokens = tokens
         self.report = report
+        self.kept = kept  # statements that need not be read again, by where they begin
         self.source = tokens.source
         self.text = tokens.source.text
         self.starts = tokens.starts
@@ -233,6 +235,9 @@ class Builder:
     def file(self, statements: list[tree.Stmt] | None = None) -> tree.File:
         return tree.File(Span(self.source, 0, len(self.text)), tuple(statements or ()))
 
+    def bad_statement(self, token: int) -> tree.Stmt:
+        return self.kept.get(self.starts[token]) or tree.BadStmt(self._span(token, token))
+
     def version(self, word: int, number: int, semicolon: int) -> tree.Stmt:
         span = self._span(word, semicolon)
         value = self.number(number)
@@ -295,16 +300,50 @@ def _block(last: Any) -> tree.Block | None:
 MAX_DEPTH = 200
 """No tree is deeper, so no later stage can exhaust the stack."""
 
-_OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(8)
+_OTHER, _LOOP, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(9)
 
 
-def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
-    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes."""
+_REACH: Final = 240
+"""Tokens past a mistake that recovery may look at, with room."""
+
+
+def scan_around(source: SourceFile, report: Report, known: Sequence[tree.Kept]) -> Tokens:
+    """Tokens of a text in which known statements are one each, but for those that recovery may look at."""
+    tokens, bad, stop = Tokens(source), tables().kind("BAD_STATEMENT"), len(source.text)
+    places = [(stmt.span.start, stmt.span.end) for stmt in known]
+    gaps = zip([0, *(end for _, end in places)], [*(start for start, _ in places), stop], strict=True)
+    touched = [blank().fullmatch(source.text, *gap) is None for gap in gaps]
+    begin, seen = 0, _REACH  # tokens since something that is not known
+    for at, (start, end) in enumerate(places):
+        count, seen = len(tokens.kinds), 0 if touched[at] else seen
+        if seen >= _REACH and not touched[at + 1]:
+            scan_part(tokens, report, begin, start)
+            tokens.append(bad, start, end)
+        elif seen < _REACH:
+            scan_part(tokens, report, begin, end)
+            seen += len(tokens.kinds) - count
+        else:
+            continue
+        begin = end
+    scan_part(tokens, report, begin, stop)
+    tokens.append(END, stop, stop)
+    return tokens
+
+
+def parse(source: SourceFile, diagnostics: Diagnostics, known: Sequence[tree.Kept] = ()) -> tree.File:
+    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes.
+
+    Args:
+        known: sound statements at top level that an edit left as they were, in order; most stand in the tree.
+    """
     report = Report(source)
-    tokens = scan(source, report)
+    tokens = scan_around(source, report, known) if known else scan(source, report)
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
-    if depths[-1] or min(depths) < 0:  # some brace has no counterpart
+    odd = depths[-1] or min(depths) < 0  # some brace has no counterpart
+    if known and (odd or tokens.cut):
+        return parse(source, diagnostics)
+    if odd:
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.language.recovery import balance
 
@@ -322,7 +361,10 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
         unfinished = values
         return recovery.resume(states, values, at)
 
-    file: tree.File | None = run(tokens.kinds, Builder(tokens, report).callbacks(), mend)
+    builder = Builder(tokens, report, {stmt.span.start: stmt for stmt in known})
+    file: tree.File | None = run(tokens.kinds, builder.callbacks(), mend)
+    if known and (file is None or any(d.code in ("E0120", "E0121") for d in report.found)):
+        return parse(source, diagnostics)
     report.flush(diagnostics)
     if file is not None:
         return file
@@ -342,14 +384,15 @@ def _classes() -> tuple[int, ...]:
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
-    classes |= {"{": _BRACE, "}": _END_BRACE}
+    classes |= {"{": _BRACE, "}": _END_BRACE, "for": _LOOP, "if": _LOOP}
     return tuple(classes.get(name, _OTHER) for name in tables().kinds)
 
 
 def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up.
 
-    Open brackets and braces, operators between them and the arms of an `else if` chain make a tree deeper.
+    Open brackets and braces, operators between them, loops in vectors and the arms of an `else if` chain make
+    a tree deeper.
     """
     kinds = tokens.kinds
     classes = _classes()
@@ -360,7 +403,7 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
     blocks: list[tuple[int, int, int, list[int]]] = []  # the state outside each open block
     for at, kind in enumerate(kinds):
         c = classes[kind]
-        if c == _OTHER:
+        if c == _OTHER or (c == _LOOP and not brackets):  # a statement's block counts
             continue
         if c <= _BRACE:
             if depth == MAX_DEPTH:

@@ -61,6 +61,7 @@ from scenelang.language.nodes import Flip as Flip
 from scenelang.language.nodes import Grayscale as Grayscale
 from scenelang.language.nodes import Ground as Ground
 from scenelang.language.nodes import Group as Group
+from scenelang.language.nodes import Grow as Grow
 from scenelang.language.nodes import Hue as Hue
 from scenelang.language.nodes import Light as Light
 from scenelang.language.nodes import Link as Link
@@ -72,6 +73,8 @@ from scenelang.language.nodes import Rotate as Rotate
 from scenelang.language.nodes import Scale as Scale
 from scenelang.language.nodes import SceneNode as SceneNode
 from scenelang.language.nodes import Shear as Shear
+from scenelang.language.nodes import Shell as Shell
+from scenelang.language.nodes import Stop as Stop
 from scenelang.language.nodes import Transform as Transform
 from scenelang.language.nodes import Translate as Translate
 from scenelang.language.nodes import Twirl as Twirl

@@ -116,6 +116,8 @@ def transform(t: Transform | MaterialOp) -> str:
             given = f"[{', '.join(map(vector, t.rows))}]"
         case "color":
             given = rgb(t.rgb)
+        case "stop":
+            given = f"{number(t.offset)}, {rgb(t.rgb)}"
         case "hue":
             given = angle(t.angle)
         case _:

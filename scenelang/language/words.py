@@ -261,6 +261,22 @@ TRANSFORMS: Final = _BOTH | _table(
         ("how far", "f, radians per unit length"),
         "displace(${1:0.1}, ${2:8});",
     ),
+    _call(
+        "grow",
+        "r:growth",
+        "Takes r off the leaf's distance: its edge moves out, round about corners, or in; first in its "
+        "block, once.",
+        ("leaf units, −0.5 to 1",),
+        "grow(${1:0.1});",
+    ),
+    _call(
+        "shell",
+        "w:wall",
+        "Keeps a wall about the leaf's edge, half on either side: a 2D outline, a hollow body; first in its "
+        "block, once.",
+        ("how thick the wall is, leaf units, above 0, at most 1",),
+        "shell(${1:0.1});",
+    ),
 )
 PROPERTIES: Final = _table(
     _call(
@@ -292,6 +308,13 @@ OPERATIONS: Final = (
             "grayscale(${1:1});",
         ),
         _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+        _call(
+            "stop",
+            "offset c:colour",
+            "A stop of a gradient, which has 2 to 8 in order; of equal offsets the edge is hard.",
+            ("where it lies, 0 to 1", "`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`"),
+            "stop(${1:0}, ${2:#d33});",
+        ),
     )
 )
 """Operations in a material's block."""
@@ -329,6 +352,24 @@ FUNCTIONS: Final = _table(
     _call("rgb", "r g b", "A colour; components in 0..1."),
     _call("hsv", "h s v", "A colour by hue (turns or an angle), saturation and value."),
 )
+LETTERS: Final = _table(
+    _call(
+        "text",
+        "text:string size? align?:string",
+        "A line of letters of an imported font, a union, with its baseline on y = 0.",
+        ("a string", "the em in world units, 1 by default", '`"left"`, `"center"` or `"right"` of x = 0'),
+        'text("$1", size = ${2:0.5});',
+        head='text("Ag", size = 1, align = "left")',
+    ),
+    _call(
+        "width",
+        "text:string size?",
+        "The width of a line of letters of an imported font, in world units.",
+        ("a string", "the em in world units, 1 by default"),
+        head='width("Ag", size = 1)',
+    ),
+)
+"""What a font brings, behind the name of its import."""
 CONSTANTS: Final = _table(
     _word("PI", "3.14159…, a number; half a turn is `0.5turn`."),
     _word("TAU", "2π, a number."),
@@ -351,10 +392,17 @@ LEAVES: Final[dict[int, dict[str, str]]] = {
         "triangle": "Regular, circumradius 1, a vertex at +y.",
         "pentagon": "Regular, circumradius 1, a vertex at +y.",
         "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",
+        "disc": "Radius 1.",
+        "hexagon": "Regular, circumradius 1, a vertex at +y.",
     },
     3: {
         "sphere": "Radius 1.",
         "torus": "Radii 0.7 and 0.3, axis y.",
+        "box": "A cube with corners on the unit sphere: half a side is 1/√3, 0.577.",
+        "cylinder": "Axis y, radius and half-height 1/√2, 0.707.",
+        "cone": "Axis y, apex (0, 1, 0), base at y = -0.5 of radius √3/2, 0.866.",
+        "capsule": "All within 0.5 of the segment from (0, -0.5, 0) to (0, 0.5, 0).",
+        "octahedron": "Corners on the axes at 1: |x| + |y| + |z| ≤ 1.",
     },
 }
 """The geometries of the plane and of space."""
@@ -371,10 +419,20 @@ TEXTURES: Final = (
     *("noise", "plaid", "stripes", "terrazzo", "tiles", "waves", "wood", "zigzag"),
 )
 """Materials that are pictures, in the plane and in space."""
+GRADIENTS: Final = {
+    "linear": "A gradient between `stop`s, over x from −1 to 1.",
+    "radial": "A gradient between `stop`s, over the distance from the origin, 0 to 1.",
+}
+PAINTS: Final = dict.fromkeys(TEXTURES, "A texture, in flat and in solid scenes.") | GRADIENTS
+"""Materials whose colour differs from place to place, in the plane and in space."""
 GEOMETRIES: Final = LEAVES[2] | LEAVES[3]
 MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
 SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
+OWN_TRANSFORMS: Final = "grow", "shell", "displace"
+"""Transforms of a leaf's own distance, which stand first in its block, each at most once."""
+NEWER: Final = frozenset(("grow", "shell", "stop", *STAGE, *SAMPLING, *PROPERTIES))
+"""Words that head a statement unless a scene's own module has their name."""
 SCENES: Final = {2: "flat", 3: "solid"}
 """Names for scenes of a dimension."""
 
@@ -384,8 +442,6 @@ def dimension_of(name: str) -> int | None:
     return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
 
 
-NEWER: Final = frozenset((*STAGE, *SAMPLING, *PROPERTIES))
-"""Words that head a statement unless a scene's own module has the name."""
 LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS)) - NEWER
 """Words that head a statement; no module, material or geometry can have such a name."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Leaf, Look, Move
 from scenelang.compiler.lifting import SOLID_LAYOUT, lift_many
 from scenelang.compiler.spaces import SPACES, Camera, Ground, Light, Stage, decoded
-from scenelang.compiler.steps import IDENTITY, Affine, Displace, Step, Twist, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.solid import Body
 from scenelang.drawing.solid.passes import read_solid_frame
@@ -122,16 +123,16 @@ def test_normal_form_and_levels_keep_the_map() -> None:
 
 
 def test_the_longest_chain_fits() -> None:
-    """A displacement, two deformations, a map, two deformations and a map, whatever trades places."""
+    """What changes the leaf's distance, two deformations, a map, and both again, whatever trades places."""
     rng = random.Random(4)
     turns = Warp(0.3, (0.0, 0.0)), Warp(0.0, (0.4, 0.0)), Twist(0.5)
-    bulge = Displace(0.1, 4.0)
+    own = Shell(0.2), Displace(0.1, 4.0), Grow(0.3)
     for _ in range(80):
-        chain = [bulge, *rng.choices(turns, k=2), random_map(rng), *rng.choices(turns, k=2), random_map(rng)]
+        chain = [*own, *rng.choices(turns, k=2), random_map(rng), *rng.choices(turns, k=2), random_map(rng)]
         levels = split_levels(steps_of(normal(map(Move, chain), SOLID)), LIMITS, SOLID)
-        assert levels.bulge == bulge
+        assert levels.skin == Skin(0.3, 0.2, 3, 0.1, 4.0)
     with pytest.raises(LevelsError, match="stand first"):
-        split_levels([Affine(affine.scaling(2, 2, 2)), bulge], LIMITS, SOLID)
+        split_levels([Affine(affine.scaling(2, 2, 2)), own[0]], LIMITS, SOLID)
 
 
 def random_map(rng: random.Random) -> Affine:
@@ -154,8 +155,8 @@ def test_boxes_and_balls_hold_leaves(geometry: str, level: float) -> None:
     hits = 0
     for _ in range(50):
         chain = [random_step(rng) for _ in range(rng.randrange(6))]
-        if rng.random() < 0.5:
-            chain.insert(0, Displace(rng.uniform(-0.3, 0.3), 4.0))
+        own = [Displace(rng.uniform(-0.3, 0.3), 4.0), Grow(rng.uniform(-0.2, 1)), Shell(rng.uniform(0.1, 1))]
+        chain = rng.sample(own, rng.randrange(3)) + chain
         moves = normal(map(Move, chain), SOLID)
         leaf = Leaf(geometry, Look("diffuse"), moves)
         xmin, ymin, xmax, ymax, zmin, zmax = SOLID.box(geometry, leaf.steps, level)
@@ -249,18 +250,50 @@ def test_bounds_hold_the_leaf(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SOLID_OF_GEOMETRIES)
-def test_gradients_and_surfaces_are_those_of_the_distance(name: str) -> None:
+def test_gradients_are_those_of_the_distance(name: str) -> None:
     row = GEOMETRIES[name]
     assert row.slopes is not None
-    assert row.surface is not None
-    assert abs(row.distance(row.surface(RNG.random((2, 1000))))).max() < 1e-12
     p, step = RNG.uniform(-1, 1, (3, 1000)), 1e-6
     d, *slopes = row.slopes(p)
     np.testing.assert_allclose(d, row.distance(p))
     for axis, slope in enumerate(slopes):
         move = step * np.eye(3)[:, axis, None]
-        np.testing.assert_allclose(
-            slope, (row.distance(p + move) - row.distance(p - move)) / (2 * step), atol=1e-3
-        )
+        change = (row.distance(p + move) - row.distance(p - move)) / (2 * step)
+        assert (abs(slope - change) < 1e-3).mean() > 0.999  # the others lie at a crease
     assert row.distance([0.1, 0.2, 0.3]) == pytest.approx(row.distance(np.array([[0.1], [0.2], [0.3]]))[0])
     assert row.thickness <= 2 * min(row.half) + 1e-12
+
+
+LEVELS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    "disc": lambda x, y, z: np.hypot(x, y) - 1,
+    "hexagon": lambda x, y, z: np.maximum(abs(x), abs(x) / 2 + abs(y) * 3**0.5 / 2) - 3**0.5 / 2,
+    "box": lambda x, y, z: np.maximum(np.maximum(abs(x), abs(y)), abs(z)) - 3**-0.5,
+    "cylinder": lambda x, y, z: np.maximum(np.hypot(x, z), abs(y)) - 2**-0.5,
+    "cone": lambda x, y, z: np.maximum(np.hypot(x, z) - (1 - y) * 3**-0.5, -0.5 - y),
+    "capsule": lambda x, y, z: np.sqrt(x * x + (y - y.clip(-0.5, 0.5)) ** 2 + z * z) - 0.5,
+    "octahedron": lambda x, y, z: abs(x) + abs(y) + abs(z) - 1,
+}
+"""Something that is below 0 in a leaf, and 0 on its outline, as the language defines it."""
+
+
+@pytest.mark.parametrize("name", LEVELS)
+def test_distances_are_to_the_shape_that_the_language_defines(name: str) -> None:
+    """A point as far as the distance says is on the outline, and no nearer one can be, as the distances of
+    two points differ by no more than these are apart.
+    """
+    row, d = GEOMETRIES[name], 2 if name in FLAT else 3
+    p, q = RNG.uniform(-2, 2, (2, d, 20_000))
+    if d == 3:
+        assert row.slopes is not None
+        distance, *gradient = map(np.asarray, row.slopes(p))
+    else:
+        step, distance = 1e-6, row.distance(p)
+        moves = step * np.eye(2)[:, :, None]
+        gradient = [(row.distance(p + move) - row.distance(p - move)) / (2 * step) for move in moves]
+    inside = LEVELS[name](*p, *[0 * p[0]] * (3 - d)) < 0
+    assert ((distance < 0) == inside).all()
+    feet = p - distance * np.array(gradient)
+    off = abs(LEVELS[name](*feet, *[0 * p[0]] * (3 - d)))
+    assert np.percentile(off, 99.9) < 1e-8  # the others lie between two nearest points
+    np.testing.assert_allclose(distance, row.distance(p), atol=1e-12)
+    assert (abs(distance - row.distance(q)) <= np.linalg.norm(p - q, axis=0) + 1e-12).all()

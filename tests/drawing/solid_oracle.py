@@ -59,7 +59,7 @@ def smallest_singular_value(m: list[list[float]]) -> float:
 
 def leaf_distance(leaf: Any, steps: list[Any]) -> Callable[[V], float]:
     """World distance to a leaf by point."""
-    bulge, total = (0.0, 0.0), [[float(i == j) for j in range(3)] for i in range(3)]
+    own, total = [], [[float(i == j) for j in range(3)] for i in range(3)]
     back: list[Any] = []
     for step in steps:
         kind = type(step).__name__
@@ -69,8 +69,8 @@ def leaf_distance(leaf: Any, steps: list[Any]) -> Callable[[V], float]:
             shift = undone(r, (0.0, 0.0, 0.0))
             columns = [plus(undone(r, tuple(float(i == j) for i in range(3))), shift, -1.0) for j in range(3)]
             back.insert(0, (kind, *columns, shift))
-        elif kind == "Displace":
-            bulge = step.amount, step.frequency
+        elif kind in ("Displace", "Grow", "Shell"):
+            own.append(step)
         else:
             back.insert(0, (kind, step))
     scale, ball = smallest_singular_value(total), leaf.geometry == "sphere"
@@ -93,7 +93,15 @@ def leaf_distance(leaf: Any, steps: list[Any]) -> Callable[[V], float]:
             d = sqrt(x * x + y * y + z * z) - 1.0
         else:
             d = sqrt((sqrt(x * x + z * z) - 0.7) ** 2 + y * y) - 0.3
-        return scale * (d + bulge[0] * sin(bulge[1] * x) * sin(bulge[1] * y) * sin(bulge[1] * z))
+        for step in own:
+            if hasattr(step, "r"):
+                d -= step.r
+            elif hasattr(step, "w"):
+                d = max(d, -d) - 0.5 * step.w
+            else:
+                f = step.frequency
+                d += step.amount * sin(f * x) * sin(f * y) * sin(f * z)
+        return scale * d
 
     return distance
 

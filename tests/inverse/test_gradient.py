@@ -23,6 +23,9 @@ SCENES = {
     "booleans": "background(none); param x = 0.1 in -1..1; param y = 0.1 in -1..1; param s = 0.3 in 0.1..0.6;"
     "chain { square { scale(0.8); translate(y, 0); material flat { color(#228833); } }"
     "subtract star { scale(s); translate(x, 0.3); } intersect pentagon { scale(0.8); translate(x, y); } }",
+    "skins": "background(none); param r = 0.2 in -0.4..1; param w = 0.3 in 0.1..0.9; param x = 0.3 in 0..1;"
+    "triangle { grow(r); shell(w); scale(0.3, 0.4); translate(x, 0.1); material flat { color(#aa3322); } }"
+    "star { shell(w); grow(r); scale(0.3); translate(-0.4, x); material flat { color(#2288dd); } }",
     "blends": "background(none); param x = 0.5 in 0..1; param k = 0.2 in 0.05..0.4; param r = 0.3 in 0..1;"
     "smooth(k = k) { star { scale(0.4); translate(-0.2, 0); material flat { color([r, 0.2, 0.1]); } }"
     "square { scale(0.3); translate(x, 0); material flat { color(#2288dd); } } }",

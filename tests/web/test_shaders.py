@@ -185,6 +185,27 @@ def test_pictures_of_examples_are_the_networks(page: Any) -> None:
     assert not {name: (db, least) for name, (db, least) in found.items() if db < least}
 
 
+GRADED = """
+    nsg 1; canvas(96, 64); background(none);
+    chain {
+      square { scale(1.1, 0.6);
+        material linear { stop(0.1, #f00); stop(0.4, #0f0); stop(1, #00f); rotate(40deg); } }
+      smooth star { scale(0.7);
+        material radial { stop(0, #ff0); stop(0.3, #f0f); stop(0.3, #000); hue(80deg); } }
+      subtract pentagon { scale(0.2); translate(0.4, 0.2); }
+      triangle { scale(0.5); bend(0.5); translate(-0.6, 0.2); material bricks { scale(0.5); } }
+    }
+"""
+
+
+@pytest.mark.browser
+def test_gradients_are_the_networks(page: Any) -> None:
+    program = nsg.compile(nsg.loads(GRADED))
+    assert compared(page, program) > LEAST_DB[2]
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (500, 2)).astype(np.float32)
+    np.testing.assert_allclose(answered(page, program, points), asked(program, points), atol=2e-3)
+
+
 @pytest.mark.browser
 def test_random_pictures_are_the_networks(page: Any) -> None:
     """Elements, textures, blends of any width and warps, through the lists of tiles."""
@@ -277,6 +298,14 @@ CORNERS = {
             subtract sphere { scale(0.7, 0.8, 1.05); translate(0.8, 0.3, -0.6); }
         }
         """,
+    "gradients": """
+        import "zoo.safetensors" as zoo; canvas(64, 48); background(none);
+        torus { rotate(60deg, axis = X); scale(0.8); translate(-0.6, 0.2, 0);
+            material radial { stop(0, #ff0); stop(0.5, #f00); stop(0.5, #00f); stop(1, #fff); hue(36deg); } }
+        sphere { scale(0.6); translate(0.8, -0.2, 0.6);
+            material volumetric linear { stop(0.2, #f22); stop(0.7, #22f); rotate(60deg); scale(0.6); } }
+        sphere { scale(0.4); translate(0, -0.6, 1); material diffuse zoo.bark; }
+        """,
     "inside": """
         canvas(48, 48); camera(eye = [0.1, 0.2, 0.6], target = [0, 0, -1], fov = 70deg);
         light(position = [0.3, 0.5, 0.2], power = 2);
@@ -298,6 +327,15 @@ CORNERS = {
             smooth(0.3) sphere { scale(0.5); translate(0.7, 0.3, 0); }
             subtract torus { twirl(1.3); scale(0.7); translate(0.1, 0.2, 0.5); }
             intersect sphere { scale(1.1); translate(0.1, 0, 0); }
+        }
+        """,
+    "skins": """
+        canvas(64, 48);
+        chain {
+            sphere { shell(0.3); displace(0.05, 7); scale(0.7); translate(-0.7, 0, 0); }
+            subtract sphere { grow(-0.2); scale(0.8); translate(-0.7, 0.5, 0.5); }
+            torus { displace(0.04, 8); shell(0.2); grow(0.05); twist(0.5); scale(0.5); translate(0.7, 0.1, 0);
+                material volumetric { color(#8af); } }
         }
         """,
 }

@@ -17,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
-from scenelang.compiler.steps import Affine, Step, Warp
+from scenelang.compiler.steps import Affine, Grow, Own, Shell, Step, Warp
 from scenelang.drawing.image import decoded
 from scenelang.language.words import BLEND, TOKENS
 
@@ -45,6 +46,8 @@ def sample_points(
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
     """Colours (M, 3) of a look with an element at its own coordinates (d, M), linear if ``light``."""
     assert look.element is not None
+    if isinstance(look.element, Gradient):  # whose stops are in the space that colours are averaged in
+        return _stepped(_graded(look.element, *q), look.colours)
     values = _values(look.element, light)
     if values.ndim == 4:
         places = [(np.clip(x, -1, 1) + 1) / 2 * (len(values) - 1) for x in q]
@@ -52,6 +55,22 @@ def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
         (u, v), (high, wide) = q, values.shape[:2]
         places = [(1 - v) / 2 * high - 0.5, (u + 1) / 2 * wide - 0.5]
     return _stepped(_mixed(values, places), look.colours)
+
+
+def along(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Offsets (M,) of points (u, v) on a gradient."""
+    return np.asarray((u + 1) / 2 if gradient.name == "linear" else np.hypot(u, v))
+
+
+def _graded(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Colours (M, 3) of a gradient at points (u, v), before operations."""
+    offsets, colours = np.split(np.array(gradient.stops, np.float64), [1], 1)
+    s = along(gradient, u, v)
+    after = np.searchsorted(offsets[:, 0], s, "right")  # of equal offsets the last has been passed
+    a, b = np.maximum(after - 1, 0), np.minimum(after, len(offsets) - 1)
+    gap = (offsets[b] - offsets[a])[:, 0]
+    share = np.where(gap > 0, (s - offsets[a, 0]) / np.where(gap > 0, gap, 1), 0.0)[:, None]
+    return np.asarray(colours[a] * (1 - share) + colours[b] * share)
 
 
 @lru_cache(maxsize=16)
@@ -111,6 +130,20 @@ def leaf_distance(geometry: str, p: Array, brought: Brought | None = None) -> Ar
     if brought and geometry in brought:
         return brought[geometry].distances(np.transpose(p))
     return GEOMETRIES[geometry].distance(p)
+
+
+def worn(steps: Sequence[Step], d: Array, p: Array) -> Array:
+    """A leaf's own distances (M,) at its own points (d, M), behind those of its steps that change them."""
+    for step in steps:
+        if not isinstance(step, Own):
+            break
+        if isinstance(step, Grow):
+            d = d - step.r
+        elif isinstance(step, Shell):
+            d = abs(d) - step.w / 2
+        else:
+            d = d + step.amount * reduce(mul, [np.sin(step.frequency * x) for x in p])
+    return d
 
 
 def fold(
@@ -223,7 +256,7 @@ def evaluate(
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         q = carry_back(steps, p)
-        d = leaf_distance(node.geometry, q, brought) * distance_scale(steps, len(p))
+        d = worn(steps, leaf_distance(node.geometry, q, brought), q) * distance_scale(steps, len(p))
         look = node.look
         if owners:
             c = np.asarray((node.number, look.opacity, look.opacity), np.float64)
@@ -317,7 +350,8 @@ def within(
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         q, spread = _carried(steps, centre, radius)
-        low = float(leaf_distance(node.geometry, q, brought)[0] - spread) * distance_scale(steps)
+        d = worn(steps, leaf_distance(node.geometry, q, brought), q)
+        low = float(d[0] - spread) * distance_scale(steps)
         return (-inf if isnan(low) else low), node
     last = max((index for index, link in enumerate(node.links) if link.width), default=-1)
     low = inf

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Stage
-from scenelang.compiler.steps import Affine, Displace, Step, Twist, Warp
+from scenelang.compiler.steps import Affine, Displace, Own, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.exact.field import (
     Array,
     Brought,
@@ -30,6 +30,7 @@ from scenelang.drawing.exact.field import (
     leaf_distance,
     placed_leaves,
     sample_points,
+    worn,
 )
 from scenelang.drawing.image import Image, from_light
 from scenelang.language.words import TOKENS
@@ -120,7 +121,7 @@ def way_back(steps: Sequence[Step]) -> Any:
     for step in reversed(steps):
         if isinstance(step, Affine):
             pending = pending @ np.vstack([np.reshape(step.rows, (3, 4)), (0, 0, 0, 1)])
-        elif not isinstance(step, Displace):
+        elif not isinstance(step, Own):
             if not back or (pending != np.eye(4)).any():
                 back.append(affine())
                 pending = np.eye(4)
@@ -138,16 +139,15 @@ class Body:
         self.geometry, self.brought = leaf.geometry, brought or {}
         self.look, self.rgb = leaf.look, np.reshape(leaf.look.colour(), (3, 1))
         self.medium = leaf.look.material == "volumetric"
-        first = steps[0] if steps else None
-        self.displace = first if isinstance(first, Displace) and not first.idle else None
+        self.own = [step for step in steps if isinstance(step, Own) and not step.idle]
         self.first, *self.back = way_back(steps)
         self.scale = distance_scale(steps, 3)
         self.rate, self.deep = self.scale, self.scale  # deep: no point is further inside
         radius = 1.0 + margin / self.scale
-        if self.displace:
-            self.rate *= 1.0 + abs(self.displace.amount * self.displace.frequency)
-            self.deep *= 1.0 + abs(self.displace.amount)
-            radius += abs(self.displace.amount)
+        skin = Skin.of(self.own)
+        self.rate *= 1.0 + abs(skin.amount * skin.frequency)
+        self.deep += self.scale * max(skin.reach, 0.0)
+        radius += skin.reach
         # How far around a point the rate that `distance` tells holds: without turns anywhere.
         self.reach = _REACH * self.scale if self.back else np.inf
         centre = np.zeros((3, 1))
@@ -174,10 +174,7 @@ class Body:
         for step in self.back:
             stretch = step.stretch(length(p) + far)
             rate, far, p = rate * stretch, far * stretch, step(p)
-        d = leaf_distance(self.geometry, p, self.brought)
-        if self.displace:
-            x, y, z = np.sin(self.displace.frequency * p)
-            d = d + self.displace.amount * x * y * z
+        d = worn(self.own, leaf_distance(self.geometry, p, self.brought), p)
         return d * self.scale, rate
 
     def colour(self, p: Array) -> Array:
@@ -202,10 +199,14 @@ class Body:
             slopes = GEOMETRIES[self.geometry].slopes
             assert slopes is not None
             g = np.stack(slopes(q)[1:])
-        if self.displace:
-            f = self.displace.frequency
-            (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)
-            g = g + self.displace.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
+        for at, step in enumerate(self.own):
+            if isinstance(step, Shell):
+                d = worn(self.own[:at], leaf_distance(self.geometry, q, self.brought), q)
+                g = np.where(d < 0.0, -g, g)
+            elif isinstance(step, Displace):
+                f = step.frequency
+                (sx, sy, sz), (cx, cy, cz) = np.sin(f * q), np.cos(f * q)
+                g = g + step.amount * f * np.stack([cx * sy * sz, sx * cy * sz, sx * sy * cz])
         for step, at in zip(reversed(back), reversed(points[:-1]), strict=True):
             g = step.pull(at, g)
         return g * self.scale

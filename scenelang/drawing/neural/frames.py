@@ -7,12 +7,12 @@ learned. Points are one array (d, M).
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.compiler.lifting import PLANE_LAYOUT, STRENGTHS, Layout
+from scenelang.compiler.lifting import PLANE_LAYOUT, STRENGTHS, Layout, Parts
 from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
 
@@ -191,6 +191,49 @@ def _inverse(frame: Floats) -> tuple[Floats, ...]:
     if not (np.max([abs(a), abs(b), abs(c), abs(d)], 0) < MOST).all():  # before squares of it overflow
         raise ProgramError("a damaged program: a frame beyond float32")
     return a, b, c, d, -(a * x + b * y), -(c * x + d * y)
+
+
+class Skins(NamedTuple):
+    """What objects make of their leaves' distances d: ``|d - first| - wall - last``, or ``d - first`` where
+    ``wall``, half of a shell, is 0. A displacement is added behind the first, or at the end where ``late`` is
+    1. All are in leaf units, float32 (N,) or numbers of one object.
+    """
+
+    first: Number
+    wall: Number
+    last: Number
+    late: Number
+
+    @property
+    def reach(self) -> Number:
+        """How much farther out objects reach (N,), below 0 where they shrink."""
+        return self.first + self.wall + self.last
+
+    def at(self, objects: Any) -> Skins:
+        """Those of some objects (P,), or of one."""
+        return Skins(*(part[objects] for part in self))
+
+    def placed(self, xp: Arrays, like: Array) -> Skins:
+        """The same where an array lies."""
+        return Skins(*(xp.array(part, like) for part in self))
+
+    def put_on(self, xp: Arrays, d: Array) -> Array:
+        """Distances (…, N) of objects by those of their leaves (…, N), without displacements."""
+        d = d - self.first
+        return xp.select((d < 0.0) & (self.wall > 0.0), -d, d) - (self.wall + self.last)
+
+
+def read_skins(parts: Parts) -> Skins | None:
+    """The skins of vectors' parts, None where no object has one; raises `ProgramError` for a damaged one."""
+    grow, shell, order = (np.asarray(part, np.float32) for part in (parts.grow, parts.shell, parts.order))
+    if not (grow.any() or shell.any() or order.any()):
+        return None
+    known = (abs(grow - 0.25) <= 0.75) & (shell >= 0.0) & (shell <= 1.0) & np.isin(order, range(4))
+    if not known.all():
+        raise ProgramError("a damaged program: a leaf that grows, or a shell, beyond what there is")
+    behind = order.astype(int)
+    last = np.where(behind & 1, grow, 0.0).astype(np.float32)
+    return Skins(grow - last, shell / 2, last, (behind // 2).astype(np.float32))
 
 
 def way_back(xp: Arrays, steps: Iterable[Affine | Warp], p: Point) -> Point:

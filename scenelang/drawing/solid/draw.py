@@ -74,6 +74,8 @@ class Lighting:
     """A field under the light of its stage, drawn at a pace."""
 
     def __init__(self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL) -> None:
+        if field.edged:  # rays may clip these
+            pace = pace._replace(gap=pace.gap / 2)
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
@@ -437,7 +439,7 @@ def draw_solids(
     samples of a pixel. Raises `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas
-    lighting = Lighting(field, stage, MARCH_SETTINGS.get(samples, CAREFUL))
+    lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]

@@ -30,8 +30,10 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
 from scenelang.drawing.arrays import Array, Arrays, Smooth
-from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
+from scenelang.drawing.neural.frames import Skins, read_skins
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import (
     BEGIN,
     END,
@@ -198,6 +200,8 @@ class SolidField:
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         drawn = np.array([solid.draws for solid in self.solids], bool)
+        # whether leaves have edges, which lines inside make
+        self.edged = any(isinstance(decoder, Norms) and decoder.inner > 0 for decoder in self.decoders)
         self.draws = bool(drawn.all())  # whether all objects draw
         self.media = bool(kinds.any())  # whether some object is a medium
         self.mixed = self.media and not kinds.all()  # whether some are and some are not
@@ -226,6 +230,10 @@ class SolidField:
         self.turned = [(i, frame) for i, frame in enumerate(frames) if frame.steps]
         self.far = any(solid.radius > RADIUS for solid in self.solids)
         self.bumpy = any(frame.amount for frame in frames)
+        skins = read_skins(parts)
+        self.skins = None if skins is None else skins.placed(xp, network.codes)
+        # which objects (N,) have a skin
+        self.skinned = np.zeros(count, bool) if skins is None else np.any(skins[:3], axis=0)
         look = network.look(xp.array(parts.material.copy(), network.codes)).T
         colour = table(parts.rgb.T, 3) * look[:3]
         # colour and medium (R, N) of objects; where some have textures, a plain colour between these
@@ -256,7 +264,7 @@ class SolidField:
         """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
         xp, like = self.xp, self.network.codes
         worn = {
-            i: Texture(xp, paint, frames[i], like, light=True)
+            i: texture_of(xp, paint, frames[i], like, light=True)
             for i, paint in enumerate(paints)
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
@@ -272,6 +280,7 @@ class SolidField:
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
         """Build the decoders of distances, and each object's index among them."""
         xp, network = self.xp, self.network
+        grown = {brought[i] for i in np.flatnonzero(self.skinned)}
         keys = [
             code.tobytes() if element is None else element
             for code, element in zip(codes, brought, strict=True)
@@ -286,7 +295,11 @@ class SolidField:
         ]
         self.decoders: list[Smooth | GridShape] = [
             *map(network.decoder, learned),
-            *(grid_shape(key, xp, network.codes) for key in ordered if isinstance(key, Element)),
+            *(
+                grid_shape(key, xp, network.codes, key in grown)
+                for key in ordered
+                if isinstance(key, Element)
+            ),
         ]
         self.decoder = xp.array(np.array([number[key] for key in keys], np.float32), network.codes)
         boxes = [
@@ -297,18 +310,20 @@ class SolidField:
             box = boxes[number[key]]
             # a small box, where an affine map leads to the leaf
             if not ((box[1] - box[0]).min() > SMALL or solid.frame.steps or solid.wide):
-                sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * (solid.radius - 1)
+                sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * max(solid.radius - 1, 0.0)
                 low, high = (xp.array(side, network.codes) for side in sides.astype(np.float32))
                 self.solids[i] = replace(solid, box=(low, high))
-        plain = [
+        plain = ~self.skinned & [
             element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
             for element, s in zip(brought, self.solids, strict=True)
         ]
+        media = np.asarray(xp.to_numpy(self.looks))[-1] > 0.5
+        self.segments = [network.segment(code) for code in learned] if (plain & media).any() else []
+        known = np.array([bool(own) for own in self.segments] + [False] * len(ordered), bool)
+        asked = plain & media & known[np.array([number[key] for key in keys], np.intp)]
         # 1 where the network for whole segments may answer
-        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
-        self.answered = bool(self.asked.sum() > 0)
-        known = len(network.segment_w) and self.answered
-        self.segments = [network.segment(code) for code in learned] if known else []
+        self.asked = xp.array(asked.astype(np.float32), network.codes)
+        self.answered = bool(asked.any())
 
     def _alone(self) -> None:
         """Prepare the answers for points that meet one object alone, or meet it first."""
@@ -322,10 +337,10 @@ class SolidField:
         # whether the cell need not be asked for any object that draws
         self.open = bool(((self.first > 0) | (drawn == 0)).all())
         self.factor = self.first * self.scale  # world units for a leaf unit of objects that are met alone
-        self.special = [  # to which more than a map leads, or that are displaced
+        self.special = [  # to which more than a map leads, or that are not as their leaves
             i
             for i, s in enumerate(solids)
-            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount)
+            if s.draws and (s.radius > RADIUS or s.frame.steps or s.frame.amount or self.skinned[i])
         ]
         # groups of objects that are met alone: those of each decoder, and each special one; -1 for others
         self.groups = len(self.decoders) + len(self.special)
@@ -385,7 +400,10 @@ class SolidField:
         xp, bulge = self.xp, None
         if self.bumpy:
             bulge = xp.take(self.frequency, objects), xp.take(self.amount, objects)
-        d, g = self._leaf(q, partial(self._decoded, objects=objects), self.far, bulge, gradient)
+        skin = None
+        if self.skins is not None:
+            skin = Skins(*(xp.take(part, objects) for part in self.skins))
+        d, g = self._leaf(q, partial(self._decoded, objects=objects), self.far, bulge, skin, gradient)
         scale = xp.take(self.scale, objects)
         if not gradient:
             return d * scale, g
@@ -404,11 +422,18 @@ class SolidField:
                 frame, decoder = self.solids[i].frame, self.decoders[int(self.decoder[i])]
                 bulge = (frame.frequency, frame.amount) if frame.amount else None
                 q, far = frame.local(self.xp, at[:, a:b]), self.solids[i].radius > RADIUS
-                parts.append(self._leaf(q, partial(self._field, decoder=decoder), far, bulge, False)[0])
+                skin = None if self.skins is None else self.skins.at(i)
+                parts.append(self._leaf(q, partial(self._field, decoder=decoder), far, bulge, skin, False)[0])
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 0)
 
     def _leaf(
-        self, q: Array, field: Callable[..., Array], far: bool, bulge: tuple[Any, Any] | None, gradient: bool
+        self,
+        q: Array,
+        field: Callable[..., Array],
+        far: bool,
+        bulge: tuple[Any, Any] | None,
+        skin: Skins | None,
+        gradient: bool,
     ) -> tuple[Array, Array]:
         """Leaf distances (P,) by a field, which does not know what is ``far``; gradients (3, P) if asked."""
         xp, place = self.xp, q
@@ -423,14 +448,16 @@ class SolidField:
             if gradient:
                 n = q / length.clip(1e-9)
                 g = xp.select(length > RADIUS, rim * (g - (g * n).sum(0) * n) + n, g)
-        if bulge is not None:
-            f, amount = bulge
-            s = xp.sin(f * q)
-            d = d + amount * (s[0] * s[1] * s[2])
+        early: Any = 1.0
+        if skin is not None:
+            early = 1.0 - skin.late
+            if bulge is not None:
+                d, g = _displaced(xp, q, d, g, bulge, early)
             if gradient:
-                c = xp.cos(f * q)
-                more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
-                g = g + (amount * f) * more
+                g = xp.select((d - skin.first < 0.0) & (skin.wall > 0.0), -g, g)
+            d, early = skin.put_on(xp, d), skin.late
+        if bulge is not None:
+            d, g = _displaced(xp, q, d, g, bulge, early)
         return d, g
 
     def _decoded(self, q: Array, gradient: bool, objects: Array) -> Array:
@@ -621,6 +648,20 @@ class SolidField:
         objects = xp.whole(slots[OBJECT].clip(0))
         detail = xp.take(self.detail, objects.reshape(-1)).reshape(objects.shape)
         return (detail * (slots[OBJECT] >= 0) * (slots[BEGIN] < INF)).sum(0)
+
+
+def _displaced(
+    xp: Arrays, q: Array, d: Array, g: Array, bulge: tuple[Any, Any], share: Any
+) -> tuple[Array, Array]:
+    """Distances (P,), and gradients (3, P) or none, with so much of a displacement."""
+    f, amount = bulge[0], bulge[1] * share
+    s = xp.sin(f * q)
+    d = d + amount * (s[0] * s[1] * s[2])
+    if len(g):
+        c = xp.cos(f * q)
+        more = xp.stack([c[0] * s[1] * s[2], s[0] * c[1] * s[2], s[0] * s[1] * c[2]], 0)
+        g = g + (amount * f) * more
+    return d, g
 
 
 def _part(xp: Arrays, whole: Array, index: Array | None) -> Array:

@@ -16,7 +16,7 @@ from scenelang.compiler.groups import INTERSECT, SMOOTH, SUBTRACT, UNION, Floats
 from scenelang.compiler.lifting import SOLID_LAYOUT, Layout
 from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.frames import MOST
+from scenelang.drawing.neural.frames import MOST, read_skins
 from scenelang.drawing.solid.network import BLEND, SolidNetwork
 
 
@@ -197,6 +197,7 @@ def _turns(slots: np.ndarray) -> list[Turn]:
 INF = float("inf")
 SMALL = 1.7  # a side of a box that is worth the asking
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
+LOOSE = 0.03  # the same, per leaf unit, of one that grows
 OBJECT, WAY, BEGIN, END, RATE, SLOT = 0, slice(1, 4), 4, 5, 6, 7  # what a slot of a ray has, and how many
 
 
@@ -225,7 +226,10 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     xp, layout, like = network.xp, network.layout, network.codes
     solids: list[Solid] = []
     frames = [read_solid_frame(vector, layout) for vector in vectors]
-    deepest = max((frame.scale * (1 + abs(frame.amount)) for frame in frames), default=0.0)
+    skins = read_skins(layout.unpack(vectors))
+    grown = np.zeros(len(frames)) if skins is None else np.asarray(skins.reach, np.float64)
+    more = grown + [abs(frame.amount) for frame in frames]  # how much farther out than leaves they reach
+    deepest = float(np.max([frame.scale for frame in frames] * (1 + more.clip(0.0)), initial=0.0))
     matters = felt(groups, widths)
     # rows (1 + D, N) that may show something where it was empty: at all, and in their groups
     shows = np.isin(groups.tokens, (UNION, SMOOTH))
@@ -241,7 +245,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
         blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
         if deep[i]:
             blends += deepest
-        radius = 1 + SLACK + abs(frame.amount) + blends / frame.scale
+        radius = 1 + SLACK + float(more[i] + LOOSE * abs(grown[i])) + blends / frame.scale
         back = inverse_of(frame.outer.linear.astype(np.float64))
         centre, ball = (-back @ frame.outer.shift).astype(np.float32), frame.ball(radius)
         solids.append(

@@ -1,6 +1,7 @@
 // Where solids may be met: a ball around each row, and of directions from a point which balls lie there.
 
 import { IDENTITY, invertedMap, stretchesOf } from "./maps.js";
+import { skinReach } from "./ways.js";
 
 const SMALL_SIDE = 1.7; // of a leaf's box that is worth the asking
 const FREE_BOX = [[-1e30, -1e30, -1e30], [1e30, 1e30, 1e30]];
@@ -26,11 +27,13 @@ function stretched([kind, ...strengths], radius) {
  * @param {(row: object) => number[][]} boxOf - the box of a row's leaf
  */
 export function solidBalls(rows, joins, network, boxOf) {
-  const deepest = rows.reduce((most, row) => Math.max(most, row.scale * (1 + Math.abs(row.amount))), 0);
+  const more = (row) => Math.abs(row.amount) + skinReach(row); // how much farther out than its leaf it reaches
+  const deepest = rows.reduce((most, row) => Math.max(most, row.scale * (1 + Math.max(more(row), 0))), 0);
   return rows.map((row, i) => {
     const { widest, count, hidden } = joins[i].seen;
     const blends = widest * (1 + count / 4) + (hidden ? deepest : 0);
-    const radius = 1 + network.slack + Math.abs(row.amount) + blends / row.scale;
+    const loose = network.slack + network.loose * Math.abs(skinReach(row));
+    const radius = 1 + loose + more(row) + blends / row.scale;
     const mapped = row.steps.length > 0 && row.steps[0][0] === "map";
     const outer = mapped ? row.steps[0].slice(1) : IDENTITY, rest = row.steps.slice(mapped ? 1 : 0);
     let ball = radius, growth = 1 + Math.abs(row.amount * row.frequency);
@@ -43,7 +46,7 @@ export function solidBalls(rows, joins, network, boxOf) {
     }
     const back = invertedMap(outer), centre = [back[3], back[7], back[11]], extent = longest(back) * ball;
     const [low, high] = boxOf(row), slim = high.some((side, i) => side - low[i] <= SMALL_SIDE);
-    const wider = [low.map((v) => v - radius + 1), high.map((v) => v + radius - 1)];
+    const wider = [low.map((v) => v - Math.max(radius - 1, 0)), high.map((v) => v + Math.max(radius - 1, 0))];
     const box = slim && !rest.length ? wider : FREE_BOX;
     return { outer, rest, radius, ball, rate: row.scale * growth, centre, extent, box };
   });

@@ -1,6 +1,7 @@
 // Chains of steps from a leaf into the world, nearest the leaf first, and their normal form: deformations as
 // near to the leaf, and as few steps, as may be. A step is {rows} of a map, {twirl, x, y} of a turn about z
-// by twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, {amount, frequency} of a displacement.
+// by twirl |p| + x p.x + y p.y, {twist} of one about y by twist p.y, {amount, frequency} of a displacement, {grow} and
+// {shell} of these.
 
 import { refuse } from "./values.js";
 import { IDENTITY, composedMap, idleMap, invertedMap, mild, stretchesOf, usableMap } from "./maps.js";
@@ -12,6 +13,7 @@ const isTurn = (step) => isWarp(step) || step.twist !== undefined;
 function idleStep(step) {
   if (step.rows) return idleMap(step.rows);
   if (isWarp(step)) return step.twirl === 0 && step.x === 0 && step.y === 0;
+  if (step.grow !== undefined || step.shell !== undefined) return (step.grow ?? step.shell) === 0;
   return step.twist === undefined ? step.amount === 0 || step.frequency === 0 : step.twist === 0;
 }
 
@@ -109,6 +111,19 @@ export function normalChain(steps, dimension) {
 function mapOfChain(steps) {
   const maps = steps.filter((step) => step.rows);
   return maps.length === 0 ? IDENTITY : maps.reduce((inner, step) => composedMap(step.rows, inner), IDENTITY);
+}
+
+/** Whether a step changes the leaf's own distance. */
+export const isOwn = (step) => ["amount", "grow", "shell"].some((name) => step[name] !== undefined);
+
+/** What a chain makes of its leaf's distance d: [first, wall, last, late], as `Skins` in frames.py has them. */
+export function skinOfChain(steps) {
+  const shell = steps.findIndex((step) => step.shell !== undefined);
+  const grow = steps.findIndex((step) => step.grow !== undefined);
+  const bump = steps.findIndex((step) => step.amount !== undefined);
+  const r = grow < 0 ? 0 : steps[grow].grow, behind = shell >= 0 && grow > shell;
+  const wall = shell < 0 ? 0 : steps[shell].shell / 2;
+  return [behind ? 0 : r, wall, behind ? r : 0, Number(shell >= 0 && bump > shell)];
 }
 
 /** How many places of a model's vector a run of turns takes. */

@@ -55,7 +55,9 @@ function leafAt(row, distanceOf, eye) {
   if (distanceOf === undefined) return NOTHING_THERE;
   const [x, y, z] = carriedBack(row.steps, eye), f = row.frequency;
   const bump = row.amount * Math.sin(f * x) * Math.sin(f * y) * Math.sin(f * z);
-  return [(distanceOf(x, y, z) + bump) * row.scale, row];
+  const [first, wall, last, late] = row.skin ?? [0, 0, 0, 0];
+  const depth = distanceOf(x, y, z) + (1 - late) * bump - first;
+  return [((wall > 0 ? Math.abs(depth) - wall : depth) - last + late * bump) * row.scale, row];
 }
 
 /** Throws NotLive where the eye is inside an opaque object; what has no formula counts as far away. */
@@ -68,7 +70,7 @@ export function checkEye({ rows, stage }, { geometries, media }) {
       open.push([here, operator, k]);
       [here, operator, k] = [NOTHING_THERE, 0, 0];
     }
-    here = foldedAt(here, operator, k, leafAt(row, DISTANCES[geometries[row.shape]], stage.eye));
+    here = foldedAt(here, operator, k, leafAt(row, DISTANCES[geometries[row.shape]], stage.camera.eye));
     for (let ends = row.token >> ENDS; ends > 0; ends -= 1) {
       const [outer, joint, width] = open.pop();
       here = foldedAt(outer, joint, width, here);

@@ -6,9 +6,10 @@
 
 import { Wearing, refuse } from "./values.js";
 import { flatMap, invertedMap, usableMap } from "./maps.js";
-import { checkChain, mergedChain, normalChain, scaleOfChain } from "./chain.js";
+import { checkChain, isOwn, mergedChain, normalChain, scaleOfChain, skinOfChain } from "./chain.js";
 import { lookOf } from "./looks.js";
 import { BEGINS, ENDS } from "./groups.js";
+import { skinReach } from "./ways.js";
 
 export const MOST_OBJECTS = 20000;
 export const USUAL_BLEND = 0.15; // the width of a `smooth`, unless said
@@ -49,9 +50,14 @@ function lowered(node, outward, around, state) {
 
 /** The steps of a node's own transforms, maps as its space has them. */
 function ownSteps(node, { dimension }) {
+  const own = new Set();
   return node.steps.map((step, at) => {
-    const late = step.amount !== undefined && (at > 0 || node.links);
-    if (late) refuse("`displace` does not stand first in the block of an object");
+    if (isOwn(step)) {
+      const name = Object.keys(step)[0];
+      const late = own.has(name) || own.size < at || node.links;
+      if (late) refuse("`grow`, `shell` or `displace` does not stand first in the block of an object");
+      own.add(name);
+    }
     if (!step.rows) return step;
     const rows = dimension === 2 ? flatMap(step.rows) : step.rows;
     if (rows === null) refuse("a transform leaves the plane");
@@ -126,8 +132,10 @@ function putRows(links, depth, rows, first = null) {
 
 // ---------------------------------------------------------------- rows
 
-function rowData({ token, leaf, k }, { dimension }) {
+function rowData({ token, leaf, k }, { dimension, geometries }) {
   const { look, shape, number } = leaf;
+  const skin = skinOfChain(leaf.steps);
+  if (shape >= geometries.length && skinReach({ skin }) > 0) refuse("an element grows");
   const bump = leaf.steps.find((step) => step.amount !== undefined);
   const steps = wayBack(leaf.steps, dimension);
   if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps from the world to an object`);
@@ -142,8 +150,10 @@ function rowData({ token, leaf, k }, { dimension }) {
     paint: look.paint,
     place: look.place,
     paintSteps: look.paintSteps,
+    stops: look.stops,
     amount: bump?.amount ?? 0,
     frequency: bump?.frequency ?? 0,
+    skin,
     blend: k,
     object: number,
   };

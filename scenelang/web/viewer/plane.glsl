@@ -2,7 +2,7 @@
 // take 4 or 16 samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
 // decoders.
 
-uniform sampler2D rows; // of each object: four texels, its steps, the place and the steps of its picture; of groups
+uniform sampler2D rows; // of each object: some texels, its steps, the place and the steps of its picture; of groups
 uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one
 uniform sampler2D nodes; // distances of elements
 uniform sampler2D texels; // of pictures
@@ -37,6 +37,11 @@ const float FAR = 1e15; // leaf units: float32 holds its square
 const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change across the pixel
 const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
 const int BLENDS = 8, EVERYWHERE = 16, HIDES = 32; // flags of rows, over kinds of joins; as in plane.js
+#ifdef SKINS
+const int BODY = 5; // texels of a row before its steps, the last for its skin
+#else
+const int BODY = 4;
+#endif
 const int END = 1 << 24; // behind all texels
 
 /** The place of a pixel's middle, 0, or of its samples from 1 on, pixels from the middle. */
@@ -117,10 +122,24 @@ vec3 turned(vec3 rgb, float turns) {
   return value - chroma + chroma * clamp(shares, 0.0, 1.0);
 }
 
-/** The colour of a picture, which repeats, at leaf coordinates. */
-vec3 painted(vec2 q, int at) {
-  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
-  vec2 spot = fract(vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z)) * about.xy - 0.5;
+/** The colour of a gradient between stops at (u, v). */
+vec3 graded(vec2 spot, int at, int count, bool straight) {
+  float s = straight ? 0.5 * spot.x + 0.5 : length(spot);
+  vec4 before = texel(rows, at);
+  vec3 rgb = before.yzw;
+  for (int i = 1; i < count; i++) {
+    vec4 next = texel(rows, at + i);
+    float over = next.x - before.x;
+    rgb = mix(rgb, next.yzw, over > HARD ? clamp((s - before.x) / over, 0.0, 1.0) : step(next.x, s));
+    before = next;
+  }
+  SPEND(8 * count);
+  return rgb;
+}
+
+/** The colour of a picture, which repeats, at coordinates in it. */
+vec3 pictured(vec2 spot, vec4 about) {
+  spot = fract(spot) * about.xy - 0.5;
   ivec2 corner = ivec2(floor(spot)), sides = ivec2(about.xy);
   vec2 share = spot - vec2(corner);
   int first = int(about.z);
@@ -128,10 +147,19 @@ vec3 painted(vec2 q, int at) {
                    dot_of_picture(first, corner + ivec2(1, 0), sides), share.x);
   vec3 below = mix(dot_of_picture(first, corner + ivec2(0, 1), sides),
                    dot_of_picture(first, corner + ivec2(1, 1), sides), share.x);
-  vec3 rgb = mix(above, below, share.y);
   SPEND(20);
+  return mix(above, below, share.y);
+}
+
+/** The colour of a picture or a gradient at leaf coordinates. */
+vec3 painted(vec2 q, int at) {
+  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
+  vec2 spot = vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z);
+  bool picture = about.x > 0.0;
+  vec3 rgb = picture ? pictured(spot, about) : graded(spot, at + 3, int(about.y), about.x > -1.5);
+  at += picture ? 3 : 3 + int(about.y);
   for (int i = 0; i < int(about.w); i++) {
-    vec4 op = texel(rows, at + 3 + i);
+    vec4 op = texel(rows, at + i);
     if (op.x == COLOR) rgb *= op.yzw;
     else if (op.x == GRAYSCALE) rgb += op.y * (dot(LUMA, rgb) - rgb);
     else rgb = turned(rgb, op.y);
@@ -271,7 +299,7 @@ void meet(vec2 p, ivec2 span) {
       // no decoder where the leaf is proved so far away that nothing changes
       vec4 b = texel(rows, at + 1);
       room = gap;
-      vec2 q = local(p, at + 4, steps, room);
+      vec2 q = local(p, at + BODY, steps, room);
       room *= scale;
       float radius = length(q);
       float least = own.a * max(max(abs(q.x) - b.x, abs(q.y) - b.y), radius - b.z) - room;
@@ -291,6 +319,11 @@ void meet(vec2 p, ivec2 span) {
         distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
 #else
         distance = learned(int(c.x), q);
+#endif
+#ifdef SKINS
+        vec4 skin = texel(rows, at + 4);
+        distance -= skin.x;
+        distance = (skin.y > 0.0 ? abs(distance) - skin.y : distance) - skin.z;
 #endif
         distance *= scale;
       }
@@ -318,7 +351,7 @@ void meet(vec2 p, ivec2 span) {
       int count = middle ? most - 1 : 1;
       for (int k = 0; k < count; k++) {
         vec2 spot = middle ? p + px * place(k + 1) : p;
-        own.rgb += painted(local(spot, at + 4, steps, room), at + int(c.z)) / float(count);
+        own.rgb += painted(local(spot, at + BODY, steps, room), at + int(c.z)) / float(count);
       }
     }
 #endif

@@ -3,7 +3,7 @@
 import { floats, linked, target, triangle } from "./gl.js";
 import { distances } from "./grids.js";
 import { groupsOf, joinsOf } from "./groups.js";
-import { rateOf, reaches, steepest, tileLists } from "./ways.js";
+import { rateOf, reaches, skinReach, steepest, tileLists } from "./ways.js";
 
 const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
 const MOST_AT_ONCE = 2 ** 28; // pairs of an object and a pixel
@@ -71,7 +71,8 @@ function texelsOf([kind, a, b, u, c, d, v]) {
 }
 
 /** Numbers of all rows and behind them of groups, and the texel at which each row begins; see `rows` of plane.glsl. */
-function packed({ network, materials }, leaves, pictures, { rows }, joins, reach) {
+function packed({ network, materials }, leaves, pictures, { rows }, joins, reach, skinned) {
+  const head = skinned ? 5 : 4; // texels before a row's steps
   const [numbers, begins] = [[], []];
   const narrow = ({ blend }) => (blend > 0 ? network.blend / blend : 1);
   rows.forEach((row, i) => {
@@ -83,16 +84,24 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
     numbers.push(scale, narrow(joins[i]), flagsOf(joins[i], row), steps.length + (1 - row.opacity) / 2);
-    numbers.push(...bounds, Math.min(reach[i], 1e30));
-    numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : 4 + moves, 0);
+    const more = skinned ? skinReach(row) / Math.min(far, 1) : 0;
+    numbers.push(...bounds.map((bound) => bound + more), Math.min(reach[i], 1e30));
+    numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : head + moves, 0);
     numbers.push(...colour, Math.min(far, 1) * scale);
+    if (skinned) numbers.push(...(row.skin ?? [0, 0, 0, 0]));
     for (const step of steps) numbers.push(...texelsOf(step));
     if (paint < 0) return;
     const [a, b, u, c, d, v] = row.place; // to shares of the picture's sides, from its upper left corner
-    numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
-    numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
-    const picture = pictures[paint];
-    numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    if (row.stops) {
+      numbers.push(a, b, u, 0, c, d, v, 0);
+      numbers.push(pictures[paint].kind === "linear" ? -1 : -2, row.stops.length, 0, row.paintSteps.length);
+      numbers.push(...row.stops.flat());
+    } else {
+      numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
+      numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
+      const picture = pictures[paint];
+      numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    }
     for (const [name, ...amounts] of row.paintSteps) {
       numbers.push(network.paintSteps.indexOf(name), ...amounts, ...Array(3 - amounts.length).fill(0));
     }
@@ -116,6 +125,9 @@ function flagsOf(join, row) {
 const hides = ({ operator, around, seen }, { opacity }) => (
   operator === 0 && around === null && !seen.blends && opacity === 1
 );
+
+/** Radius of a disc within an object whose leaf has one of a radius, 0 where none is known. */
+const filled = (inner, { skin = [0, 0, 0] }) => (skin[1] > 0 || !inner ? 0 : Math.max(inner + skin[0] + skin[2], 0));
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
 function listed({ starts, objects }, begins) {
@@ -145,13 +157,14 @@ export function planeDrawer(gl, view) {
   const programs = new Map(); // by what they were compiled for
   const shapes = new Set(); // seen so far
   let depth = 0; // of groups, likewise
+  let skinned = false; // whether a leaf has had a skin
   let clear = false; // whether something was not opaque
   const textures = ["rows", "lists", "nodes", "texels", "points"];
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
   const grids = view.shapes.slice(network.decoders.length);
   const [nodes, ofGrid] = joined(grids.map(distances), Float32Array);
-  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels), Uint8Array);
+  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
     ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
     ...grids.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest, first: ofGrid[i] })),
@@ -168,11 +181,12 @@ export function planeDrawer(gl, view) {
 
   function compiled(program, joins, define) {
     for (const { shape } of program.rows) shapes.add(shape);
+    skinned ||= program.rows.some((row) => row.skin?.some(Boolean));
     depth = Math.max(depth, groupsOf(joins).depth);
     clear ||= program.rows.some(({ opacity }) => opacity < 1);
     const used = [...shapes].sort((a, b) => a - b);
-    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : []), ...(clear ? ["CLEAR"] : [])];
-    if (define) defines.push(define);
+    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : [])];
+    defines.push(...(skinned ? ["SKINS"] : []), ...(clear ? ["CLEAR"] : []), ...(define ? [define] : []));
     const key = [...defines, ...used].join();
     if (!programs.has(key)) {
       const found = linked(gl, fragmentText(view, used, defines));
@@ -190,8 +204,8 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const reach = reaches(program.rows, joins, network);
     const widest = program.rows.reduce((most, { blend }) => Math.max(most, blend), network.blend);
-    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? leaves[row.shape].inner : 0));
-    const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach);
+    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? filled(leaves[row.shape].inner, row) : 0));
+    const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach, skinned);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
       ? { starts: [0, begins.length], objects: [...begins.keys()], tile: height, across: 1, down: 1 }

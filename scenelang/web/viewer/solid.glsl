@@ -9,12 +9,12 @@ precision highp usampler3D;
 //network//
 
 // The field of solids. Of what a scene lacks nothing is compiled: SHAPE_i (a geometry), MEDIA, MIXED (with
-// solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, OTHERS (than objects that
-// draw), FAR (points from leaves). SLOTS: balls that a ray keeps; DEPTH: groups that are open at once.
+// solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, SKINS, OTHERS (than objects
+// that draw), FAR (points from leaves). SLOTS: balls that a ray keeps; DEPTH: groups that are open at once.
 
 const float NEVER = 1e30;
 const int SMOOTH = 1;
-const int ROW = 13; // numbers of a row, in fours, the first three its map
+const int ROW = 14; // numbers of a row, in fours, the first three its map
 const int HEAD = 3; // kind of join and flags, shape, scale, usual width of a blend in widths of its own
 const int MORE = 4; // amount and frequency of its displacement, where its steps begin, how many
 const int AROUND = 5; // centre and squared radius of a ball of the world around it
@@ -24,6 +24,7 @@ const int LOOK = 8; // colour, medium
 const int PAINT = 9; // kind of texture, where its colour steps begin, how many; its group
 const int PLACE = 10; // two: from the leaf to its picture; where that begins
 const int GRID = 12; // side and first slice of a grid, sides of a texture
+const int SKIN = 13; // how far it grows, half of its shell, how far behind that; whether displacements are behind it
 
 uniform int zero; // keeps compilers from unrolling
 uniform sampler2D table; // rows and steps
@@ -134,12 +135,18 @@ float leaf(int row, vec4 head, vec3 q) {
 #ifdef FAR
   d += max(r - RADIUS, 0.0);
 #endif
+  float bump = 0.0;
 #ifdef BUMPS
   vec4 more = part(row, MORE);
   vec3 s = sin(more.y * q);
-  d += more.x * s.x * s.y * s.z;
+  bump = more.x * s.x * s.y * s.z;
 #endif
-  return d;
+#ifdef SKINS
+  vec4 skin = part(row, SKIN);
+  d += (1.0 - skin.w) * bump - skin.x;
+  return (skin.y > 0.0 ? abs(d) - skin.y : d) - skin.z + skin.w * bump;
+#endif
+  return d + bump;
 }
 
 // The same and how it changes.
@@ -170,12 +177,26 @@ float leaf(int row, vec4 head, vec3 q, out vec3 g) {
     d += r - RADIUS;
   }
 #endif
+  float bump = 0.0;
+  vec3 slope = vec3(0.0);
 #ifdef BUMPS
   vec4 more = part(row, MORE);
   float f = more.y, amount = more.x;
   vec3 s = sin(f * q), c = cos(f * q);
-  d += amount * s.x * s.y * s.z;
-  g += amount * f * vec3(c.x * s.y * s.z, s.x * c.y * s.z, s.x * s.y * c.z);
+  bump = amount * s.x * s.y * s.z;
+  slope = amount * f * vec3(c.x * s.y * s.z, s.x * c.y * s.z, s.x * s.y * c.z);
 #endif
-  return d;
+#ifdef SKINS
+  vec4 skin = part(row, SKIN);
+  d += (1.0 - skin.w) * bump - skin.x;
+  g += (1.0 - skin.w) * slope;
+  if (skin.y > 0.0) {
+    g *= d < 0.0 ? -1.0 : 1.0;
+    d = abs(d) - skin.y;
+  }
+  g += skin.w * slope;
+  return d - skin.z + skin.w * bump;
+#endif
+  g += slope;
+  return d + bump;
 }

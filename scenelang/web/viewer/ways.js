@@ -74,9 +74,13 @@ function extent(way, x, y, radius) {
 /** Leaf units from each object's origin beyond which it makes no difference, Infinity where it always may. */
 export function reaches(rows, joins, { slack, farther, farthest }) {
   return Float64Array.from(joins, ({ always, seen: { hidden, total, widest } }, i) => (
-    always || hidden ? Infinity : 1 + slack + Math.min(farther * total, farthest * widest) / rows[i].scale
+    always || hidden ? Infinity
+      : 1 + slack + skinReach(rows[i]) + Math.min(farther * total, farthest * widest) / rows[i].scale
   ));
 }
+
+/** How much farther out than its leaf an object reaches, leaf units, but for a displacement. */
+export const skinReach = ({ skin = [0, 0, 0] }) => skin[0] + skin[1] + skin[2];
 
 /**
  * Which objects each tile of a frame meets, in stream order.
