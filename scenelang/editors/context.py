@@ -221,7 +221,7 @@ def find_symbol(docs: Workspace, document: Document, name: str, offset: int) -> 
     symbol = document.names_at(offset).scope_at(offset).find(alias)
     if rest and symbol is not None and isinstance(symbol.node, tree.Import):
         library = docs.imported(document, symbol.node.path.value)
-        symbol = library.names.top.symbols.get(rest) if library is not None else None
+        symbol = library.names.top.names.get(rest) if library is not None else None
         if symbol is None or not symbol.is_exported:
             return None
     return symbol if symbol is not None and symbol.kind in ("fn", "module") else None

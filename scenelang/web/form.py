@@ -27,6 +27,7 @@ from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
 from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
+from scenelang.language.scopes import find, head_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
 from scenelang.language.words import (
@@ -34,7 +35,6 @@ from scenelang.language.words import (
     FUNCTIONS,
     GRADIENTS,
     LANGUAGE,
-    NEWER,
     OPERATIONS,
     SETTINGS,
     SOLID_TRANSFORMS,
@@ -65,10 +65,7 @@ class Scope:
     def find(self, name: str) -> Bound | None:
         """The binding of a name, qualified or not."""
         alias, dot, rest = name.partition(".")
-        scope: Scope | None = self
-        while scope is not None and alias not in scope.names:
-            scope = scope.parent
-        result = None if scope is None else scope.names[alias]
+        result = find(self, alias)
         return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
@@ -103,9 +100,6 @@ def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[n
     for at, arg in enumerate(args or ()):
         bound[params[at] if arg.name is None else arg.name.text] = arg.value
     return [bound.get(name) for name in params]
-
-
-_VALUES: Final = ("let", "param", "argument", "loop")
 
 
 class Lacking(Exception):
@@ -390,19 +384,17 @@ class Writer:
     def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
-        worn = bound is not None and bound.kind in _VALUES and stmt.args is None
-        hidden = worn or (bound is not None and bound.kind == "module")
-        if name in SETTINGS and not hidden:
+        head = head_of(stmt, bound, kind)
+        if head == "setting":
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             word = (name,) if name == "animate" else ("set", name)
             return None if name == "canvas" else [*word, *args]
-        moves = name in LANGUAGE or (name in NEWER and name not in SETTINGS)
-        if moves and (kind == "material" or not hidden):
+        if head == "move":
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
-        if bound is None:
+        if bound is None or head == "leaf":
             if name not in self.manifest.geometries:
                 return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
             return ["object", self.manifest.geometries.index(name), body or []]
@@ -525,13 +517,13 @@ def form_of(
 @cache
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
-    usual, fields = Stage(), {}
+    usual, fields = stage_data(Stage()), {}
     for name, word in STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
-        columns = zip(getattr(usual, name).__match_args__, word.kinds, ranges, strict=True)
+        columns = zip(usual[name], word.kinds, ranges, strict=True)
         fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
-    return {"usual": stage_data(usual), "fields": fields}
+    return {"usual": usual, "fields": fields}
 
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:

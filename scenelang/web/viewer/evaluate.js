@@ -1,5 +1,5 @@
 // A scene's form, prepared once and run for any params and any frame. `scenelang/web/form.py` makes forms;
-// what a statement means is in `scenelang/evaluate/prepare`.
+// what a statement means is in `scenelang/language/statements.py`.
 
 import { Time, Angle, Vec, Wearing } from "./values.js";
 import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
@@ -202,7 +202,6 @@ function opacityFrom(share) {
 function samplesFrom([count] = [4]) {
   return [4, 16].includes(bare(count)) ? count : refuse(`${count} samples a pixel`);
 }
-};
 
 const STATEMENTS_OF_FORMS = {
   no: ([why]) => () => refuse(why),
