@@ -106,8 +106,8 @@ def test_completion_goes_by_the_block(client: Client, uri: str) -> None:
         ("group {\n  ", "square star ring lib translate let for", ""),
         ("\nsquare { ", "translate rotate twirl material", "square canvas color"),
         ("subtract ", "square ring group", "canvas"),
-        ("flat { ", "color hue grayscale flip", "twirl square"),
-        ("\nmod", "module canvas animate square", "translate"),
+        ("flat { ", "color hue grayscale flip opacity", "twirl square samples"),
+        ("\nmod", "module canvas animate samples square", "translate opacity"),
     ):
         found = set(labels(client, client.at(uri, before, len(before))))
         assert set(offered.split()) <= found, before
@@ -194,6 +194,10 @@ def test_hover_tells_words_models_and_the_stage_unless_a_module_hides_it(client:
         *[("smooth", 1, ["blend"]), ("k = 0.2", 0, ["width"])],
     ]
     says(client, uri, rows)
+    client.replace(uri, "samples(16);\nsquare { material flat { opacity(0.5); } }\n")
+    says(client, uri, [("samples", 1, ["4 or 16"]), ("opacity", 1, ["behind an object"])])
+    client.replace(uri, "module opacity(a) { square { scale(a); } }\nopacity(0.5);\n")
+    says(client, uri, [("opacity(0.5)", 1, ["module opacity(a)"])])
     client.replace(uri, "module light(power) { sphere; }\nlight(3);\n")
     says(client, uri, [("light(3)", 1, ["module light(power)"])])
 
