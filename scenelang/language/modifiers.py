@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
-from scenelang.language import advice, nodes, tree, words
+from scenelang.language import advice, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -486,7 +486,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
         advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
         wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
-    elif own is not None and own.kind in advice.VALUES:
+    elif own is not None and own.kind in scopes.VALUES:
         _is_value(name, place)
     elif own is not None:
         wrong_kind(name, own, place, "a material")
