@@ -70,6 +70,9 @@ if TYPE_CHECKING:
     from scenelang.output.animate import animate as animate
     from scenelang.output.animate import render_frames as render_frames
     from scenelang.output.frames import FramesError as FramesError
+    from scenelang.output.mesh import TriangleMesh as TriangleMesh
+    from scenelang.output.shapes import to_mesh as to_mesh
+    from scenelang.output.shapes import to_svg as to_svg
     from scenelang.output.sweep import render_many as render_many
     from scenelang.web.export import export as export
     from scenelang.web.notebook import set_notebook as set_notebook
@@ -97,6 +100,8 @@ _HOME: Final = {
     "scenelang.language.scene": "Elements load_elements Scene",
     "scenelang.output.animate": "animate render_frames",
     "scenelang.output.frames": "FramesError",
+    "scenelang.output.mesh": "TriangleMesh",
+    "scenelang.output.shapes": "to_mesh to_svg",
     "scenelang.output.sweep": "render_many",
     "scenelang.web.export": "export",
     "scenelang.web.notebook": "set_notebook",

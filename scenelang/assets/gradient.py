@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Any, ClassVar, Final
 
+from scenelang.assets.records import Record
+
+NAMES: Final = "linear", "radial"
 STOPS: Final = range(2, 9)  # how many a gradient may have
 HARD: Final = 1e-6  # of an offset: stops that are no farther apart are a hard edge
 
 Stops = tuple[tuple[float, float, float, float], ...]
 
 
-class Gradient(NamedTuple):
+class Gradient(Record):
     """A gradient over the (u, v) of textures.
 
     Args:
@@ -21,17 +25,17 @@ class Gradient(NamedTuple):
             offsets rise, and equal neighbours are a hard edge.
     """
 
-    name: str
-    stops: Stops
+    kind: ClassVar = "texture"  # a model that draws textures draws gradients
+    material: ClassVar = True
+    dimension: ClassVar = 2
 
-    kind = "texture"  # a model that draws textures draws gradients
-    material = True
-    dimension = 2
+    name: str
+    stops: Stops = ()
 
     @property
     def digest(self) -> str:
         """SHA-256, hex, of everything that determines its colours."""
-        return hashlib.sha256(repr(tuple(self)).encode()).hexdigest()
+        return hashlib.sha256(repr((self.name, self.stops)).encode()).hexdigest()
 
     @property
     def edges(self) -> tuple[float, ...]:
@@ -47,6 +51,15 @@ class Gradient(NamedTuple):
             if b[0] - a[0] > HARD
         ]
         return max(rates, default=0.0) / (2 if self.name == "linear" else 1)
+
+
+def material_fault(name: str, ops: Iterable[Any]) -> tuple[Any, str] | None:
+    """The stop that is wrong among the operations of a material, None where some lack, and why, if one is."""
+    stops = [op for op in ops if op.kind == "stop"]
+    if name not in NAMES:
+        return (stops[0], f"a stop in `{name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
 
 
 def stops_fault(offsets: list[float]) -> tuple[int, str] | None:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 STDIN: Final = "-"
 SCENE, PROGRAM, PAGE = ".nsg", ".safetensors", ".html"
+DRAWING: Final = ".svg"
+SHAPES: Final = (DRAWING, ".stl", ".glb", ".ply", ".obj")  # what holds outlines or a surface, no pixels
 
 
 def scenes_of(paths: Iterable[str]) -> tuple[list[str], bool]:

@@ -73,7 +73,7 @@ def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int3
             steps = [(kind, *_rounded(numbers)) for kind, *numbers in look.colours]
             element = look.element
             if isinstance(element, Gradient):
-                element = element._replace(stops=tuple(map(_rounded, element.stops)))
+                element = Gradient(element.name, tuple(map(_rounded, element.stops)))
             known[id(look)] = result.setdefault(Paint(element, tuple(steps)), len(result))
     return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
 

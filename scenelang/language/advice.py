@@ -165,6 +165,9 @@ def unknown_member(
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
+        element = exported.scope.names.get(rest.removesuffix("_size"))
+        if element is not None and element.kind == "element" and rest.endswith("_size"):
+            return f"its file does not say how large `{rest[:-5]}` was; learn it again", None
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
         shape = foreign.SHAPES.get(rest.lower()) if library.holds(exported.source) else None
         if help is None and shape is not None:
@@ -247,6 +250,8 @@ def report_problem(
     at = problem.operand
     operand = operands[at] if at is not None and at < len(operands) else None
     place = operand.span if operand else span
+    if problem.letter is not None and isinstance(operand, tree.String):
+        place = operand.character(problem.letter)
     if (place.source, place) in report.reported:
         return
     help, fix = problem.help, None

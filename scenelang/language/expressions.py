@@ -359,6 +359,8 @@ def value_of(name: tree.Name, binding: Binding, place: Place) -> Code:
     slots, slot, report, span = binding.slots, binding.slot, place.report, name.span
     if binding.needs is not None:
         place.session.needs.on.append(binding.needs)
+    if slots is None and binding.known:
+        return constant(binding.value)
     if binding.kind == "poison" or slots is None:
         return POISONED
     if slots is place.scope.slots:
@@ -397,6 +399,7 @@ def lookup(name: tree.Name, place: Place) -> Binding | None:
 def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, help: str | None = None) -> None:
     """Report a name that stands for something else than is wanted here."""
     kinds = {"fn": "a function", "module": "a module", "import": "an imported file", "element": "a geometry"}
+    kinds |= {"text": "a module", "width": "a function"}
     message = f"`{name.text}` is {kinds.get(binding.kind, 'a value')}, not {wanted}"
     key = "E0213", message, place.file.source, binding.span
     place.report.error_once(key, "E0213", message, name.span, help=help, labels=binding.labels())
@@ -405,7 +408,8 @@ def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, hel
 def _as_value(name: tree.Name, binding: Binding, place: Place) -> Code:
     if binding.kind in VALUES or binding.kind == "poison":
         return value_of(name, binding, place)
-    wrong_kind(name, binding, place, "a value", f"call it: {name.text}(…)" if binding.kind == "fn" else None)
+    called = binding.kind in ("fn", "width")
+    wrong_kind(name, binding, place, "a value", f"call it: {name.text}(…)" if called else None)
     return POISONED
 
 
@@ -543,6 +547,8 @@ def prepare_call(expr: tree.CallExpr, place: Place) -> Code:
         return _call_builtin(expr, given, place)
     if binding.kind == "poison":
         return POISONED
+    if binding.kind == "width":
+        return binding.value(expr, given, place) or POISONED
     if binding.kind != "fn":
         help = "a module makes objects and is called as a statement" if binding.kind == "module" else None
         wrong_kind(name, binding, place, "a function", help)

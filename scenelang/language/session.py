@@ -75,10 +75,16 @@ class Definition(Record, frozen=False):
     needs: Needs = field(default_factory=Needs)  # what its body depends on besides its arguments
 
 
+Brought = Literal["text", "width"]
+"""Kinds of bindings of what a font brings."""
+
+
 class Binding(Record, frozen=False):
     """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 
-    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
+    kind: Literal[
+        "let", "param", "argument", "loop", "fn", "module", "import", "element", "text", "width", "poison"
+    ]
     span: Span | None = None  # None for the language's own names
     slots: Slots | None = None  # what holds its slot
     slot: int = 0

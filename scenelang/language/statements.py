@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.element_file import ElementFile
-from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, scopes, tree, words
+from scenelang.language import (
+    advice,
+    blocks,
+    expressions,
+    foreign,
+    letters,
+    library,
+    modifiers,
+    scopes,
+    tree,
+    words,
+)
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
     Diagnostics,
@@ -238,6 +250,15 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
     brought = FileContext(source, session, context.loader, context.defines, path)
     for name in (*zoo.geometries, *zoo.groups):
         brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
+    for name, element in zoo.geometries.items():
+        if element.size is not None and f"{name}_size" not in brought.scope.names:
+            size = Binding("let", stmt.alias.span, value=element.size, known=True)
+            brought.scope.names[f"{name}_size"] = size
+    if zoo.font is not None:
+        font = letters.Letters(zoo.font, known)
+        brought.scope.names["text"] = Binding("text", stmt.alias.span, value=font)
+        width = partial(letters.prepare_width, font)
+        brought.scope.names["width"] = Binding("width", stmt.alias.span, value=width)
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 
@@ -448,6 +469,8 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
         return None
     if binding.kind == "module":
         return blocks.prepare_module_call(stmt, binding.value, place)
+    if binding.kind == "text":
+        return letters.prepare_text(stmt, place, binding.value)
     if binding.kind == "element":
         return blocks.prepare_element(stmt, place, binding.value)
     if binding.kind in scopes.VALUES:
@@ -499,7 +522,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
         if alias is None:
             advice.unknown(name, place)
         elif alias.kind == "import":
-            advice.unknown_member(name, place, alias.value, kinds=("module", "element"))
+            advice.unknown_member(name, place, alias.value, kinds=("module", "text", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return

@@ -46,6 +46,17 @@ class Number(Expr):
 class String(Expr):
     value: str
 
+    def character(self, at: int) -> Span:
+        """Place of a character of the value, of one that is escaped with its backslash."""
+        start = self.span.start + 1
+        for _ in range(at):
+            start += self._length(start)
+        return Span(self.span.source, start, start + self._length(start))
+
+    def _length(self, start: int) -> int:
+        text = self.span.source.text
+        return 2 if text[start] == "\\" and text[start + 1] in '"\\nt' else 1
+
 
 class Bool(Expr):
     value: bool

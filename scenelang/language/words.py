@@ -352,6 +352,24 @@ FUNCTIONS: Final = _table(
     _call("rgb", "r g b", "A colour; components in 0..1."),
     _call("hsv", "h s v", "A colour by hue (turns or an angle), saturation and value."),
 )
+LETTERS: Final = _table(
+    _call(
+        "text",
+        "text:string size? align?:string",
+        "A line of letters of an imported font, a union, with its baseline on y = 0.",
+        ("a string", "the em in world units, 1 by default", '`"left"`, `"center"` or `"right"` of x = 0'),
+        'text("$1", size = ${2:0.5});',
+        head='text("Ag", size = 1, align = "left")',
+    ),
+    _call(
+        "width",
+        "text:string size?",
+        "The width of a line of letters of an imported font, in world units.",
+        ("a string", "the em in world units, 1 by default"),
+        head='width("Ag", size = 1)',
+    ),
+)
+"""What a font brings, behind the name of its import."""
 CONSTANTS: Final = _table(
     _word("PI", "3.14159…, a number; half a turn is `0.5turn`."),
     _word("TAU", "2π, a number."),
@@ -374,10 +392,17 @@ LEAVES: Final[dict[int, dict[str, str]]] = {
         "triangle": "Regular, circumradius 1, a vertex at +y.",
         "pentagon": "Regular, circumradius 1, a vertex at +y.",
         "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",
+        "disc": "Radius 1.",
+        "hexagon": "Regular, circumradius 1, a vertex at +y.",
     },
     3: {
         "sphere": "Radius 1.",
         "torus": "Radii 0.7 and 0.3, axis y.",
+        "box": "A cube with corners on the unit sphere: half a side is 1/√3, 0.577.",
+        "cylinder": "Axis y, radius and half-height 1/√2, 0.707.",
+        "cone": "Axis y, apex (0, 1, 0), base at y = -0.5 of radius √3/2, 0.866.",
+        "capsule": "All within 0.5 of the segment from (0, -0.5, 0) to (0, 0.5, 0).",
+        "octahedron": "Corners on the axes at 1: |x| + |y| + |z| ≤ 1.",
     },
 }
 """The geometries of the plane and of space."""

@@ -15,7 +15,7 @@ from scenelang.compiler import steps as affine
 from scenelang.compiler.chain import Levels, LevelsError, merged, normal, split_levels
 from scenelang.compiler.graph import Leaf, Look, Move, leaf_box
 from scenelang.compiler.spaces import EVERYWHERE, PLANE, SPACES, Plane, flattened
-from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Warp, composed
+from scenelang.compiler.steps import IDENTITY, Affine, Grow, Rows, Shell, Skin, Step, Warp, composed
 
 
 def back(steps: list[Step], x: float, y: float) -> tuple[float, float]:
@@ -244,6 +244,8 @@ def hull_points(name: str, reach: float, rng: np.random.Generator) -> np.ndarray
 def forward(points: np.ndarray, steps) -> np.ndarray:
     """Leaf points into the world; a warp is undone by turning by the angle at the world point."""
     for step in steps:
+        if isinstance(step, Grow | Shell):
+            continue
         if isinstance(step, Affine):
             rows = np.array(step.rows).reshape(3, 4)
             points = points @ rows[:2, :2].T + rows[:2, 3]
@@ -268,10 +270,11 @@ def test_boxes_contain_the_leaf(name: str, level: float) -> None:
     rng, draw = random.Random(7), np.random.default_rng(7)
     shares = []
     for _ in range(50):
-        chain = [random_step(rng) for _ in range(rng.randrange(6))]
+        own = [Grow(rng.uniform(0.0, 1.0)), Shell(rng.uniform(0.1, 1.0))][: rng.randrange(3)]
+        chain = [*own, *(random_step(rng) for _ in range(rng.randrange(6)))]
         moves = normal(map(Move, chain), PLANE)
         block = np.array(composed(move.step for move in moves)).reshape(3, 4)[:2, :2]
-        reach = level / np.linalg.svd(block, compute_uv=False)[-1]
+        reach = level / np.linalg.svd(block, compute_uv=False)[-1] + Skin.of(own).reach
         box = leaf_box(Leaf(name, Look("flat"), moves), level, PLANE)
         points = forward(hull_points(name, reach * (1 - 1e-9), draw), [move.step for move in moves])
         assert (points >= np.array(box[:2])).all()

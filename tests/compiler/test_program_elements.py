@@ -153,11 +153,11 @@ def test_damaged_gradients() -> None:
         (lambda h, t: t.update(stops=t["stops"][:4]), "one stop"),
         (lambda h, t: t.update(stops=t["stops"][:, :4]), "tensor `stops` is F32"),
         (lambda h, t: t.update(paints=np.array([[-3, 3], [-1, 0]], np.int32)), "not listed"),
-        (lambda h, t: t.update(stops=t["stops"] + np.float32([1, 0, 0, 0, 0])), "stops that no gradient has"),
-        (lambda h, t: t.update(stops=t["stops"] * np.float32([1, 3, 1, 1, 1])), "outside 0..1"),
-        (lambda h, t: t.update(stops=t["stops"] * np.float32([1, -1, 1, 1, 1])), "outside 0..1"),
-        (lambda h, t: t.update(stops=t["stops"] * np.float32([1, 1, 2, 1, 1])), "outside 0..1"),
-        (lambda h, t: t.update(stops=t["stops"] * np.float32([1, np.nan, 1, 1, 1])), "not finite"),
+        (lambda h, t: t.update(stops=t["stops"] + np.array([1, 0, 0, 0, 0], np.float32)), "no gradient has"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, 3, 1, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, -1, 1, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, 1, 2, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, np.nan, 1, 1, 1], np.float32)), "not finite"),
     ])  # fmt: skip
 
 

@@ -59,6 +59,8 @@ def smallest_singular_value(m: list[list[float]]) -> float:
 
 def carry_back(moves: list[Any], x: float, y: float) -> tuple[float, float]:
     for move in reversed(moves):
+        if move.kind in ("grow", "shell"):
+            continue
         affine = linear_and_shift(move)
         if affine is None:
             angle = move.k * (math.hypot(x, y) if move.kind == "twirl" else x)
@@ -117,7 +119,10 @@ def sample(node: Any, x: float, y: float, outer: list[Any], material: Any) -> tu
     material = node.material or material
     if node.kind == "object":
         qx, qy = carry_back(moves, x, y)
-        return polygon_distance(outline(node.geometry), qx, qy) * scale_of(moves), colour_of(material)
+        d = polygon_distance(outline(node.geometry), qx, qy)
+        for move in moves:
+            d = d - move.r if move.kind == "grow" else abs(d) - move.w / 2 if move.kind == "shell" else d
+        return d * scale_of(moves), colour_of(material)
     if node.kind == "chain":
         links = [(link.op, link.node) for link in node.children]
     else:

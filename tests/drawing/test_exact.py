@@ -55,7 +55,9 @@ def test_distance_equals_a_loop_over_edges(geometry: str) -> None:
     np.testing.assert_allclose(leaf_distance(geometry, points.T), slow, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["shapes2d", "chains", "groups", "twelve", "shuffled", "tree", "wide"])
+@pytest.mark.parametrize(
+    "name", ["shapes2d", "chains", "groups", "twelve", "shuffled", "tree", "wide", "skins"]
+)
 def test_picture_equals_the_slow_loop(name: str) -> None:
     rng = np.random.default_rng(list(name.encode()))
     for _ in range(2):

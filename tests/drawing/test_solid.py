@@ -10,7 +10,7 @@ import pytest
 from lab.bench import povray
 from scenelang.compiler.graph import Fold
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage
-from scenelang.compiler.steps import Displace, Twist, Warp
+from scenelang.compiler.steps import Displace, Grow, Shell, Twist, Warp
 from scenelang.drawing.exact import solid
 from scenelang.drawing.exact.solid import Body, solid_image
 from scenelang.drawing.image import encoded
@@ -126,6 +126,14 @@ SCENES: dict[str, tuple[Fold, Stage]] = {
             ("intersect", leaf("sphere", "diffuse", RED, scaled(0.95))),
         ),
         Stage(horizon=(0.2, 0.1, 0.3), zenith=(0.2, 0.1, 0.3), ground=Ground(-0.4, (0.1, 0.6, 0.2))),
+    ),
+    "skins": (
+        fold(
+            leaf("sphere", "diffuse", GOLD, Shell(0.3), Displace(0.05, 6), scaled(0.6), moved(-0.7, 0, 0)),
+            ("subtract", leaf("sphere", "diffuse", RED, Grow(-0.2), moved(-0.7, 0.7, 0.7))),
+            leaf("torus", "volumetric", SKY, Displace(0.05, 6), Shell(0.2), Grow(0.1), scaled(0.6)),
+        ),
+        Stage(),
     ),
     "alpha": (
         fold(

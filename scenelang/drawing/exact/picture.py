@@ -13,6 +13,7 @@ import numpy as np
 from scenelang.compiler.graph import Graph, Node, leaves
 from scenelang.compiler.spaces import EXTINCTION, Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
+from scenelang.drawing.exact.outline import of_curves
 from scenelang.drawing.exact.solid import OPAQUE, TILE, Field, facing, seen_along, solid_image, ways
 from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
 
@@ -32,7 +33,7 @@ def reference_image(
     ``progress`` is called with the share done. Raises `ValueError` where the eye is inside something opaque,
     or a shape is known only by what was made of it.
     """
-    check_shapes(graph, brought)
+    brought = true_shapes(graph, brought)
     per_side = per_side or isqrt(graph.samples)
     if graph.stage is not None:
         return solid_image(
@@ -62,17 +63,23 @@ def translucent(node: Node) -> bool:
     return any(leaf.look.opacity < 1.0 for leaf in leaves(node))
 
 
-def check_shapes(graph: Graph, brought: Brought | None) -> None:
-    """Raise `ValueError` where a graph shows an element whose true shape is not given."""
-    unknown = graph.elements.keys() - (brought or {}).keys()
-    name = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in unknown), None)
-    if name is not None:
-        raise ValueError(f"the exact shape of `{name}` is not known")
+def true_shapes(graph: Graph, brought: Brought | None) -> Brought:
+    """True shapes of the elements that a graph shows, those of outlines from their curves; raises
+    `ValueError` where another one is not given.
+    """
+    result = dict(brought or {})
+    for leaf in leaves(graph.root):
+        element = graph.elements.get(name := leaf.geometry)
+        if element is not None and name not in result:
+            if element.form != "outline":
+                raise ValueError(f"the exact shape of `{name}` is not known")
+            result[name] = of_curves(element)
+    return result
 
 
 def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     """All outputs that a lowered graph has; raises as `reference_image`."""
-    check_shapes(graph, brought)
+    brought = true_shapes(graph, brought)
     width, height = graph.canvas
     result = np.zeros((6, height, width))  # depth, normal, object and alpha
     side = isqrt(graph.samples)

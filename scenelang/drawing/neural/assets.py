@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -106,6 +107,68 @@ class GridShape(Lattice):
         return xp.stack(rows, 0)
 
 
+NEARER = 4  # times that the point of a surface is sought that is nearest to a point outside of the cube
+ALONG = 0.6  # of the way along the surface to where a plane would be nearest: it may be round
+
+
+class GrownShape(GridShape):
+    """A grid of an object that reaches out of the cube, where its distances are true ones, too.
+
+    The point of the surface that is nearest to a point outside is sought: from that nearest to the nearest
+    point of the cube, along the surface to where it faces the point.
+    """
+
+    def slopes(self) -> Slopes:
+        """Infinite bounds: nothing is proved of where guesses end."""
+        return Slopes(np.full((len(RADII), CELLS, CELLS), np.inf), np.inf)
+
+    def distance(self, q: Array) -> Array:
+        xp, inside = self.xp, q.clip(-1.0, 1.0)
+        result = self.at(inside)
+        some = xp.where(((q - inside) * (q - inside)).sum(0) > 0)
+        if len(some):
+            xp.put(result, some, self._nearest(xp.take(q, some))[1])
+        return result
+
+    def field(self, q: Array, gradient: bool) -> Array:
+        result, xp = super().field(q, gradient), self.xp
+        some = xp.where(((q - q.clip(-1.0, 1.0)) * (q - q.clip(-1.0, 1.0))).sum(0) > 0)
+        if gradient and len(some):
+            away = self._nearest(xp.take(q, some))[0]
+            xp.put(result[1:], some, away / xp.length([*away]).clip(1e-9))
+        return result
+
+    def _nearest(self, q: Array) -> tuple[Array, Array]:
+        """Ways (d, M) to points outside of the cube from the nearest of the surface, about, and lengths."""
+        xp = self.xp
+        best, normal = self._foot(q.clip(-1.0, 1.0))
+        least = xp.length([*(q - best)])
+        for _ in range(NEARER):
+            away = q - best
+            along = away - (away * normal).sum(0) * normal
+            found, turned = self._foot((best + ALONG * along).clip(-1.0, 1.0))
+            far = xp.length([*(q - found)])
+            nearer = far < least
+            best, normal = xp.select(nearer, found, best), xp.select(nearer, turned, normal)
+            least = xp.select(nearer, far, least)
+        return q - best, least
+
+    def _foot(self, q: Array) -> tuple[Array, Array]:
+        """Points of the surface (d, M) that are nearest to points of the cube, and unit normals there."""
+        xp, step, rows = self.xp, 0.5 / self.half, []
+        for axis in range(self.d):
+            ends = []
+            for way in (step, -step):
+                moved = [*q]
+                moved[axis] = (q[axis] + way).clip(-1.0, 1.0)
+                ends.append((self.at(xp.stack(moved, 0)), moved[axis]))
+            (ahead, last), (behind, first) = ends
+            rows.append((ahead - behind) / (last - first))
+        slope = xp.stack(rows, 0)
+        normal = slope / xp.sqrt((slope * slope).sum(0)).clip(1e-9)
+        return q - self.at(q) * normal, normal
+
+
 @lru_cache(maxsize=8)
 def _grid(element: Element) -> np.ndarray:
     try:
@@ -114,10 +177,12 @@ def _grid(element: Element) -> np.ndarray:
         raise ProgramError(str(error)) from None
 
 
-def grid_shape(element: Element, xp: Arrays, like: Array) -> GridShape:
-    """The shape of an element, where an array lies; raises ProgramError where it is damaged."""
+def grid_shape(element: Element, xp: Arrays, like: Array, grown: bool = False) -> GridShape:
+    """The shape of an element, of objects that reach out of it if ``grown``, where an array lies; raises
+    ProgramError where it is damaged.
+    """
     grid = _grid(element)
-    return GridShape(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
+    return (GrownShape if grown else GridShape)(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
 
 
 EDGE = 64.0  # texels to a leaf unit that a hard edge counts as
@@ -126,49 +191,30 @@ MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 class Texture:
     """Colours of a paint at leaf coordinates, linear if ``light``; ``frame`` leads from x and y to the
-    picture or the gradient (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
+    picture (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
     """
+
+    texels: Any = None
 
     def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
         self._xp, self.steps = xp, paint.steps
-        if not abs(frame).max() < MOST:
-            raise ProgramError("a texture's frame beyond float32")
-        self.texels, self.sides = None, (0, 0)
-        if isinstance(paint.element, Gradient):
-            self._gradient = paint.element
-            self.place = Affine(tuple(map(tuple, frame.astype(np.float64).reshape(2, 3).tolist())))
-            across = abs(np.array([row[:2] for row in self.place.rows])).max()
-            self.detail = EDGE if paint.element.edges else min(float(across * paint.element.slope), EDGE)
-            self._at = self._graded
-            return
+        assert isinstance(paint.element, Element)
         values = _nodes(paint.element, light)
         flat = xp.array(values.reshape(3, -1), like)
         self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
-        self._at = self._picture if self._lattice is None else self._colouring
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
-        (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
+        (a, b, u), (c, d, v) = _rows(frame)
         self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
         self.texels, self.sides = flat, values.shape[-2:]
-        across = abs(np.array([row[:2] for row in self.place.rows])).max() if values.ndim == 3 else 0.5
-        self.detail = float(across) * max(values.shape)  # Texels that a way of a leaf unit may cross, about
+        across = _across(self.place) if values.ndim == 3 else 0.5
+        self.detail = across * max(values.shape)  # Texels that a way of a leaf unit may cross, about
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""
-        return stepped(self._xp, self._at(q), self.steps)
+        return stepped(self._xp, self._colours(q), self.steps)
 
-    def _colouring(self, q: Array) -> Array:
-        return self._lattice.at(q.clip(-1.0, 1.0))
-
-    def _graded(self, q: Array) -> Array:
-        xp, (name, stops) = self._xp, self._gradient
-        u, v = self.place(xp, [q[0], q[1]])
-        s = (u + 1.0) * 0.5 if name == "linear" else xp.length([u, v])
-        rows = [xp.full((len(s),), value, s) for value in stops[0][1:]]
-        for (begin, *a), (end, *b) in pairwise(stops):
-            over = end - begin
-            share = ((s - begin) * (1.0 / over)).clip(0.0, 1.0) if over > HARD else xp.narrow(s >= end)
-            rows = [row + share * (y - x) for row, x, y in zip(rows, a, b, strict=True)]
-        return xp.stack(rows, 0)
+    def _colours(self, q: Array) -> Array:
+        return self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
 
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides
@@ -178,6 +224,47 @@ class Texture:
             cells.append(xp.whole(place))
             shares.append(place - xp.narrow(cells[-1]))
         return blended(xp, self.texels, cells[1] * wide + cells[0], shares[::-1], [0, wide])
+
+
+class _Graded(Texture):
+    """The same of a gradient, whose stops are in the space that colours are averaged in."""
+
+    def __init__(
+        self, xp: Arrays, gradient: Gradient, steps: tuple[ColourStep, ...], frame: np.ndarray
+    ) -> None:
+        self._xp, self.steps, self.gradient = xp, steps, gradient
+        self.place = Affine(_rows(frame))
+        self.detail = EDGE if gradient.edges else min(_across(self.place) * gradient.slope, EDGE)
+
+    def _colours(self, q: Array) -> Array:
+        xp, stops = self._xp, self.gradient.stops
+        u, v = self.place(xp, [q[0], q[1]])
+        s = (u + 1.0) * 0.5 if self.gradient.name == "linear" else xp.length([u, v])
+        rows = [xp.full((len(s),), value, s) for value in stops[0][1:]]
+        for (begin, *a), (end, *b) in pairwise(stops):
+            over = end - begin
+            share = ((s - begin) * (1.0 / over)).clip(0.0, 1.0) if over > HARD else xp.narrow(s >= end)
+            rows = [row + share * (y - x) for row, x, y in zip(rows, a, b, strict=True)]
+        return xp.stack(rows, 0)
+
+
+def texture_of(xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> Texture:
+    """The texture of a paint, which may be a gradient; as `Texture`."""
+    if isinstance(paint.element, Gradient):
+        return _Graded(xp, paint.element, paint.steps, frame)
+    return Texture(xp, paint, frame, like, light)
+
+
+def _rows(frame: np.ndarray) -> Any:
+    """Rows of a texture's frame (6,); raises ProgramError where they are beyond float32."""
+    if not abs(frame).max() < MOST:
+        raise ProgramError("a texture's frame beyond float32")
+    return frame.astype(np.float64).reshape(2, 3).tolist()
+
+
+def _across(place: Affine) -> float:
+    """The most that a coordinate changes over a leaf unit, about."""
+    return float(abs(np.array([row[:2] for row in place.rows])).max())
 
 
 @lru_cache(maxsize=32)

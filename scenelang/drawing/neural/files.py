@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from scenelang.assets.files import read_regular
 from scenelang.assets.tensors import TensorError, read_tensors
-from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.weights import (
     ModelError,
     check_shapes,
+    manifest_of,
     open_weights,
     replaced,
     shipped_weights,
@@ -27,6 +28,7 @@ from scenelang.compiler.weights import (
 )
 from scenelang.drawing.neural.network import (
     CELLS,
+    LEVEL_NODES,
     NODE,
     RADII,
     STEEP,
@@ -78,11 +80,23 @@ MOST_WIDTH: Final = 1024  # Most units of a layer in the plane
 Config = TypeVar("Config", FramedConfig, SolidConfig)
 
 
+@lru_cache(maxsize=8)
+def load_levels(name: str, digest: str) -> Mapping[bytes, npt.NDArray[np.float32]]:
+    """By the bytes of codes, what leaves' decoders are short of far from their outlines (`LEVEL_NODES`,
+    `LEVEL_NODES`), which leaves that grow and shells show; none where there is no file for these weights.
+    """
+    path, network = weights_folder(name, digest) / "levels.safetensors", load_arrays(name, digest).network
+    shape = len(network.codes), LEVEL_NODES, LEVEL_NODES
+    arrays = read_proof(path, {"weights": digest}, {"levels": shape})
+    rows = () if arrays is None else arrays["levels"].astype(np.float32)
+    return {code.tobytes(): row for code, row in zip(network.codes, rows, strict=False)}
+
+
 def _sizes(kind: type[Config], config: Any, most: int) -> Config:
     sizes = config.get("network") if isinstance(config, dict) else None
     if not isinstance(sizes, dict):
         raise ModelError("no network sizes")
-    least = {"segment": 0}
+    least = {"segment": 0, "units": 0, "hidden": 0, "answered": 0}
     if any(type(v) is not int or not least.get(name, 1) <= v <= most for name, v in sizes.items()):
         raise ModelError("a network size is out of range")
     try:
@@ -139,10 +153,11 @@ def load_arrays(name: str, weights: str = "") -> ArrayModel:
 
 @lru_cache(maxsize=8)
 def _load(name: str, weights: str) -> ArrayModel:
-    manifest, data = load_manifest(name), shipped_weights(name, weights)
+    manifest, data = manifest_of(name, weights), shipped_weights(name, weights)
     digest = hashlib.sha256(data).hexdigest()
     if manifest.renderer == "solid":
         return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
     network = framed_arrays(data, manifest)
     network.slopes = load_slopes(name, digest, network.codes, float(network.far[0]))
+    network.levels = partial(load_levels, name, digest)
     return ArrayModel(network, digest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +13,25 @@ import torch
 from torch import Tensor, nn
 
 from scenelang.compiler.lifting import WIDTH
-from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.weights import (
     LIFTING,
     Codes,
     ModelError,
     check_shapes,
     codes_of,
+    manifest_of,
     open_weights,
     shipped_weights,
 )
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_slopes, solid_config
+from scenelang.drawing.neural.files import (
+    MOST_WIDTH,
+    framed_config,
+    load_levels,
+    load_slopes,
+    solid_config,
+)
 from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
@@ -166,11 +174,12 @@ _MAKERS: dict[str, _Make] = {
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
     """Load a shipped model, or weights at ``path``; raises and takes ``weights`` as `load_arrays`."""
-    manifest, data = load_manifest(name), shipped_weights(name, weights, path)
+    manifest, data = manifest_of(name, weights), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
     if isinstance(network, Framed):
         host = network.codes.cpu().numpy()
         network.slopes = load_slopes(name, codes.digest, host, float(network.far[0]))
+        network.levels = partial(load_levels, name, codes.digest)
     return Model(manifest, network, codes, open_weights(data).header)
 
 

@@ -74,6 +74,8 @@ class Lighting:
     """A field under the light of its stage, drawn at a pace."""
 
     def __init__(self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL) -> None:
+        if field.edged:  # rays may clip these
+            pace = pace._replace(gap=pace.gap / 2)
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'

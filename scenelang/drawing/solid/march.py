@@ -408,7 +408,7 @@ def march(
     ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
     trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes)
     trail.work.near = len(ids)
-    if whole and solids.segments and len(ids):
+    if whole and solids.answered and len(ids):
         sure = known(solids, passes)
         some, rest = xp.where(sure), xp.where(~sure)
         if len(some):
