@@ -384,7 +384,7 @@ def _check_settings(program: Program) -> None:
     shares = colour is None or all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
     if not shares or (colour is not None and len(colour) != 3):
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
-    if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
+    if (stage := program.stage) is not None and (fault := stage.fault()):
         raise ProgramError(fault)
     if type(program.samples) is not int or program.samples not in SAMPLES:
         raise ProgramError(f"{program.samples!r} samples of a pixel, where 4 and 16 are allowed")

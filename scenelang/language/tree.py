@@ -11,7 +11,7 @@ from typing import Any, Literal, cast
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Span
-from scenelang.language.words import GEOMETRIES, Combine
+from scenelang.language.words import Combine
 
 
 class Spanned(Record):
@@ -276,7 +276,7 @@ class Kept(Stmt):
             if cls is tuple:
                 return tuple([move(item) for item in value])
             if isinstance(value, Record) and (deep or cls is Name or value is self.stmt):
-                return cls(*[move(getattr(value, name)) for name in value.__match_args__])
+                return cls(*[move(getattr(value, name)) for name in cls.__match_args__])
             return value
 
         return cast(Stmt, move(self.stmt))
@@ -287,13 +287,6 @@ class File(Spanned):
 
 
 # ---------------------------------------------------------------- walking
-
-
-def is_leaf(call: Call, module: Stmt) -> bool:
-    """Test whether ``disc { … }``, inside the module of that name, is the leaf: without parentheses."""
-    here, there = call.span, module.span
-    within = here.source is there.source and there.start <= here.start < there.end
-    return within and call.args is None and call.name.text in GEOMETRIES
 
 
 def children(node: Any) -> Iterator[Any]:

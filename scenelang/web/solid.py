@@ -12,9 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from scenelang.assets.gradient import HARD
-from scenelang.assets.records import Record
 from scenelang.compiler.groups import INTERSECT, SUBTRACT
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage, stage_data
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
@@ -48,7 +47,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
-    parts += [_struct("Stage", Stage())]
+    parts += [_struct("Stage", stage_data(Stage()))]
     parts += [
         f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
@@ -70,12 +69,11 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     }
 
 
-def _struct(name: str, part: Record) -> str:
+def _struct(name: str, part: dict[str, Any]) -> str:
     """GLSL of the type of a part of the stage, behind those of its own parts."""
-    fields = {field: getattr(part, field) for field in part.__match_args__}
-    inner = [_struct(field.title(), value) for field, value in fields.items() if isinstance(value, Record)]
+    inner = [_struct(field.title(), value) for field, value in part.items() if isinstance(value, dict)]
     types = {tuple: "vec3", float: "float", bool: "bool"}
-    lines = [f"{types.get(type(value), field.title())} {field};" for field, value in fields.items()]
+    lines = [f"{types.get(type(value), field.title())} {field};" for field, value in part.items()]
     return "\n".join([*inner, f"struct {name} {{ {' '.join(lines)} bool on; }};"])
 
 

@@ -208,7 +208,8 @@ def test_faults() -> None:
         (Light(power=0.0), None),
         (Light(power=-2.0), "a power of -2 is negative"),
     ):
-        assert value.fault() == fault
+        part = {"camera": value} if isinstance(value, Camera) else {"light": value}
+        assert Stage(**part).fault() == fault
 
 
 def test_colours_are_decoded_from_srgb() -> None:
