@@ -226,7 +226,7 @@ SHAPES: Final = _each_word(
         "circle disc disk dot": "disc(r)",
         "ellipse oval": "ellipse(rx, ry)",
         "ring annulus": "ring(r, width)",
-        "rect rectangle box quad": "rect(w, h)",
+        "rect rectangle quad": "rect(w, h)",
         "rounded rounded_rect rounded_rectangle roundrect rrect": "rounded(w, h, r)",
         "line segment": "line([x, y], [x, y], width)",
         "capsule stadium": "capsule([x, y], [x, y], width)",
@@ -236,7 +236,6 @@ SHAPES: Final = _each_word(
         "arrow": "arrow([x, y], [x, y], width)",
         "arc": "arc(r, width, 0deg, 90deg)",
         "parallelogram": "parallelogram(p, a, b)",
-        "hexagon": "polygon(6)",
         "heptagon": "polygon(7)",
         "octagon": "polygon(8)",
     }
