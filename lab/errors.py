@@ -8,10 +8,10 @@ derivatives (`lab.slopes`), and so has e. The mean value theorem makes one of f 
 whose interval reaches farther than what was seen in their cell are cut in four.
 
 Within half a sector (`SECTORS` of `scenelang.compiler.geometries`) e is the distance to one segment, with a
-sign. Its gradient is the segment's normal beside the segment. Elsewhere it is the direction from the
-nearest point. As p less its nearest point of a convex set changes by no more than p does, that direction
-changes by at most 2 r / (2 d - r) within r of where the distance is d. Where a box meets more half sectors,
-it may be any's.
+sign; the disc's is the distance to its centre. Its gradient is the segment's normal beside the segment.
+Elsewhere it is the direction from the nearest point. As p less its nearest point of a convex set changes by
+no more than p does, that direction changes by at most 2 r / (2 d - r) within r of where the distance is d.
+Where a box meets more half sectors, it may be any's.
 """
 
 from __future__ import annotations
@@ -75,8 +75,11 @@ def proved_errors(
 
 def gradients(geometry: str, p: Floats, half: float) -> tuple[Floats, Floats]:
     """The least and the most of the exact distance's derivatives (M, 2) over boxes about points (M, 2)."""
+    r = half * 2**0.5
+    if geometry not in SECTORS:  # a disc: away from the origin
+        return _turning(p, r)
     order, first, outer, inner = SECTORS[geometry]
-    width, r = math.pi / order, half * 2**0.5
+    width = math.pi / order
     length, angle = np.hypot(*p.T), np.arctan2(p[:, 1], p[:, 0])
     least, most = np.full(p.shape, np.inf), np.full(p.shape, -np.inf)
     for index in range(2 * order):
@@ -90,6 +93,14 @@ def gradients(geometry: str, p: Floats, half: float) -> tuple[Floats, Floats]:
         low, high = _beside(p[here], r, *ends)
         least[here], most[here] = np.minimum(least[here], low), np.maximum(most[here], high)
     return least, most
+
+
+def _turning(gap: Floats, r: float) -> tuple[Floats, Floats]:
+    """Directions of ways (M, 2) whose ends move by up to r."""
+    d = np.hypot(*gap.T)
+    spread = np.where(d > r, 2 * r / (2 * d - r).clip(1e-300), 2.0)[:, None]
+    middle = gap / d.clip(1e-300)[:, None]
+    return (middle - spread).clip(-1.0, 1.0), (middle + spread).clip(-1.0, 1.0)
 
 
 def _beside(p: Floats, r: float, a: Floats, b: Floats) -> tuple[Floats, Floats]:

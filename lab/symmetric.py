@@ -268,7 +268,7 @@ FITS: Final = {
 }
 """The starts whose ends ship."""
 DISC: Final = (0.2, -0.1, 0.4, 0.0)
-"""Its code: [code, 1] lies well beside those of the other four."""
+"""Its code: [code, 1] lies well beside those of the four before it."""
 
 
 def trained(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict[str, Any]]:
@@ -278,17 +278,17 @@ def trained(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict[str, 
     result = {leaf: fit.run(leaf) for leaf, fit in FITS.items()}
     pair = hiding(result["square"], result["triangle"], result["hexagon"], width)
     goals = [*pair, *(placed(result[leaf], width) for leaf in ("star", "pentagon", "disc"))]
-    codes = np.concatenate([arrays["codes"].astype(np.float64), [DISC]])
+    codes = np.concatenate([arrays["codes"][:4].astype(np.float64), [DISC]])
     one = np.concatenate([codes, np.ones((len(codes), 1))], 1)
     for i in range(3):
         for kind, at in (("w", 2 * i), ("b", 2 * i + 1)):
             stacked = np.stack([goal[at].T for goal in goals])
             mixed = np.linalg.solve(one, stacked.reshape(len(one), -1))
             arrays[f"decoder_{kind}.{i}"] = mixed.reshape(stacked.shape).astype(np.float32)
-    more = {"disc": DISC, "hexagon": tuple((2 * codes[0] - codes[1]).tolist())}
+    arrays["codes"] = np.concatenate([codes, [2 * codes[0] - codes[1]]]).astype(np.float32)
     fits = {leaf: fit._asdict() for leaf, fit in FITS.items()}
     header.pop("measured", None)  # of its own decoders
-    return arrays, {**header, "decoders": {"fits": fits, "codes": more}}
+    return arrays, {**header, "decoders": {"fits": fits}}
 
 
 if __name__ == "__main__":

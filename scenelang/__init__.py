@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from scenelang.language.nodes import Scale as Scale
     from scenelang.language.nodes import Shear as Shear
     from scenelang.language.nodes import Shell as Shell
+    from scenelang.language.nodes import Stop as Stop
     from scenelang.language.nodes import Translate as Translate
     from scenelang.language.nodes import Twirl as Twirl
     from scenelang.language.nodes import Twist as Twist
@@ -69,6 +70,9 @@ if TYPE_CHECKING:
     from scenelang.output.animate import animate as animate
     from scenelang.output.animate import render_frames as render_frames
     from scenelang.output.frames import FramesError as FramesError
+    from scenelang.output.mesh import TriangleMesh as TriangleMesh
+    from scenelang.output.shapes import to_mesh as to_mesh
+    from scenelang.output.shapes import to_svg as to_svg
     from scenelang.output.sweep import render_many as render_many
     from scenelang.web.export import export as export
     from scenelang.web.notebook import set_notebook as set_notebook
@@ -90,12 +94,14 @@ _HOME: Final = {
     "scenelang.language.formatting": "format_text",
     "scenelang.language.nodes": (
         "Animation Bend Boolean Camera Chain Color Displace Flip Grayscale Ground Group Grow Hue Light Link "
-        "Material Matrix Object Rotate Scale Shear Shell Translate Twirl Twist"
+        "Material Matrix Object Rotate Scale Shear Shell Stop Translate Twirl Twist"
     ),
     "scenelang.language.reports": "SceneError",
     "scenelang.language.scene": "Elements load_elements Scene",
     "scenelang.output.animate": "animate render_frames",
     "scenelang.output.frames": "FramesError",
+    "scenelang.output.mesh": "TriangleMesh",
+    "scenelang.output.shapes": "to_mesh to_svg",
     "scenelang.output.sweep": "render_many",
     "scenelang.web.export": "export",
     "scenelang.web.notebook": "set_notebook",

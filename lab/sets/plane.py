@@ -2,9 +2,10 @@
 
 ``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
 rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
-uniform. The others change one thing each. `textures2d` has 1 to 4 squares with one of the textures
-each: scale and translation, and of the texture flip, rotation and hue; `textures2d-mixed` has the four
-shapes, warps and booleans, and any moves and colours of textures, one object in five being plain.
+uniform. The others change one thing each: `leaves2d` has discs and hexagons. `textures2d` has 1 to 4 squares
+with one of the textures each: scale and translation, and of the texture flip, rotation and hue;
+`textures2d-mixed` has the four shapes, warps and booleans, and any moves and colours of textures, one object
+in five being plain.
 """
 
 from __future__ import annotations
@@ -72,6 +73,7 @@ class SetConfig:
 
 SETS: dict[str, SetConfig] = {
     "shapes2d": SetConfig(),
+    "leaves2d": SetConfig(geometries=("disc", "hexagon")),
     "unions": SetConfig(unions=1.0),
     "affine": SetConfig(unions=1.0, deformed=False),
     "chains": SetConfig(unions=0.0, objects=(2, 4)),

@@ -2,8 +2,9 @@
 
 ``solids3d`` is the base set: 1 to 3 spheres and tori, diffuse or volumetric, scaled by 0.35 to 0.85 per axis,
 turned about any axis and moved by ±1.2 (y: -0.5 to 0.9), in that order, colours uniform in 0.1 to 1 as
-written, all unions, on the default stage. The others change one thing each, ``mixed`` several. ``meshes3d``
-has 1 to 4 of the meshes that ship, diffuse; they are scaled, turned and moved in random order.
+written, all unions, on the default stage. The others change one thing each, ``mixed`` several; ``leaves3d``
+has the leaves with edges, and capsules. ``meshes3d`` has 1 to 4 of the meshes that ship, diffuse; they are
+scaled, turned and moved in random order.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ from scenelang.language.words import COMBINE
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"
 SIDES = 0.35, 0.85  # smallest and largest scale
+EDGED = "box", "cylinder", "cone", "capsule", "octahedron"
 WARP = 0.8  # of deformed objects
 
 
@@ -58,6 +60,7 @@ class SolidConfig:
     meshes: str = ""  # a file of elements whose solids take the place of spheres and tori
     skins: bool = False  # whether objects grow, or are shells, or both
     trees: bool = False  # any trees of booleans; see `lab.sets.plane.any_tree`
+    leaves: tuple[str, ...] = ("sphere", "torus")
 
 
 SOLID_SETS: dict[str, SolidConfig] = {
@@ -73,6 +76,7 @@ SOLID_SETS: dict[str, SolidConfig] = {
     "staged": SolidConfig(staged=True),
     "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
     "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
+    "leaves3d": SolidConfig(media=0.3, canvas=(256, 256), leaves=EDGED),
     "meshes3d": SolidConfig(objects=(1, 4), media=0.0, meshes="std/meshes"),
 }
 
@@ -123,7 +127,7 @@ def random_solid(rng: Rng, config: SolidConfig) -> Scene:
     unions = rng.random() < config.unions
     zoo = load_elements(config.meshes, "zoo") if config.meshes else None
     brought = Brought.of((zoo,)).geometries if zoo is not None else {}
-    geometries = [name for name, it in brought.items() if it.dimension == 3] or ["sphere", "torus"]
+    geometries = [name for name, it in brought.items() if it.dimension == 3] or config.leaves
 
     def solid() -> Object:
         kind = "volumetric" if rng.random() < config.media else "diffuse"

@@ -58,14 +58,9 @@ class SolidsConfig:
 
     model: str  # name of the model that the weights are for
     seed: int  # seeds parameters and points
-    # steps of Adam for the cell and for all leaves together
-    cell: int
-    leaves: int
-    polish: int  # Gauss-Newton steps for each leaf, a multiple of 20
+    cell: int  # steps of Adam for the cell
     segments: int  # steps of Adam for the answers for whole segments
     network: SolidConfig  # sizes
-    # name of a model whose cell, looks and answers for segments the weights get, in place of fitted ones
-    like: str | None = None
 
 
 def config_data(name: str) -> bytes:
@@ -78,7 +73,7 @@ def config_data(name: str) -> bytes:
 
 def is_solids(data: bytes) -> bool:
     """Return whether a configuration is a `SolidsConfig`."""
-    return b'"polish"' in data
+    return b'"segments"' in data
 
 
 def read_solids_config(name: str) -> SolidsConfig:

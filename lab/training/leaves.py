@@ -1,53 +1,16 @@
-"""Training samples of leaves in space: distances of random points, lengths of random half rays."""
+"""Training samples of leaves in space: lengths of random half rays."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.solid.network import RADIUS, folded
+from scenelang.drawing.solid.network import folded
 from scenelang.language import words
 
 LEAVES = (*words.LEAVES[3],)
-
-
-@dataclass(frozen=True, slots=True)
-class Points:
-    """Points on and around a leaf."""
-
-    q: Tensor  # (P, 3)
-    distance: Tensor  # exact (P,)
-    gradient: Tensor  # of it (P, 3)
-    weight: Tensor  # of the errors of distance and gradient (P, 4)
-
-
-def leaf_points(leaf: str, count: int, g: torch.Generator, kind: torch.dtype) -> Points:
-    """Half of the points near the surface at all scales, a quarter in its ball, a quarter farther out."""
-    row = GEOMETRIES[leaf]
-    assert row.surface is not None
-    near = torch.stack(row.surface(torch.rand((2, count // 2), generator=g)), 1)
-    near = near + torch.randn(near.shape, generator=g) * 10 ** (
-        2.5 * torch.rand((len(near), 1), generator=g) - 3.5
-    )
-    far = _directions(count - len(near), g) * torch.rand((count - len(near), 1), generator=g) ** (1 / 3)
-    far[::2] *= 1.3
-    far[1::2] *= RADIUS
-    q = torch.cat([near, far]).to(kind).requires_grad_()
-    with torch.enable_grad():
-        distance = row.distance(q.T)
-        (gradient,) = torch.autograd.grad(distance.sum(), q)
-    distance = distance.detach()
-    by_value = torch.where(distance < -0.15, 0.2, 1.0) / (distance.abs() + 0.02)
-    by_gradient = 0.003 / (distance.square() + 0.01)
-    # next to a centre there is no gradient
-    bent = gradient.isnan().any(1) | (distance < -0.45 * row.thickness)
-    by_gradient = torch.where(bent, 0.0, by_gradient)
-    weight = torch.cat([by_value[:, None], by_gradient[:, None].expand(-1, 3)], 1)
-    return Points(q.detach(), distance, gradient.nan_to_num(), weight)
 
 
 def _directions(count: int, g: torch.Generator) -> Tensor:

@@ -14,6 +14,9 @@ from scenelang.assets.tensors import TensorError
 
 MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
 MOST_PIXELS: Final = 2048  # along a side of a picture
+MOST_CURVES: Final = 5000  # of an outline
+GRAIN: Final = 32767  # steps in a radius of an outline
+ROOM: Final = 12  # bytes of a curve
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
 
@@ -32,6 +35,9 @@ FORMS: Final = {
         ("deflate", "bzip2"),
         {2: "element of the plane", 3: "element of space"},
     ),
+    # a geometry: closed outlines of quadratic curves in the unit disc, which have the inside on their left:
+    # 16-bit numbers of a start, a control point and an end, in 1 / `GRAIN`
+    "outline": Encoding(("curves",), ("plain",), {2: "element of the plane"}),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
     "picture": Encoding(("height", "width"), ("webp", "av1"), {2: "texture"}),
     # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.colours`)
@@ -47,8 +53,9 @@ class Element:
         name: its name in scenes, after the name of the import.
         form: one of `FORMS`.
         sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
-            coarsest grid along an axis, and grids, each of twice as many cells as the one before; a picture
-            height and width in texels; colours nodes along an axis, and steps from dark to light.
+            coarsest grid along an axis, and grids, each of twice as many cells as the one before; an outline
+            its curves; a picture height and width in texels; colours nodes along an axis, and steps from dark
+            to light.
         coding: of its bytes, one of the form's.
         data: the bytes.
         about: facts from its maker: license, source, errors; text and numbers by name.
@@ -71,7 +78,7 @@ class Element:
     @property
     def material(self) -> bool:
         """True of a material, false of a geometry."""
-        return self.form != "pyramid"
+        return self.form in ("picture", "colours")
 
     @property
     def names_coding(self) -> bool:
@@ -81,7 +88,13 @@ class Element:
     @property
     def dimension(self) -> int:
         """Dimension of the space that it fills."""
-        return self.sizes[0] if self.form == "pyramid" else 2 if self.form == "picture" else 3
+        return self.sizes[0] if self.form == "pyramid" else 3 if self.form == "colours" else 2
+
+    @property
+    def size(self) -> float | None:
+        """Radius of its unit ball in units of the file that it was made of, None where it does not say."""
+        size = self.about.get("size")
+        return None if self.material or not isinstance(size, int | float) or not size > 0 else float(size)
 
     @property
     def kind(self) -> str:
@@ -90,6 +103,9 @@ class Element:
 
     def told(self) -> str:
         """Kind, sizes and facts of the element, a line each."""
+        if self.form == "outline":
+            lines = [f"{self.kind}: {self.sizes[0]} curves, {len(self.data):,} bytes"]
+            return "\n".join([*lines, *(f"{key}: {value}" for key, value in self.about.items())])
         sides = self.sizes[::-1] if self.form == "picture" else (self.sides[-1],) * self.dimension
         what = "colours" if self.material else "distances"
         lines = [f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"]
@@ -111,6 +127,8 @@ class Element:
     @property
     def held(self) -> int:
         """Bytes that it takes unpacked, one a distance or a channel."""
+        if self.form == "outline":
+            return ROOM * self.sizes[0]
         if self.form == "picture":
             return 3 * self.sizes[0] * self.sizes[1]
         nodes: int = sum(side**self.dimension for side in self.sides)
@@ -118,6 +136,8 @@ class Element:
 
     def inflated(self) -> bytes:
         """The unpacked bytes of all nodes; raises `TensorError` where they are damaged, fewer or more."""
+        if self.coding == "plain" and len(self.data) == self.held:
+            return self.data
         inflate = bz2.BZ2Decompressor() if self.coding == "bzip2" else zlib.decompressobj()
         try:
             result = inflate.decompress(self.data, self.held + 1)
@@ -143,6 +163,8 @@ def in_range(form: str, sizes: tuple[int, ...]) -> bool:
         return all(1 <= side <= MOST_PIXELS for side in sizes)
     if form == "colours":
         return 2 <= sizes[0] <= MOST_SIDE[3] and 4 <= sizes[1] <= 255
+    if form == "outline":
+        return 1 <= sizes[0] <= MOST_CURVES
     dimension, cells, levels = sizes
     fits = dimension in MOST_SIDE and 2 <= cells <= 8 and 1 <= levels <= 9
     return fits and cells * 2 ** (levels - 1) < MOST_SIDE[dimension]

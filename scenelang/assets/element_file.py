@@ -1,7 +1,7 @@
 """Files of elements, which scenes import, checked without numpy as a stranger's.
 
 A file has a tensor of bytes for each element, named as the header's ``elements`` and, as ``material.NAME``,
-its ``materials``; ``groups`` come with these, in format 2.
+its ``materials``; ``groups`` come with these, in format 2, and in format 3 a ``font`` with its own tensors.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any, Final
 from scenelang.assets.element import FORMS, Element, Group, in_range, read_group
 from scenelang.assets.element import entry_of as group_entry
 from scenelang.assets.files import read_regular
+from scenelang.assets.font import RESERVED, TENSORS, Font, is_glyph, read_font
 from scenelang.assets.picture import pixels
 from scenelang.assets.tensors import Tensor, TensorError, read_tensors
 
@@ -38,6 +39,7 @@ class ElementFile:
     materials: dict[str, Element] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
     folder: Path | None = field(default=None, compare=False)  # where it lies
+    font: Font | None = field(default=None, compare=False)  # whose letters are among the geometries
 
     @staticmethod
     def of(elements: Iterable[Element], digest: str = "0" * 64) -> ElementFile:
@@ -77,17 +79,25 @@ _TABLES: Final = {"elements": "", "materials": "material."}
 
 def read_zoo(data: bytes) -> ElementFile:
     """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
-    file = read_tensors(data, MOST_ELEMENT_BYTES, (1, 2))
+    file = read_tensors(data, MOST_ELEMENT_BYTES, (1, 2, 3))
+    entry = file.header.pop("font", None) if file.header["format"] == 3 else None
     known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
     tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
     if file.header.keys() != known or not all(isinstance(table, dict) for table in tables.values()):
         raise TensorError("not a file of elements")
+    font = None
+    if entry is not None:
+        if not isinstance(entry, dict) or entry.keys() != {"about", "columns"}:
+            raise TensorError("its font has missing or unknown fields")
+        font = read_font(entry["columns"], _about(entry["about"], "the font"), file.tensors, file.body)
+        for name in TENSORS:
+            del file.tensors[name]
     listed_groups = tables.pop("groups", None) or {}
     entries = [(key, name, entry) for key, table in tables.items() for name, entry in (table or {}).items()]
     tensors = [_TABLES[key] + name for key, name, _ in entries]
     if len(set(tensors)) < len(tensors) or {*tensors} != file.tensors.keys():
         raise TensorError("its header names other elements than it holds")
-    if not 0 < len(entries) <= MOST_ELEMENTS:
+    if not (font is None) <= len(entries) <= MOST_ELEMENTS:
         raise TensorError(f"{len(entries):,} elements, where 1 to {MOST_ELEMENTS:,} are allowed")
     listed = [(e[1], e[2], file.tensors[tensor]) for e, tensor in zip(entries, tensors, strict=True)]
     result = read_elements(listed, file.body)
@@ -96,6 +106,11 @@ def read_zoo(data: bytes) -> ElementFile:
     zoo = ElementFile.of(result, hashlib.sha256(data).hexdigest())
     if len(listed_groups) > MOST_ELEMENTS:
         raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
+    if font is not None:
+        named = (name.removeprefix("material.") for name in (*tensors, *listed_groups))
+        if taken := next((name for name in named if name in RESERVED or is_glyph(name)), ""):
+            raise TensorError(f"an element called `{taken[:40]}` beside a font, to which that name belongs")
+        zoo = replace(zoo, geometries=zoo.geometries | font.glyphs, font=font)
     held = zoo.geometries, zoo.materials
     return replace(zoo, groups={name: read_group(name, e, *held) for name, e in listed_groups.items()})
 
@@ -129,10 +144,14 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
     sizes = tuple(entry[key] for key in form.sizes)
     if not all(type(size) is int for size in sizes) or not in_range(entry["form"], sizes):
         raise TensorError(f"element `{name}` has sizes out of range")
-    about = entry["about"]
-    if not isinstance(about, dict) or not all(k.isidentifier() and is_said(v) for k, v in about.items()):
-        raise TensorError(f"what element `{name}` says of itself is not text and numbers")
+    about = _about(entry["about"], f"element `{name}`")
     return Element(name, entry["form"], sizes, coding, bytes(body[tensor.first : tensor.last]), about)
+
+
+def _about(said: Any, whose: str) -> dict[str, str | float]:
+    if not isinstance(said, dict) or not all(k.isidentifier() and is_said(v) for k, v in said.items()):
+        raise TensorError(f"what {whose} says of itself is not text and numbers")
+    return said
 
 
 def is_said(value: Any) -> bool:
@@ -149,22 +168,30 @@ def entry_of(element: Element) -> dict[str, Any]:
     return {"form": element.form, **sizes, **coding, "about": element.about}
 
 
-def element_file_bytes(elements: Iterable[Element], groups: Mapping[str, Group] | None = None) -> bytes:
-    """The file of elements and groups; equal ones give equal bytes."""
+def element_file_bytes(
+    elements: Iterable[Element], groups: Mapping[str, Group] | None = None, font: Font | None = None
+) -> bytes:
+    """The file of elements, groups and a font, whose letters are left out; equal ones give equal bytes."""
     import numpy as np
     from safetensors.numpy import save
 
-    zoo = ElementFile.of(sorted(elements, key=lambda element: element.name))
-    tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if zoo.materials or groups else {})
+    own = {} if font is None else font.glyphs
+    zoo = ElementFile.of(sorted((e for e in elements if e.name not in own), key=lambda element: element.name))
+    more = bool(zoo.materials or groups or font)
+    tables = {"elements": zoo.geometries} | ({"materials": zoo.materials} if more else {})
     header: dict[str, Any] = {"format": len(tables)}
     header |= {key: {e.name: entry_of(e) for e in table.values()} for key, table in tables.items()}
     if len(tables) > 1:
         header["groups"] = {name: group_entry(group) for name, group in (groups or {}).items()}
+    if font is not None:
+        header |= {"format": 3, "font": {"about": font.about, "columns": font.columns}}
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     tensors = {
         _TABLES[key] + element.name: np.frombuffer(element.data, np.uint8)
         for key, table in tables.items()
         for element in table.values()
     }
+    for name in TENSORS if font is not None else ():
+        tensors[name] = np.array(font.tables[name])
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 STDIN: Final = "-"
 SCENE, PROGRAM, PAGE = ".nsg", ".safetensors", ".html"
+DRAWING: Final = ".svg"
+SHAPES: Final = (DRAWING, ".stl", ".glb", ".ply", ".obj")  # what holds outlines or a surface, no pixels
 
 
 def scenes_of(paths: Iterable[str]) -> tuple[list[str], bool]:
@@ -94,12 +96,12 @@ def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
 
 
 def _check_format(path: Path, suffix: str) -> None:
-    """Raise `ValueError` where a file is not called like a page or a picture."""
-    if suffix != PAGE:
+    """Raise `ValueError` where a file is not called like a page, a picture or a shape."""
+    if suffix != PAGE and path.suffix.lower() not in SHAPES:
         from scenelang.drawing.image import image_format
 
         image_format(path)
-    elif path.suffix.lower() not in (PAGE, ".htm"):
+    elif suffix == PAGE and path.suffix.lower() not in (PAGE, ".htm"):
         raise ValueError(f"a page's file ends in {PAGE}")
 
 

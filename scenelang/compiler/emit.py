@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS
@@ -30,7 +34,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
     listed = sorted({leaf.geometry for leaf in leaves} & graph.elements.keys())
     forms = {name: at for at, name in enumerate(listed)}
     palette, worn = _palette(leaves)
-    materials = dict.fromkeys(paint.element for paint in palette)
+    materials = dict.fromkeys(paint.element for paint in palette if isinstance(paint.element, Element))
     vectors = _vectors(leaves, manifest, codes)
     for at, row in enumerate(rows):
         if row.k and row.op != "union":  # a width that is not the usual one belongs to a row, not to a leaf
@@ -51,6 +55,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         forms=np.array([forms.get(leaf.geometry, -1) for leaf in leaves], dtype=np.int32),
         palette=palette,
         worn=worn,
+        samples=graph.samples,
     )
 
 
@@ -65,9 +70,17 @@ def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int3
     for look in {id(leaf.look): leaf.look for leaf in leaves}.values():
         known[id(look)] = -1
         if look.element is not None:
-            steps = [(kind, *np.asarray(numbers, np.float32).tolist()) for kind, *numbers in look.colours]
-            known[id(look)] = result.setdefault(Paint(look.element, tuple(steps)), len(result))
+            steps = [(kind, *_rounded(numbers)) for kind, *numbers in look.colours]
+            element = look.element
+            if isinstance(element, Gradient):
+                element = Gradient(element.name, tuple(map(_rounded, element.stops)))
+            known[id(look)] = result.setdefault(Paint(element, tuple(steps)), len(result))
     return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
+
+
+def _rounded(numbers: Sequence[float]) -> Any:
+    """Numbers in float32."""
+    return tuple(np.asarray(numbers, np.float32).tolist())
 
 
 def _vectors(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray[np.float32]:
@@ -101,7 +114,8 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         nothing = (0.0,) * 4  # a row of an element names it by `forms`
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
         painted = [codes.material[leaf.look.material] for leaf in leaves]
-        vectors = lift_colours(colours, painted, layout, [leaf.look.moved for leaf in leaves])
+        moved, opacities = [leaf.look.moved for leaf in leaves], [leaf.look.opacity for leaf in leaves]
+        vectors = lift_colours(colours, painted, layout, moved, opacities)
         vectors += lift_many(levels, shapes, layout)  # these fill other places of the vectors
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")

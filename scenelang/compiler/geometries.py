@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
+from functools import reduce
 from typing import Any, Final
 
 from scenelang.assets.records import Record
@@ -22,17 +23,15 @@ class Geometry(Record):
     """A leaf within the unit disc or ball of its space; ``distance`` of points (d, …) is exact and signed.
 
     A disc or ball of radius ``inner``, 0 for none, about the origin lies within it. In space ``slopes`` are
-    the distance and its gradient (4, …), ``surface`` gives points (3, …) from two coordinates in [0, 1),
-    ``half`` is half the sides of a box around it, ``thickness`` its least thickness. In the plane ``sectors``
-    of a shape of dihedral symmetry are its order n, direction of a vertex, outer radius, and the radius at
-    half a sector, where the edge from the vertex ends (for the star an inner vertex); ``corners`` are those
-    of a convex polygon around it, none for the unit disc.
+    the distance and its gradient (4, …), ``half`` is half the sides of a box around it, ``thickness`` its
+    least thickness. In the plane ``sectors`` of a shape of dihedral symmetry are its order n, direction of a
+    vertex, outer radius, and the radius at half a sector, where the edge from the vertex ends (for the star
+    an inner vertex); ``corners`` are those of a convex polygon around it, none for the unit disc.
     """
 
     distance: Callable[[Points], Array]
     inner: float = 0.0
     slopes: Callable[[Points], tuple[Array, ...]] | None = None
-    surface: Callable[[Points], tuple[Array, ...]] | None = None
     half: tuple[float, float, float] = (1.0, 1.0, 1.0)
     thickness: float = math.inf
     sectors: tuple[int, float, float, float] | None = None
@@ -103,14 +102,6 @@ def _sphere_slopes(p: Points) -> tuple[Array, ...]:
     return length - 1.0, x / length, y / length, z / length
 
 
-def _sphere_surface(at: Points) -> tuple[Array, ...]:
-    """Points that are evenly spread, as equal bands of a sphere along y have equal areas."""
-    u, v = at
-    xp, y = namespace(u), 2.0 * v - 1.0
-    around = xp.sqrt(1.0 - y * y)
-    return around * xp.cos(math.tau * u), y, around * xp.sin(math.tau * u)
-
-
 _RING, _TUBE = 0.7, 0.3  # radii of the circle about y and of the tube
 
 
@@ -130,11 +121,112 @@ def _torus_slopes(p: Points) -> tuple[Array, ...]:
     return tube - _TUBE, ring / tube * x / around, y / tube, ring / tube * z / around
 
 
-def _torus_surface(at: Points) -> tuple[Array, ...]:
-    u, v = math.tau * at[0], math.tau * at[1]
-    xp = namespace(u)
-    ring = _RING + _TUBE * xp.cos(v)
-    return ring * xp.cos(u), _TUBE * xp.sin(v), ring * xp.sin(u)
+def _above(a: Array) -> Array:
+    """The part above zero."""
+    return (a + abs(a)) / 2
+
+
+def _corner(*levels: Array) -> Array:
+    """Distance to where several levels, distances from orthogonal planes or lines, are all below zero."""
+    xp = namespace(levels[0])
+    highest = reduce(xp.maximum, levels)
+    return xp.sqrt(sum(_above(level) ** 2 for level in levels)) + (highest - abs(highest)) / 2
+
+
+def _corner_slopes(*levels: Array) -> tuple[Array, ...]:
+    """`_corner`, and its derivatives by the levels: along the way out of the nearest point."""
+    xp = namespace(levels[0])
+    highest = reduce(xp.maximum, levels)
+    ways = [xp.where(highest > 0, _above(level), 1.0 * (level == highest)) for level in levels]
+    length = xp.sqrt(sum(way * way for way in ways))
+    return _corner(*levels), *(way / length for way in ways)
+
+
+def _around(p: Points, d: Array, by_rho: Array, by_y: Array) -> tuple[Array, ...]:
+    """A distance and its gradient by its derivatives along y and away from the axis."""
+    x, _, z = p
+    rho = namespace(x).sqrt(x * x + z * z).clip(_TINY)
+    return d, by_rho * x / rho, by_y, by_rho * z / rho
+
+
+_CUBE: Final = 1 / math.sqrt(3)  # half of a box's side
+_CAN: Final = 1 / math.sqrt(2)  # radius and half-height of a cylinder
+_LEAN: Final = math.sqrt(3) / 2  # radius of a cone's base
+_LONG, _PILL = 0.5, 0.5  # half of the segment in a capsule, and its radius
+
+
+def _box_slopes(p: Points) -> tuple[Array, ...]:
+    xp = namespace(p[0])
+    d, *by = _corner_slopes(*(abs(a) - _CUBE for a in p))
+    return d, *(xp.sign(a) * slope for a, slope in zip(p, by, strict=True))
+
+
+def _cylinder_levels(p: Points) -> tuple[Array, Array]:
+    x, y, z = p
+    return namespace(x).sqrt(x * x + z * z) - _CAN, abs(y) - _CAN
+
+
+def _cylinder_slopes(p: Points) -> tuple[Array, ...]:
+    d, by_rho, by_y = _corner_slopes(*_cylinder_levels(p))
+    return _around(p, d, by_rho, namespace(p[1]).sign(p[1]) * by_y)
+
+
+def _cone_levels(p: Points) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Levels of two corners that meet in the cone: its side between apex and rim; its base up to the rim."""
+    x, y, z = p
+    rho = namespace(x).sqrt(x * x + z * z)
+    along = rho / 2 - _LEAN * y  # the side, from -sqrt(3) / 2 to sqrt(3) / 2
+    return (_LEAN * rho + y / 2 - 0.5, abs(along) - _LEAN), (-y - 0.5, rho - _LEAN)
+
+
+def _cone(p: Points) -> Array:
+    side, base = _cone_levels(p)
+    return namespace(p[0]).maximum(_corner(*side), _corner(*base))
+
+
+def _cone_slopes(p: Points) -> tuple[Array, ...]:
+    xp, (side, base) = namespace(p[0]), _cone_levels(p)
+    (a, out, along), (b, down, over) = _corner_slopes(*side), _corner_slopes(*base)
+    x, y, z = p
+    along = xp.where(xp.sqrt(x * x + z * z) / 2 > _LEAN * y, along, -along)
+    by_rho = xp.where(a >= b, _LEAN * out + along / 2, over)
+    by_y = xp.where(a >= b, out / 2 - _LEAN * along, -down)
+    return _around(p, xp.maximum(a, b), by_rho, by_y)
+
+
+def _capsule(p: Points) -> Array:
+    x, y, z = p
+    beyond = _above(abs(y) - _LONG)
+    return namespace(x).sqrt(x * x + beyond * beyond + z * z) - _PILL
+
+
+def _capsule_slopes(p: Points) -> tuple[Array, ...]:
+    x, y, z = p
+    return _capsule(p), *_sphere_slopes([x, namespace(y).sign(y) * _above(abs(y) - _LONG), z])[1:]
+
+
+def _octahedron_ways(p: Points) -> tuple[Array, Array]:
+    """How far above its plane a point is, by its coordinates' sum; and how far from it the nearest point of
+    the octahedron is along each axis at most, outside (Duchi et al. 2008, projection onto the simplex).
+    """
+    a, b, c = map(abs, p)
+    xp = namespace(a)
+    above, most, least = a + b + c - 1, xp.maximum(xp.maximum(a, b), c), xp.minimum(xp.minimum(a, b), c)
+    return above, xp.maximum(xp.maximum(most - 1, (above - least) / 2), above / 3)
+
+
+def _octahedron(p: Points) -> Array:
+    xp, (above, way) = namespace(p[0]), _octahedron_ways(p)
+    outside = xp.sqrt(sum(xp.minimum(abs(a), abs(way)) ** 2 for a in p))
+    inside = (above - abs(above)) / 2 / math.sqrt(3)
+    return outside * (above > 0) + inside
+
+
+def _octahedron_slopes(p: Points) -> tuple[Array, ...]:
+    xp, (above, way) = namespace(p[0]), _octahedron_ways(p)
+    ways = [xp.where(above > 0, xp.minimum(abs(a), way), 1.0) for a in p]
+    length = xp.sqrt(sum(own * own for own in ways))
+    return _octahedron(p), *(xp.sign(a) * own / length for a, own in zip(p, ways, strict=True))
 
 
 GEOMETRIES: Final[dict[str, Geometry]] = {
@@ -148,10 +240,19 @@ GEOMETRIES: Final[dict[str, Geometry]] = {
     "triangle": _sectored(3, _UP, math.cos(math.pi / 3), 0.5),
     "star": _sectored(5, _UP, 0.381966),
     "pentagon": _sectored(5, _UP, math.cos(math.pi / 5)),
-    "sphere": Geometry(_sphere, 1.0, _sphere_slopes, _sphere_surface, thickness=2.0),
-    "torus": Geometry(
-        _torus, 0.0, _torus_slopes, _torus_surface, half=(1.0, _TUBE, 1.0), thickness=2.0 * _TUBE
+    "disc": Geometry(lambda p: namespace(p[0]).sqrt(p[0] * p[0] + p[1] * p[1]) - 1.0, 1.0),
+    "hexagon": _sectored(6, _UP, math.cos(math.pi / 6)),
+    "sphere": Geometry(_sphere, 1.0, _sphere_slopes, thickness=2.0),
+    "torus": Geometry(_torus, 0.0, _torus_slopes, (1.0, _TUBE, 1.0), 2.0 * _TUBE),
+    "box": Geometry(
+        lambda p: _corner(*(abs(a) - _CUBE for a in p)), _CUBE, _box_slopes, (_CUBE,) * 3, 2.0 * _CUBE
     ),
+    "cylinder": Geometry(
+        lambda p: _corner(*_cylinder_levels(p)), _CAN, _cylinder_slopes, (_CAN,) * 3, 2.0 * _CAN
+    ),
+    "cone": Geometry(_cone, 0.5, _cone_slopes, (_LEAN, 1.0, _LEAN), 1.0),
+    "capsule": Geometry(_capsule, _PILL, _capsule_slopes, (_PILL, 1.0, _PILL), 2.0 * _PILL),
+    "octahedron": Geometry(_octahedron, _CUBE, _octahedron_slopes, thickness=2.0 * _CUBE),
 }
 """All of them; their dimensions and meaning are in `scenelang.language.words.LEAVES`."""
 SECTORS: Final = {name: row.sectors for name, row in GEOMETRIES.items() if row.sectors is not None}

@@ -23,6 +23,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record
 from scenelang.compiler.spaces import Box, Space, Stage
 from scenelang.compiler.steps import Affine, Rows, Step, composed
@@ -42,15 +43,17 @@ ColourStep = tuple[str, *tuple[float, ...]]
 class Look(Record):
     """The material of an object: how it is lit, and the colour as written that operations start from.
 
-    ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture (``element``) stand
-    instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was written first first.
+    ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture or a gradient
+    (``element``) stand instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was
+    written first first. ``opacity`` is the share, in [0, 1], that it hides of what lies behind.
     """
 
     material: str
     colours: tuple[ColourStep, ...] = ()
     rgb: Triple = WHITE
-    element: Element | None = None
+    element: Element | Gradient | None = None
     texture: tuple[Affine, ...] = ()
+    opacity: float = 1.0
 
     def colour(self) -> Triple:
         """The colour of a constant material; of a texture, what white would become."""
@@ -59,12 +62,18 @@ class Look(Record):
     def folded(self) -> Look:
         """The same look in its normal form: of a constant material one colour."""
         if self.element is None:
-            return Look(self.material, rgb=self.colour()) if self.texture or self.colours else self
+            plain = Look(self.material, rgb=self.colour(), opacity=self.opacity)
+            return plain if self.texture or self.colours else self
         colours, moved = normal(self.colours), composed(self.texture)
         texture = (Affine(moved),) if self.texture else ()
         if (colours, texture) == (self.colours, self.texture):
             return self
-        return Look(self.material, colours, self.rgb, self.element, texture)
+        return Look(self.material, colours, self.rgb, self.element, texture, self.opacity)
+
+    @property
+    def plain(self) -> bool:
+        """True where an object hides all that lies behind it by one colour."""
+        return self.element is None and self.opacity == 1.0
 
     @property
     def moved(self) -> Rows:
@@ -226,9 +235,10 @@ class Graph(Record):
     space: Space
     stage: Stage | None = None
     elements: dict[str, Element] = field(default_factory=dict)
+    samples: int = 4  # of a pixel
 
     def rooted(self, root: Fold) -> Graph:
-        return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements)
+        return Graph(root, self.canvas, self.background, self.space, self.stage, self.elements, self.samples)
 
     def rows(self) -> list[Row]:
         """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""

@@ -10,7 +10,7 @@ the other); the outermost of a group comes first. Behind them lie, in the order 
 and frequency of a displacement (in space), the width of a blend (0 where it is the usual one, or none), the
 frame of the texture, the colour and the code of the material. The colour is the diagonal of a 3 x 4 matrix,
 row by row, whose other nine places, `OTHERS`, hold what is rarely written: how far the leaf grows, how thick
-its shell is, and the order of these (`Skin`) take the first, the second and the fourth; the others are free.
+its shell is, 1 - opacity, and the order of growing and shell (`Skin`); the others are free.
 
 Every part is a function of the scene alone, and each transformation acts on the vector linearly: an affine
 map multiplies its frame by its inverse; a warp shifts the warps of its group by one place and writes itself
@@ -44,7 +44,9 @@ Array = Any  # numpy array or torch tensor
 
 
 class Parts(NamedTuple):
-    """Parts of vectors (…, 64), each (…, its size) but ``width``, ``grow``, ``shell`` and ``order`` (…,)."""
+    """Parts of vectors (…, 64), each (…, its size), but ``width``, ``clear`` and what follows ``material``
+    (…,).
+    """
 
     code: Array
     one: Array
@@ -56,6 +58,7 @@ class Parts(NamedTuple):
     width: Array  # of the blend by which it joins
     texture: Array
     rgb: Array
+    clear: Array  # (…,) 1 - opacity
     material: Array
     grow: Array  # this and what follows as in `Skin`
     shell: Array
@@ -76,11 +79,9 @@ class Layout:
         colour = at.pop("colour").start
         at.pop("free", None)
         one, width = at.pop("one").start, at.pop("width").start
-        grow, shell, _, order, *_ = (colour + other for other in OTHERS)
-        rgb = slice(colour, colour + 12, 5)  # the diagonal
-        self.places = Parts(**at, one=one, width=width, rgb=rgb, grow=grow, shell=shell, order=order)
-        self.others = [colour + other for other in OTHERS]
-        """Places of `OTHERS` in vectors."""
+        grow, shell, clear, order, *_ = self.others = [colour + place for place in OTHERS]
+        own = {"rgb": slice(colour, colour + 12, 5), "clear": clear, "grow": grow, "shell": shell}
+        self.places = Parts(**at, **own, one=one, width=width, order=order)  # of colours the diagonal
         self.dimension, self.geometry = dimension, int(self.places.bulge.stop)
         self.outer, self.inner = sizes["outer"] // STRENGTHS, sizes["inner"] // STRENGTHS
         rows = range(dimension)
@@ -154,15 +155,19 @@ def lift_colours(
     codes: Sequence[Sequence[float]],
     layout: Layout = PLANE_LAYOUT,
     moved: Sequence[Rows] = (),
+    opacities: Sequence[float] = (),
 ) -> np.ndarray:
-    """Vectors (N, 64) in float64 of materials: colours (r, g, b) in [0, 1], and maps that move textures."""
+    """Vectors (N, 64) in float64 of materials: colours (r, g, b) in [0, 1], maps that move textures, and
+    opacities in [0, 1].
+    """
     count = len(colours)
     texture = [PLANE_LAYOUT.identity] * count  # textures lie in a plane
     for at, map in enumerate(moved):
         if map is not IDENTITY:
             texture[at] = tuple(inverse_frame(map, 2))
     rgb, material = (np.asarray(each, np.float64).reshape(count, -1) for each in (colours, codes))
-    return layout.pack(count, texture=texture, rgb=rgb, material=material)
+    clear = 1.0 - np.asarray(opacities or [1.0] * count, np.float64)
+    return layout.pack(count, texture=texture, rgb=rgb, clear=clear, material=material)
 
 
 Doubles = npt.NDArray[np.float64]

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.graph import (
     MOST_STEPS,
     WHITE,
@@ -18,6 +19,7 @@ from scenelang.compiler.graph import (
     Look,
     Move,
     colour_steps,
+    coloured,
     normal,
 )
 from scenelang.compiler.manifest import Manifest
@@ -43,7 +45,9 @@ from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
 from scenelang.language.scene import Brought, Scene
 from scenelang.language.words import (
     BLEND,
+    GRADIENTS,
     OWN_TRANSFORMS,
+    PAINTS,
     SCENES,
     STAGE,
     TEXTURES,
@@ -144,7 +148,7 @@ def lower(
         memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = WHITE if scene.background == "default" else scene.background
-    return Graph(root, scene.canvas, background, space, stage, brought.geometries)
+    return Graph(root, scene.canvas, background, space, stage, brought.geometries, scene.samples)
 
 
 def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics) -> None:
@@ -161,6 +165,9 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
     if manifest.white and scene.background not in (WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
+    if scene.samples != 4 and manifest.lifting != "exact":
+        help = "leave `samples` out, or draw with another model"
+        diagnostics.add("E0381", f"{model} takes four samples of a pixel and no others", place, help=help)
 
 
 Composite = Scene | schema.Group | schema.Boolean | schema.Chain
@@ -306,31 +313,52 @@ class _Lowering:
         known = self.looks.get(id(material))
         if known is not None:
             return known
-        name, manifest, element = material.name, self.manifest, None
+        name, manifest = material.name, self.manifest
+        element: Element | Gradient | None = None
         shading = material.shading or manifest.materials[0]
         if "." in name:
             element = self.element(name, self.brought.materials, material, "E0502")
         elif name in TEXTURES:
             element = self.element(name, load_textures(), material, "E0502")
+        elif name in GRADIENTS:
+            element = self.gradient(material)
         else:
             shading = name
             if material.shading is not None:
                 self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
         if shading not in manifest.materials:
-            offered = (*manifest.materials, *TEXTURES) if shading is name else manifest.materials
+            offered = (*manifest.materials, *PAINTS) if shading is name else manifest.materials
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
         colours = colour_steps(map(self.space.inked, material.ops))
         if len(normal(colours)) > MOST_STEPS and element is not None:
             self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
-        look = self.looks[id(material)] = Look(shading, colours, element=element, texture=moves)
+        if material.opacity != 1.0 and not manifest.translucent:
+            fact = f"model `{manifest.name}` has no `opacity`"
+            flat = "leave it out, or draw with another model"
+            help = flat if self.space.dimension == 2 else "in space mist is translucent: material volumetric"
+            self.say("E0380", fact, material, help)
+        look = self.looks[id(material)] = Look(
+            shading, colours, element=element, texture=moves, opacity=material.opacity
+        )
         return look
 
-    def texture_moves(self, material: schema.Material, element: Element | None) -> Iterator[Affine]:
+    def gradient(self, material: schema.Material) -> Gradient | None:
+        """The gradient of a material, with colours in the space that they are averaged in."""
+        if Gradient.kind not in self.manifest.elements:
+            fact = f"model `{self.manifest.name}` does not draw `{material.name}`, a gradient"
+            self.say("E0502", fact, material)
+            return None
+        inked = [op for op in map(self.space.inked, material.ops) if isinstance(op, schema.Stop)]
+        return Gradient(material.name, tuple([(op.offset, *coloured((("color", *op.rgb),))) for op in inked]))
+
+    def texture_moves(
+        self, material: schema.Material, element: Element | Gradient | None
+    ) -> Iterator[Affine]:
         """The moves of a texture; a constant material's are checked too, colours of space have none."""
         rows = IDENTITY
         for op in material.ops:
-            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue):
+            if isinstance(op, schema.Color | schema.Grayscale | schema.Hue | schema.Stop):
                 continue
             if element is not None and element.dimension == 3:
                 fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"

@@ -81,6 +81,11 @@ class Manifest:
         """Kinds of users' elements that it draws."""
         return _DRAWN.get(self.renderer, ()) if self.lifting == "exact" else ()
 
+    @property
+    def translucent(self) -> bool:
+        """True where it draws objects of any opacity."""
+        return self.renderer == "framed" and self.lifting == "exact"
+
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
         value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)

@@ -9,6 +9,7 @@ from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
 from operator import attrgetter, itemgetter
 from typing import Final, NamedTuple
 
+from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
 from scenelang.compiler import steps
 from scenelang.compiler.chain import LevelsError, split_levels
@@ -265,7 +266,7 @@ def _thickness(skin: Skin, row: Geometry | None) -> float:
 def _texels(leaf: Leaf, graph: Graph) -> Measures:
     """Texels to a pixel of the picture that an object wears, where they are densest."""
     element, affines = leaf.look.element, steps.composed(leaf.steps)
-    if element is None or element.dimension == 3:
+    if not isinstance(element, Element) or element.dimension == 3:
         return []
     a, b, c, _, d, e, f, *_ = steps.inverted(steps.compose(affines, leaf.look.moved))
     p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
@@ -398,7 +399,7 @@ def check_seen(graph: Graph, context: Context) -> Graph:
         _say(context, fact, cut, "let what is cut reach out of what cuts it, or what intersects meet")
     elif not seen:
         _say(context, *_unseen(graph, rows[0].leaf))
-    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.element is None:
+    elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.plain:
         cover = cover_of(last, graph.space)
         if cover is not None and covered(graph.window(), [cover]):
             fact = f"this `{last.geometry}` covers the whole canvas: the picture has one colour"

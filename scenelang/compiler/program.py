@@ -7,7 +7,8 @@ end column), all -1 where unknown, ``numbers`` I32 (N,) unless 1 to N. With elem
 header lists them, ``forms`` I32 (N,) has the index of each row's geometry, and ``element.0`` and so on are
 their bytes. Where some are materials it is format 3, with a table of paints (`Paint`) and ``worn`` I32 (N,),
 the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
-where the others would; with anything that needs one of the places `OTHERS` of its vectors format 5, likewise.
+where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
+places `OTHERS` of vectors, or ``samples`` other than 4, which the header then has, it is format 5.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from scenelang.assets import notebook
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import MOST_ELEMENT_BYTES, entry_of, read_elements
 from scenelang.assets.files import read_regular, write_output
+from scenelang.assets.gradient import Gradient, stops_fault
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 from scenelang.compiler.graph import MOST_STEPS, ColourStep
 from scenelang.compiler.groups import OPERATOR, token_fault
@@ -33,51 +35,76 @@ from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
 from scenelang.compiler.manifest import ALIASES, available, load_manifest
 from scenelang.compiler.spaces import Stage, read_stage, stage_data
 from scenelang.language.diagnostics import plural
+from scenelang.language.nodes import SAMPLES
 from scenelang.language.words import TOKENS
 
 GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
 STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
 """Operations on a colour and how many numbers each has; files have their index here."""
+_GRADED: Final = {-1: "linear", -2: "radial"}
+"""Gradients, in place of an index of elements."""
 
 
 class Paint(NamedTuple):
-    """An element, a picture or colours of space, and `STEPS` on its colours, clamped to [0, 1] after each."""
+    """A gradient or an element, a picture or colours of space, and `STEPS` on its colours, clamped to [0, 1]
+    after each.
+    """
 
-    element: Element
+    element: Element | Gradient
     steps: tuple[ColourStep, ...] = ()
 
 
 def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:
-    """Tensors of paints: `paints` I32 (K, 2), element and number of steps; `steps` F32 (S, 4), in order."""
+    """Tensors of paints: `paints` I32 (K, 2), element and number of steps; `steps` F32 (S, 4), in order; with
+    gradients, whose elements are -1 linear and -2 radial, `stops` F32 (S, 5), each behind its paint's index.
+    """
     kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
-    table = [(index[paint.element], len(paint.steps)) for paint in paints]
+    graded = {name: at for at, name in _GRADED.items()}
+    table = [
+        (
+            graded[paint.element.name] if isinstance(paint.element, Gradient) else index[paint.element],
+            len(paint.steps),
+        )
+        for paint in paints
+    ]
     steps = [
         (kinds.index(kind), *numbers, *[0.0] * (3 - len(numbers)))
         for paint in paints
         for kind, *numbers in paint.steps
     ]
-    return {
+    tensors = {
         "paints": np.array(table, np.int32).reshape(-1, 2),
         "steps": np.array(steps, np.float32).reshape(-1, 4),
     }
+    stops = [
+        (at, *stop)
+        for at, p in enumerate(paints)
+        if isinstance(p.element, Gradient)
+        for stop in p.element.stops
+    ]
+    return tensors | ({"stops": np.array(stops, np.float32)} if stops else {})
 
 
-def read_paints(
-    table: npt.NDArray[Any], steps: npt.NDArray[Any], elements: tuple[Element, ...]
-) -> tuple[Paint, ...]:
-    """The paints of a table, as `paint_tensors` writes it; raises TensorError where they do not agree."""
-    kinds, rows, result, first = list(STEPS), steps.tolist(), [], 0
+def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, ...]) -> tuple[Paint, ...]:
+    """The paints of tensors, as `paint_tensors` writes them; raises TensorError where they do not agree."""
+    kinds, rows, result, first = list(STEPS), tensors["steps"].tolist(), [], 0
+    stops: dict[float, list[Any]] = {}
+    for owner, *stop in tensors["stops"].tolist() if "stops" in tensors else ():
+        stops.setdefault(owner, []).append(tuple(stop))
     if not all(kind in range(len(kinds)) for kind, *_ in rows):
         raise TensorError("a paint with a step that this version does not know")
-    for at, count in table.tolist():
-        if not 0 <= at < len(elements) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
+    for row, (at, count) in enumerate(tensors["paints"].tolist()):
+        graded = Gradient(_GRADED[at], tuple(stops.pop(row, ()))) if at in _GRADED else None
+        if not (graded or 0 <= at < len(elements)) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
             raise TensorError("a paint of an element or of steps that are not listed")
         own = rows[first : first + count]
         named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
-        result.append(Paint(elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
+        result.append(Paint(graded or elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
         first += count
     if first != len(rows):
         raise TensorError("steps that no paint has")
+    if stops:
+        raise TensorError("stops that no gradient has")
     return tuple(result)
 
 
@@ -85,7 +112,11 @@ def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimensio
     """Say what is wrong with the paints of a Program of a dimension, None where nothing is."""
     known = set(elements)
     for element, steps in paints:
-        if not element.material or element not in known:
+        if isinstance(element, Gradient):
+            fault = stops_fault([stop[0] for stop in element.stops])
+            if fault is not None or not all(0.0 <= v <= 1.0 for stop in element.stops for v in stop):
+                return fault[1] if fault else "a stop whose colour is outside 0..1"
+        elif not element.material or element not in known:
             return f"a paint of `{element.name}`, which is not a material that is listed"
         if element.dimension > dimension:
             return f"a paint of dimension {element.dimension} in the plane"
@@ -138,6 +169,7 @@ class Program:
         forms: int32 (N,), index of a row's element, -1 for a geometry of the model. None stands for all -1.
         palette: paints of the rows.
         worn: int32 (N,), index of a row's paint, -1 for the colour of its vector. None stands for all -1.
+        samples: of a pixel, 4 or 16 on a regular grid.
 
     Raises:
         ProgramError: anything is not as above.
@@ -158,6 +190,7 @@ class Program:
     forms: npt.NDArray[np.int32] | None = field(default=None, repr=False)
     palette: tuple[Paint, ...] = field(default=(), repr=False)
     worn: npt.NDArray[np.int32] | None = field(default=None, repr=False)
+    samples: int = 4
 
     def __post_init__(self) -> None:
         count = len(self.objects)
@@ -202,6 +235,8 @@ class Program:
                 *settings,
                 *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
             )
+        if self.samples != 4:
+            settings = (*settings, "samples", self.samples)
         total = hashlib.sha256(repr(settings).encode())
         for array, kind in ((self.vectors, "<f4"), (self.tokens, "i1"), (self.bounds, "<f4")):
             total.update(array.astype(kind).tobytes())
@@ -228,10 +263,13 @@ class Program:
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
     @property
-    def uses_others(self) -> bool:
-        """True where a row needs a renderer that knows what stands in the places `OTHERS` of its vector."""
+    def newest(self) -> bool:
+        """True where it has what files of format 5 alone have: gradients, other samples, `OTHERS`."""
         layout = self._layout()
-        return layout is not None and bool(self.vectors[:, layout.others].any())
+        if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
+            return True
+        outlines = any(element.form == "outline" for element in self.elements)
+        return outlines or any(isinstance(paint.element, Gradient) for paint in self.palette)
 
     def _layout(self) -> Layout | None:
         """The layout of its vectors, None where their numbers are those of a learned lifting."""
@@ -290,10 +328,12 @@ def program_bytes(program: Program) -> bytes:
     if program.palette and program.worn is not None:
         header["format"] = 3
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
-    if program.uses_others:
+    if program.newest:
         header["format"] = NEWEST
     elif program.extended:
         header["format"] = GROUPED
+    if program.samples != 4:
+        header["samples"] = program.samples
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data
@@ -344,8 +384,10 @@ def _check_settings(program: Program) -> None:
     shares = colour is None or all(type(v) in (int, float) and 0 <= v <= 1 for v in colour)
     if not shares or (colour is not None and len(colour) != 3):
         raise ProgramError(f"a background of {colour!r}, which is not a colour")
-    if (stage := program.stage) is not None and (fault := stage.camera.fault() or stage.light.fault()):
+    if (stage := program.stage) is not None and (fault := stage.fault()):
         raise ProgramError(fault)
+    if type(program.samples) is not int or program.samples not in SAMPLES:
+        raise ProgramError(f"{program.samples!r} samples of a pixel, where 4 and 16 are allowed")
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
@@ -364,7 +406,12 @@ _LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
     "places": ("I32", (5,)),
 }
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
-_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {"paints": ("I32", (2,)), "steps": ("F32", (4,))}
+_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {
+    "paints": ("I32", (2,)),
+    "steps": ("F32", (4,)),
+    "stops": ("F32", (5,)),
+}
+_PAINTS = {"paints", "steps"}
 _HEADER: dict[str, Any] = {
     "background": list | None,
     "canvas": list,
@@ -399,11 +446,12 @@ def parse_program(data: bytes) -> Program:
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
-        palette = read_paints(tensors["paints"], tensors["steps"], elements) if "worn" in tensors else ()
+        palette = read_paints(tensors, elements) if "worn" in tensors else ()
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
-    if header.keys() - {"stage", "elements"} != _HEADER.keys() or not all(
+    newer = {"samples"} if header["format"] == NEWEST else set()
+    if header.keys() - {"stage", "elements", *newer} != _HEADER.keys() or not all(
         isinstance(header[k], _HEADER[k]) for k in _HEADER
     ):
         raise ProgramError("the header has missing, unknown or damaged fields")
@@ -437,6 +485,7 @@ def parse_program(data: bytes) -> Program:
         forms=tensors.get("forms"),
         palette=palette,
         worn=tensors.get("worn"),
+        samples=header.get("samples", 4),
     )
 
 
@@ -462,11 +511,13 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
 def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
     format = file.header["format"]
-    newer = ({"forms"} if format > 1 else set()) | ({"worn", *_TABLES} if format > 2 else set())
+    newer = ({"forms"} if format > 1 else set()) | ({"worn", *_PAINTS} if format > 2 else set())
     if format >= GROUPED:  # these are there where scenes have elements, and where materials are among them
-        newer &= file.tensors.keys() if "elements" in file.header else set()
+        newer &= file.tensors.keys() if "elements" in file.header or format == NEWEST else set()
         if "worn" in newer:
-            newer |= _TABLES.keys()
+            newer |= _PAINTS
+        if format > 4 and "worn" in newer:
+            newer |= {"stops"} & file.tensors.keys()
     if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
         raise TensorError(f"it holds other tensors than a program of format {format}")
     count = (*file.tensors["vectors"].shape, 0)[0]
@@ -476,7 +527,7 @@ def _count(file: TensorFile) -> int:
         kind, rest = (_LAYOUT | _OPTIONAL | _TABLES)[name]
         rows = count
         if name in _TABLES:
-            most = _MOST_STEPS if name == "steps" else MOST_OBJECTS
+            most = MOST_OBJECTS if name == "paints" else _MOST_STEPS
             rows = min((*tensor.shape, 0)[0], most)
         if tensor.type != kind or tensor.shape != (rows, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")

@@ -154,6 +154,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
 
     A row's effect stays within its leaf, and there the later union alone decides. A blend uses distances, so
     rows before the last blend stay, and groups with blends. A leaf drawn twice in one place is covered too.
+    What is translucent covers nothing.
     Before: STREAM. After: STREAM; the reference image keeps every pixel.
     """
     space = graph.space
@@ -178,7 +179,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
                 kept[index] = None
         elif hidden(leaf := link.node):
             kept[index] = None
-        elif link.op == "union":
+        elif link.op == "union" and leaf.look.opacity == 1.0:
             drawn.add((leaf.geometry, leaf.steps))
             disc = leaf.noted("cover", cover)
             if disc is not None and (len(covers) < _MOST or disc > covers[-1]):

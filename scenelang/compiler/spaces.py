@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
 from struct import pack, unpack
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 from scenelang.assets.records import Record
 from scenelang.compiler.geometries import GEOMETRIES
@@ -82,11 +82,6 @@ class Camera(Record):
     target: Triple = (0.0, 0.0, 0.0)
     fov_rad: float = 2.0 * atan(1.0 / 3.0)
 
-    def fault(self) -> str | None:
-        """Say why there is no picture from here, None where there is one."""
-        fault = camera_fault(self.eye, self.target, self.fov_rad)
-        return None if fault is None else fault[1]
-
     def axes(self) -> tuple[Triple, Triple, Triple]:
         """Unit vectors forward, right and up; seen straight along y, up is -z."""
         f = _unit(self.target[0] - self.eye[0], self.target[1] - self.eye[1], self.target[2] - self.eye[2])
@@ -101,10 +96,6 @@ class Light(Record):
     position: Triple = (2.5, 4.0, 3.0)
     power: float = 28.0
     rgb: Triple = (1.0, 1.0, 1.0)
-
-    def fault(self) -> str | None:
-        """Say why there is no such light, None where there is one."""
-        return light_fault(self.power)
 
 
 class Ground(Record):
@@ -124,45 +115,40 @@ class Stage(Record):
     zenith: Triple = ZENITH
     transparent: bool = False
 
+    def fault(self) -> str | None:
+        """Say why it shows nothing, None where it does."""
+        camera = camera_fault(self.camera.eye, self.camera.target, self.camera.fov_rad)
+        return light_fault(self.light.power) if camera is None else camera[1]
 
-def stage_data(stage: Stage) -> dict[str, Any]:
-    """A stage as JSON data; camera, light and ground are objects of their fields."""
-    data: dict[str, Any] = {name: getattr(stage, name) for name in Stage.__match_args__}
-    for name in ("camera", "light", "ground"):
-        part = data[name]
-        data[name] = None if part is None else {n: getattr(part, n) for n in part.__match_args__}
-    return data
+
+def stage_data(part: Record) -> dict[str, Any]:
+    """A stage, or a part of it, as JSON data: an object of its fields."""
+    names: tuple[str, ...] = part.__match_args__
+    values = [getattr(part, name) for name in names]
+    return {n: stage_data(v) if isinstance(v, Record) else v for n, v in zip(names, values, strict=True)}
 
 
 def read_stage(data: object) -> Stage:
     """Read a stage from JSON data, the inverse of `stage_data`; raises ValueError for other data."""
-    if not isinstance(data, dict) or data.keys() != set(Stage.__match_args__):
-        raise ValueError("fields missing or unknown")
-    parts: dict[str, Any] = {name: _read(name, data[name]) for name in data}
-    if parts["camera"] is None or parts["light"] is None or type(parts["transparent"]) is not bool:
-        raise ValueError("a part missing")
-    return Stage(**parts)
+    return cast("Stage", _read(Stage(), data, "stage"))
 
 
-_PARTS: dict[str, type[Record]] = {"camera": Camera, "light": Light, "ground": Ground}
-
-
-def _read(name: str, value: object) -> Any:
-    if name in _PARTS:
-        if value is None:
+def _read(usual: Any, value: Any, name: str) -> Any:
+    """A value of the kind that the default has."""
+    if isinstance(usual, Record):
+        names: tuple[str, ...] = usual.__match_args__
+        if name == "ground" and value is None:
             return None
-        if not isinstance(value, dict) or value.keys() != set(_PARTS[name].__match_args__):
+        if not isinstance(value, dict) or value.keys() != set(names):
             raise ValueError(f"`{name}` has fields missing or unknown")
-        return _PARTS[name](**{n: _read(n, v) for n, v in value.items()})
-    if name == "transparent":
-        return value
-    three = name not in ("fov_rad", "power", "y")
-    numbers = value if three else [value]
-    if not isinstance(numbers, list) or len(numbers) != (3 if three else 1):
+        return type(usual)(**{n: _read(getattr(usual, n), value[n], n) for n in names})
+    numbers = value if type(usual) is tuple else [value]
+    if not isinstance(numbers, list) or len(numbers) != (3 if type(usual) is tuple else 1):
         raise ValueError(f"`{name}` does not hold what it should")
-    if not all(type(v) in (int, float) and abs(v) <= MOST for v in numbers):
-        raise ValueError(f"`{name}` is not a finite number")
-    return tuple(map(float, numbers)) if three else float(numbers[0])
+    kinds = (bool,) if type(usual) is bool else (int, float)
+    if not all(type(v) in kinds and abs(v) <= MOST for v in numbers):
+        raise ValueError(f"`{name}` is not a finite number or a boolean")
+    return type(usual)(map(float, value) if type(usual) is tuple else value)
 
 
 def stage_of(scene: Scene) -> Stage:
@@ -239,7 +225,9 @@ class Space:
 
     def inked(self, op: scene.MaterialOp) -> scene.MaterialOp:
         """An operation of a material in the space that colours are averaged in; here linear, as light is."""
-        return op.model_copy(update={"rgb": decoded(op.rgb)}) if isinstance(op, scene.Color) else op
+        if isinstance(op, scene.Color | scene.Stop):
+            return op.model_copy(update={"rgb": decoded(op.rgb)})
+        return op
 
     def written(self, rgb: Triple) -> Triple:
         """The inverse of `inked` for a colour: as it is written."""

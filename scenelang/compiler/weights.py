@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import os
 from collections.abc import Mapping
@@ -60,6 +61,15 @@ def weights_path(name: str, digest: str = "") -> Path:
     return weights_folder(name, digest) / "weights.safetensors"
 
 
+def manifest_of(name: str, digest: str = "") -> Manifest:
+    """A model's manifest; of weights `replaced` since, with the first of its geometries, which these know."""
+    manifest = load_manifest(name)
+    if not replaced(digest):
+        return manifest
+    known = len(open_weights(shipped_weights(name, digest)).arrays["codes"])
+    return dataclasses.replace(manifest, geometries=manifest.geometries[:known])
+
+
 def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:
     """The bytes of a model's weights file or of ``path``; raises `ModelError` where it cannot be read."""
     try:
@@ -107,7 +117,7 @@ def read_facts(name: str) -> dict[str, Any]:
 @lru_cache(maxsize=8)
 def load_codes(name: str, digest: str = "") -> Codes:
     """Codes of a model's current weights or of those `replaced`; raises KeyError, OSError or `ModelError`."""
-    return codes_of(load_manifest(name), read_regular(weights_path(name, digest), MOST_BYTES))
+    return codes_of(manifest_of(name, digest), read_regular(weights_path(name, digest), MOST_BYTES))
 
 
 def codes_of(manifest: Manifest, data: bytes) -> Codes:

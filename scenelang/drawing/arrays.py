@@ -1,7 +1,8 @@
 """The dozen functions by which numpy arrays and torch tensors differ; all else is written as both have it.
 
 The field is written once, for a network whose `xp` is `NUMPY` here or `TORCH` (`arrays_torch.py`). Points lie
-along the last axis, M. Functions leave their arguments as they are; `put`, `add` and `unit` write in place.
+along the last axis, M. Functions leave their arguments as they are; `put`, `add`, `above` and `unit` write in
+place.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ class Arrays:
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     order: ClassVar[Any] = staticmethod(lambda x: x.argsort(kind="stable"))  # indices that sort (M,)
+    frozen: ClassVar[Any] = staticmethod(lambda x: x)  # the same numbers, without their gradients
     exp: ClassVar[Any] = np.exp
     log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos
@@ -77,6 +79,14 @@ class Arrays:
     def least(self, x: Array) -> Array:
         """The least of the first axis: (M,) of (R, M)."""
         return x.min(0)
+
+    def above(self, x: Array) -> Array:
+        """The parts above zero, in place."""
+        return np.maximum(x, 0.0, out=x)
+
+    def total(self, x: Array) -> Array:
+        """The sum over the first axis: (M,) of (R, M)."""
+        return np.add.reduce(x, 0)
 
     def unit(self, x: Array) -> Array:
         """Clamped to [0, 1], in place."""

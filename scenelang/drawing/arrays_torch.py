@@ -30,6 +30,7 @@ class Torch(Arrays):
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
     order = staticmethod(lambda x: x.argsort(stable=True))
+    frozen = staticmethod(Tensor.detach)
     exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin
     sqrt, floor = torch.sqrt, torch.floor
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
@@ -57,6 +58,12 @@ class Torch(Arrays):
 
     def least(self, x: Tensor) -> Tensor:
         return x.amin(0)
+
+    def above(self, x: Tensor) -> Tensor:
+        return x.relu_()
+
+    def total(self, x: Tensor) -> Tensor:
+        return x.sum(0)
 
     def unit(self, x: Tensor) -> Tensor:
         return x.clamp(0.0, 1.0)

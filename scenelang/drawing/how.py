@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Final, Literal, NamedTuple, TypedDict, cast, get_args
+from dataclasses import replace
+from typing import Final, Literal, NamedTuple, TypedDict, TypeVar, cast, get_args
 
 Backend = Literal["neural", "exact", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
-Samples = Literal["adaptive", "four", "quick", "one", "draft"]
+Samples = Literal["adaptive", "four", "quick", "one", "draft", "4", "16"]
+T = TypeVar("T")
 
 
 class RenderError(Exception):
@@ -44,7 +46,8 @@ class How(NamedTuple):
             elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
             hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
             with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
-            and ``"draft"`` may.
+            and ``"draft"`` may. Of a scene with ``samples(16)`` four are sixteen; ``"4"`` and ``"16"``, also
+            as numbers, are ``"adaptive"`` with so many, whatever the scene says.
     """
 
     backend: Backend = "neural"
@@ -54,14 +57,16 @@ class How(NamedTuple):
 
     def checked(self) -> How:
         """The same. Raises `ValueError` for other values, `RenderError` where two exclude each other."""
+        if type(self.samples) is int:
+            return self._replace(samples=cast("Samples", str(self.samples))).checked()
         for name, known in CHOICES.items():
             if (value := getattr(self, name)) not in known:
                 ways = ", ".join(f"`{way}`" for way in known)
                 raise ValueError(f"unknown {name} `{value}`; there are {ways}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"{self.threads} threads, where at least 1 is needed")
-        if self.backend == "reference" and self.samples != "adaptive":
-            raise RenderError("the reference always takes four samples a pixel")
+        if self.backend == "reference" and self.care["samples"] != "adaptive":
+            raise RenderError("the reference always takes all samples of a pixel")
         if self.backend == "exact" and self.device == "cuda":
             raise RenderError("formulas are computed by numpy, not by device cuda")
         return self
@@ -69,7 +74,21 @@ class How(NamedTuple):
     @property
     def care(self) -> Care:
         """The fields that renderers take."""
-        return cast("Care", {name: getattr(self, name) for name in Care.__annotations__})
+        given = self if self.count is None else self._replace(samples="adaptive")
+        return cast("Care", {name: getattr(given, name) for name in Care.__annotations__})
+
+    @property
+    def count(self) -> int | None:
+        """Number of a pixel's samples that overrides a scene's, if one does."""
+        return int(self.samples) if self.samples in ("4", "16") else None
+
+    def sampled(self, drawn: T) -> T:
+        """A Scene, a Graph or a Program with the number of samples that overrides its own."""
+        if self.count is None:
+            return drawn
+        if hasattr(drawn, "model_copy"):
+            return cast("T", drawn.model_copy(update={"samples": self.count}))
+        return replace(drawn, samples=self.count)  # type: ignore[type-var]
 
 
 DEFAULT: Final = How()
@@ -80,7 +99,7 @@ HELP: Final = {
     "device": "Device of torch; auto is CUDA where there is any, and numpy for solids or a small picture.",
     "threads": "Number of threads on the CPU.",
     "samples": "Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), "
-    "one, with hard edges, or one for each 2 x 2 pixels.",
+    "one, with hard edges, or one for each 2 x 2 pixels; or so many near outlines, whatever the scene says.",
 }  # The line of `--help` for each field of `How`
 
 

@@ -19,6 +19,7 @@ Array = npt.NDArray[Any]
 MOST_DB = 50.0
 UNCAPPED_DB = 100.0  # what no picture in single precision reaches
 GAP, TEXT = 4, 14  # pixels of a sheet, between pictures and for a line of text
+WIDE = 128  # pixels across from which on a picture's name and its figures stand on one line
 
 
 def over_white(picture: Array) -> Array:
@@ -85,8 +86,9 @@ def compare(picture: Array, reference: Array) -> dict[str, float]:
 
 
 def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
-    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3); if ``plain``,
-    eight times how far each channel is off in place of the map, which needs the extra ``eval``.
+    """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3), or two lines.
+
+    If ``plain``, eight times how far each channel is off in place of the map, which needs the extra ``eval``.
     """
     far = ("8 × difference", np.clip(8 * np.abs(picture - reference), 0, 1)) if plain else None
     parts = [
@@ -95,10 +97,13 @@ def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = 
         far or ("FLIP", flip_map(picture, reference, magma=True)),
     ]
     height, width = reference.shape[:2]
-    sheet = pillow.new("RGB", (3 * width + 2 * GAP, height + TEXT), "white")
+    top = TEXT if width >= WIDE else 2 * TEXT
+    sheet = pillow.new("RGB", (3 * width + 2 * GAP, top + height), "white")
     pen = ImageDraw.Draw(sheet)
+    pen.text((2, 1), f"network {label}" if top == TEXT else label, fill="black")
     for column, (name, part) in enumerate(parts):
         left = column * (width + GAP)
-        sheet.paste(np.asarray(part, np.float32).view(Image).to_pil(), (left, TEXT))
-        pen.text((left + 2, 1), f"{name} {label}" if column == 0 else name, fill="black")
+        sheet.paste(np.asarray(part, np.float32).view(Image).to_pil(), (left, top))
+        if column or top > TEXT:
+            pen.text((left + 2, 1 + top - TEXT), name, fill="black")
     return (np.asarray(sheet, np.float32) / 255).view(Image)

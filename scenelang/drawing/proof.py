@@ -16,13 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache, reduce
-from math import hypot, inf, sqrt
+from math import hypot, inf, isqrt, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import HARD, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
 from scenelang.compiler.graph import Graph, Look
@@ -41,7 +42,7 @@ from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
-from scenelang.drawing.exact.field import carry_back, colour_at, leaf_distance, placed_leaves
+from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -76,13 +77,17 @@ class Written(NamedTuple):
         """Leaf units by which points within a reach of the leaf, and ``far`` from the world's, may be off."""
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
-    def discoloured(self, reach: float, far: float) -> float:
-        """Greatest error of a channel of a texture's colours there."""
+    def mispainted(self, reach: float, far: float) -> float:
+        """Distance by which (u, v) of a texture may be off there."""
+        reach = min(reach, _seen(self.steps, far))
+        return _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
+
+    def discoloured(self, off: float) -> float:
+        """Greatest error of a channel of a texture's colours, apart from hard edges, where (u, v) is off."""
         if self.look.element is None:
             return 0.0
-        reach = min(reach, _seen(self.steps, far))
-        off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
-        off *= max(self.look.element.sizes)
+        element = self.look.element
+        off *= element.slope if isinstance(element, Gradient) else max(element.sizes)
         for kind, *numbers in self.look.colours:
             if kind == "hue":
                 off = 6 * (off + EPS * abs(numbers[0]))
@@ -165,14 +170,16 @@ def enclosed(
 ) -> tuple[Interval, Mask]:
     """Channels (K, B) that regions show, and which objects (P,) may change them.
 
-    Distances (P,) and colours (3, P) of the pairs hold wherever in the region; ``behind`` (K,) is shown where
-    nothing is. ``nest`` and ``groups`` are of streams with groups.
+    Distances (P,) and colours (3 or 4, P), as of `State`, of the pairs hold wherever in the region;
+    ``behind`` (K,) is shown where nothing is. ``nest`` and ``groups`` are of streams with groups.
     """
     count, pairs = len(meetings.columns), len(joins.tokens)
     shut, opened = np.empty((2, pairs), bool)
     if nest is None:
         nest = flat_nesting(meetings)
-    state, operands = _Exact.empty(NOTHING, count * nest.levels, np.float64), State(distance, colour)
+    channels = len(colour.low)
+    state = _Exact.empty(NOTHING, count * nest.levels, np.float64, channels)
+    operands = State(distance, colour)
 
     def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
         return state.join(places, operands.at(turn.part), joins.some(turn.part), turn.fresh)
@@ -185,9 +192,11 @@ def enclosed(
 
     nest.fold(count, shut, opened, pair, group)
     (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)
-    if len(behind) > 3:
-        first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
     back = behind[:, None]
+    if channels < len(behind):
+        first, last = (np.vstack([c, np.ones(count)]) for c in (first, last))
+    elif channels > len(behind):
+        first, last = first[:3] + (1.0 - last[3]) * back, last[:3] + (1.0 - first[3]) * back
     shown = Interval(
         np.where(high < 0, first, np.where(low < 0, np.minimum(first, back), back)),
         np.where(high < 0, last, np.where(low < 0, np.maximum(last, back), back)),
@@ -228,7 +237,13 @@ class _Exact(State):
             ends, shares = _chosen(fresh, (d, e), ends), _chosen(fresh, (1.0, 1.0), shares)
             closed, wide = closed & ~fresh, wide | fresh
         self.distance.low[columns], self.distance.high[columns] = ends
-        self.paint(columns, operand.colour, Interval(*shares))
+        through = None
+        if len(operand.colour.low) == 4:
+            least, most = (1.0 - side[3] for side in reversed(operand.colour))
+            over = union & ~fresh
+            through = Interval(least * (over & (b < 0.0)), most * (over & (a < 0.0)))
+            wide = wide & (through.high <= 0.0)
+        self.paint(columns, operand.colour, Interval(*shares), through)
         return closed, wide
 
 
@@ -350,8 +365,13 @@ class Stream:
         self.unknown = tuple(sorted(set(names) - self._known.keys()))
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
+        opacity = np.array([leaf.look.opacity for leaf in self._leaves])
+        self._opacity = opacity if (opacity < 1.0).any() else None
         self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
-        self._discoloured = [leaf.discoloured(within, far) for leaf, within in own]
+        self._mispainted = [leaf.mispainted(w, far) if leaf.look.element else 0.0 for leaf, w in own]
+        self._discoloured = [
+            leaf.discoloured(off) for leaf, off in zip(leaves, self._mispainted, strict=True)
+        ]
 
     def crowd(self, canvas: tuple[int, int]) -> float:
         """Mean number of objects that reach a place on the canvas."""
@@ -382,15 +402,24 @@ class Stream:
         )
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
-        """Colours (3, P) of objects at leaf coordinates, or in regions about them, which textures vary in."""
+        """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or in regions about them, which
+        textures vary in.
+        """
         low, high = self._plain[:, which], self._plain[:, which]
         for at in np.unique(which[self._painted[which]]).tolist():
             some, look = which == at, self._leaves[at].look
             low[:, some], high[:, some] = 0.0, 1.0
             if sampled:
-                seen, off = colour_at(look, carry_back(look.texture, q[:, some])).T, self._discoloured[at]
+                p = carry_back(look.texture, q[:, some])
+                seen, off = colour_at(look, p).T, self._discoloured[at] * np.ones(len(p[0]))
+                if isinstance(look.element, Gradient):
+                    s, torn = along(look.element, p[0], p[1]), self._mispainted[at] + HARD
+                    off[np.any([abs(s - edge) <= torn for edge in look.element.edges or (np.inf,)], 0)] = 1.0
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
-        return Interval(low, high)
+        if self._opacity is None:
+            return Interval(low, high)
+        opacity = self._opacity[which]
+        return Interval(*(np.vstack([side * opacity, opacity]) for side in (low, high)))
 
 
 def _worn(d: Interval, first: Floats, wall: Floats, last: Floats) -> Interval:
@@ -401,34 +430,41 @@ def _worn(d: Interval, first: Floats, wall: Floats, last: Floats) -> Interval:
     return Interval(low - (wall + last), high - (wall + last))
 
 
-SIDES = 16, 8, 4, 2, 1  # of regions, samples: two along a side of a pixel
+SIDES = 16, 8, 4, 2, 1  # of regions, samples
 FLAT = 5e-4  # of a channel: a region that is known so well is not cut
 
 
 class Band:
-    """Some rows of pixels, and what is ``shown`` there (rows, width, K), ``behind`` (K,) where nothing is."""
+    """Some rows of pixels, and what is ``shown`` there (rows, width, K), ``behind`` (K,) where nothing is;
+    ``along`` the side of a pixel there are so many samples.
+    """
 
-    def __init__(self, stream: Stream, canvas: tuple[int, int], rows: range, behind: Floats) -> None:
-        self._stream, self._behind, self._reach = stream, behind, stream.reach
+    def __init__(
+        self, stream: Stream, canvas: tuple[int, int], rows: range, behind: Floats, along: int = 2
+    ) -> None:
+        self._stream, self._behind, self._reach, self._along = stream, behind, stream.reach, along
         width, height = canvas
         self._grid = grid = raster(
-            (2 * width, 2 * height), range(2 * rows.start, 2 * rows.stop), largest=SIDES[0]
+            (along * width, along * height),
+            range(along * rows.start, along * rows.stop),
+            largest=SIDES[0],
         )
-        self._every = np.empty((2, grid.high // 2, grid.wide // 2, len(behind)))
+        self._every = np.empty((2, grid.high // along, grid.wide // along, len(behind)))
         self._every[:] = behind
         self.shown = Interval(*self._every[:, : len(rows), :width])
         pairs = grid.reached(stream.frames, self._reach)
-        for side in SIDES[:-1]:
+        for side in [side for side in SIDES if side >= along]:
             columns, shown, pairs = self._looked(pairs, side)
             known = (shown.high - shown.low).max(0) <= FLAT
             x, y = grid.place(columns[known], side)
             for every, values in zip(self._every, shown, strict=True):
-                blocks = every.reshape(grid.high // side, side // 2, -1, side // 2, len(behind))
+                pixels = side // along
+                blocks = every.reshape(grid.high // side, pixels, -1, pixels, len(behind))
                 blocks[y // side, :, x // side] = values.T[known, None, None]
             done = np.zeros(grid.wide * grid.high // side**2, bool)
             done[columns[known]] = True
             pairs = pairs.take(~done[pairs.block])
-            if side > 2:
+            if side > along:
                 pairs = pairs.split(grid.wide // side, 2)
         self._pixels = pairs  # pixels that are drawn by their samples
         self._sampled(exactly=False)
@@ -469,13 +505,14 @@ class Band:
 
     def _sampled(self, *, exactly: bool) -> None:
         """Ask for the samples of pixels that they have to tell, and take their means."""
-        wide = self._grid.wide // 2
-        columns, shown, _ = self._looked(self._pixels.split(wide, 2), 1, exactly)
+        along = self._along
+        wide = self._grid.wide // along
+        columns, shown, _ = self._looked(self._pixels.split(wide, along), 1, exactly)
         x, y = self._grid.place(columns, 1)
         for every, values in zip(self._every, shown, strict=True):
             flat = every.reshape(-1, len(self._behind))
             flat[self._pixels.block] = self._behind
-            np.add.at(flat, y // 2 * wide + x // 2, (values.T - self._behind) / 4)
+            np.add.at(flat, y // along * wide + x // along, (values.T - self._behind) / along**2)
 
 
 BAND = 1 << 17  # pixels at a time, at least a row of the largest regions
@@ -510,7 +547,8 @@ def prove_image(
     rows = -(-max(1, int(BAND / width / (1 + stream.crowd(graph.canvas) / CROWD))) // SIDES[0]) * SIDES[0]
     for top in range(0, height, rows):
         part = range(top, min(top + rows, height))
-        band, drawn = Band(stream, graph.canvas, part, behind), picture[part.start : part.stop]
+        band = Band(stream, graph.canvas, part, behind, isqrt(graph.samples))
+        drawn = picture[part.start : part.stop]
         result = _off(drawn, band.shown)
         if redraw and (bad := result > PROVED).any():
             band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))

@@ -73,11 +73,11 @@ def draw(
     """Draw a Program by the library that fits, as of `Run`; raises as `render`. ``place`` is ``"numpy"`` or a
     torch device; by default numpy for solids and small pictures, else ``how.device``.
     """
-    run = {"threads": how.threads, **run, **how.care}
+    run, program = {"threads": how.threads, **run, **how.care}, how.sampled(program)
     if place is None:
         from scenelang.drawing.small import choose_drawer
 
-        drawer = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+        drawer = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
         place = drawer.library if drawer.library == "numpy" else how.device
     if place == "numpy":
         from scenelang.drawing.small import draw_small
@@ -125,7 +125,7 @@ def render(
     way = How(**how).checked()
     result, spans = given(program_or_scene, size, way.backend)
     if isinstance(result, Scene):
-        return draw_exact(result, spans=spans, progress=progress)
+        return draw_exact(way.sampled(result), spans=spans, progress=progress)
     return draw(result, way, progress=progress).image
 
 
@@ -198,12 +198,12 @@ def prove(
     program = compile_scene(scene, spans=spans, diagnostics=result, after=graphs.__setitem__)
 
     return prove_drawn(
-        graphs, program.model, lambda: draw(program, way).image if image is None else image, redraw
+        graphs, program.model, lambda: draw(program, way).image if image is None else image, redraw, way
     )
 
 
 def prove_drawn(
-    graphs: Mapping[str, Graph], model: str, draw: Callable[[], Image], redraw: bool
+    graphs: Mapping[str, Graph], model: str, draw: Callable[[], Image], redraw: bool, how: How = DEFAULT
 ) -> tuple[Image, Proof]:
     """A picture and its proof, by the graphs after `lower` and each pass; raises as `prove`, before drawing.
     The stream that is proved has all objects, so that no pass that drops some has to be believed.
@@ -215,7 +215,8 @@ def prove_drawn(
     keep_memory()
     try:
         known_errors(manifest := load_manifest(model))
-        return prove_image(graphs["lower"], graphs["flatten"], manifest, draw(), redraw=redraw)
+        lowered, stream = (how.sampled(graphs[name]) for name in ("lower", "flatten"))
+        return prove_image(lowered, stream, manifest, draw(), redraw=redraw)
     except (ProofError, ModelError) as error:
         raise RenderError(str(error)) from None
 
@@ -268,6 +269,7 @@ def outputs_of(
     wanted = tuple([name for name in wanted if name != "proof"])
     if not wanted:
         return Outputs()
+    drawn = how.sampled(drawn)
     if isinstance(drawn, Scene):
         return _exact(drawn, wanted, spans)
     return _neural(drawn, wanted, how)

@@ -37,8 +37,8 @@ class Load(NamedTuple):
     objects: int  # rows of the Program
     pixels: int  # of the canvas
     meetings: float  # pixels within objects' bounds, summed over objects; of solids, network evaluations
-    # pixels around those bounds, summed likewise; of solids, evaluations for a pixel times pixels of the
-    # canvas's shorter side, as outlines and shadows grow with both
+    # pixels around those bounds, summed likewise, for each four samples; of solids, evaluations for a pixel
+    # times pixels of the canvas's shorter side, as outlines and shadows grow with both
     outline: float
 
     def row(self, skip: bool) -> tuple[float, float, float, float, float]:
@@ -60,7 +60,7 @@ def load_of(program: Program) -> Load:
     half = np.array([width, height], np.float64) / 2
     corners = np.clip(program.bounds.astype(np.float64).reshape(-1, 2, 2) * unit, -half, half)
     size = corners[:, 1] - corners[:, 0]  # (N, 2)
-    outline = np.minimum(2 * size.sum(1), 2 * half.sum())
+    outline = np.minimum(2 * size.sum(1), 2 * half.sum()) * (program.samples / 4)
     return Load(len(program), width * height, float(size.prod(1).sum()), float(outline.sum()))
 
 

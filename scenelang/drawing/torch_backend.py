@@ -111,7 +111,8 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
                 drawing = drawing or draw_objects(network, program, skip=skip, **run)
                 drawing.image.credit = credit_of(program.elements)
                 return drawing
-            if samples != "adaptive":
+            if samples != "adaptive" or program.samples != 4:
+                samples = samples if program.samples == 4 else str(program.samples)
                 raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
             torch.set_num_threads(run["threads"] or 1)
             return draw_whole(network, program, progress=progress)

@@ -8,7 +8,7 @@ import os
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, Final
 
 from lsprotocol import types
@@ -207,7 +207,7 @@ _MOST_ITEMS: Final = 8
 
 def dimensions_of(document: Document) -> tuple[int, ...]:
     """The dimension of the model that a document names; both where it names none."""
-    for stmt in document.file.statements:
+    for stmt in document.heads:
         if isinstance(stmt, tree.Model) and isinstance(stmt.name, tree.String):
             with suppress(KeyError):
                 return (load_manifest(stmt.name.value).dimension,)
@@ -300,10 +300,10 @@ _SYMBOLS: Final = {
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
     """Proposals at an offset."""
-    names = document.names
+    names = document.names_at(offset)
     holders = ("let", "argument", "loop", "param")
     values = frozenset(s.name for s in names.visible(offset) if s.kind in holders)
-    cursor = cursor_at(document.tokens, offset, values)
+    cursor = cursor_at(document.tokens_to(offset), offset, values)
     start, end = cursor.start, cursor.end
     if cursor.inside == "string":
         start += 1
@@ -356,9 +356,9 @@ class _Maker:
             yield from self._members(before)
         elif not before:
             yield from self._statements()
-        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before == ("for", "("):
+        elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before[-2:] == ("for", "("):
             return
-        elif before[:2] == ("for", "(") and len(before) == 3:
+        elif before[-3:-1] == ("for", "("):
             yield Item("in", Kind.Keyword, "in ")
         elif before[0] == "import":
             if len(before) == 2:
@@ -376,8 +376,11 @@ class _Maker:
             return
         elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
             return  # the name of a parameter
-        elif not _ends_operand(last):
+        elif (loops := _begins_item(before)) or not _ends_operand(last):
             yield from self._expressions()
+            for word, inside in (("for", "${1:i} in ${2:0..<5}"), ("if", "${1:condition}")) if loops else ():
+                about = words.KEYWORDS[word].text
+                yield Item(word, Kind.Keyword, f"{word} ({inside}) ", "n", about=about, snippet=True)
         elif ".." in before or "..<" in before:
             yield Item("step", Kind.Keyword, "step ")
 
@@ -410,7 +413,7 @@ class _Maker:
             yield from (self._keyword(word) for word in ("let", "for", "if"))
             return
         if kind == "file" and not block.nested:
-            given = {type(stmt) for stmt in self.document.file.statements}
+            given = {type(stmt) for stmt in self.document.heads}
             if tree.Version not in given:
                 yield self._keyword("nsg", "c")
             if tree.Model not in given:
@@ -446,9 +449,11 @@ class _Maker:
 
     def _materials(self, constant: Collection[str]) -> Iterator[Item]:
         """Materials, and files that may hold others."""
-        for name in sorted({*constant, *words.TEXTURES}):
+        for name in sorted({*constant, *words.PAINTS}):
             text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
-            yield Item(name, Kind.EnumMember, text, "a", kind, words.MATERIALS.get(name, ""), True)
+            if name in words.GRADIENTS:
+                text, kind = f"{name} {{ stop(0, ${{1:#d33}}); stop(1, ${{2:#33d}}); }}", "gradient"
+            yield Item(name, Kind.EnumMember, text, "a", kind, (words.MATERIALS | words.PAINTS)[name], True)
         for symbol in self.names.visible(self.cursor.offset):
             stmt = symbol.node
             zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None
@@ -531,6 +536,8 @@ class _Maker:
             if element.material == worn:
                 name, about = element.name, element.told()
                 yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
+            if element.size is not None and not worn:
+                yield Item(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
@@ -543,6 +550,19 @@ class _Maker:
 def _calls(known: dict[str, words.Word], rank: str, kind: Kind = Kind.Method) -> Iterator[Item]:
     for _, word in sorted(known.items()):
         yield Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
+
+
+def _begins_item(before: tuple[str, ...]) -> bool:
+    """Test whether an item of a vector begins behind tokens, perhaps with a loop."""
+    heads, closed = [""], ""
+    for last, text in pairwise(("", *before)):
+        if text in ("(", "["):
+            heads.append(last + text)
+        elif text in (")", "]"):
+            closed = heads.pop() if heads[1:] else ""
+    if not heads[-1].endswith("[") or _ends_operand(heads[-1][:-1]):
+        return False
+    return before[-1] in ("[", ",") or (before[-1] == ")" and closed in ("for(", "if("))
 
 
 def _ends_operand(text: str) -> bool:

@@ -218,10 +218,10 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
 def find_symbol(docs: Workspace, document: Document, name: str, offset: int) -> Symbol | None:
     """The fn or module of a plain or dotted name at an offset."""
     alias, _, rest = name.partition(".")
-    symbol = document.names.scope_at(offset).find(alias)
+    symbol = document.names_at(offset).scope_at(offset).find(alias)
     if rest and symbol is not None and isinstance(symbol.node, tree.Import):
         library = docs.imported(document, symbol.node.path.value)
-        symbol = library.names.top.symbols.get(rest) if library is not None else None
+        symbol = library.names.top.names.get(rest) if library is not None else None
         if symbol is None or not symbol.is_exported:
             return None
     return symbol if symbol is not None and symbol.kind in ("fn", "module") else None
@@ -229,7 +229,7 @@ def find_symbol(docs: Workspace, document: Document, name: str, offset: int) -> 
 
 def signature_help(docs: Workspace, document: Document, offset: int) -> types.SignatureHelp | None:
     """The signature of the call around an offset, with the argument that the offset is in."""
-    cursor = cursor_at(document.tokens, offset)
+    cursor = cursor_at(document.tokens_to(offset), offset)
     callee = find_callee(docs, document, cursor)
     if callee is None or cursor.call is None or cursor.inside == "comment":
         return None
@@ -265,7 +265,7 @@ def word_of(symbol: Symbol) -> Word:
         head = f"module {called}"
     elif isinstance(node, tree.Fn):
         head = f"fn {called} = {_short(node.body.span.text)}"
-    elif isinstance(node, tree.For):
+    elif isinstance(node, tree.For | tree.ForItem):
         head = f"for ({symbol.name} in {_short(node.iterable.span.text)})"
     elif isinstance(node, tree.Parameter):
         head = f"(parameter) {_short(node.span.text)}"
@@ -281,7 +281,7 @@ def _short(text: str) -> str:
 
 def comment_above(symbol: Symbol) -> str:
     """The lines of comment right above a definition, or behind it on its line."""
-    if isinstance(symbol.node, tree.Parameter | tree.For):
+    if isinstance(symbol.node, tree.Parameter | tree.For | tree.ForItem):
         return ""
     # The node's own text: it may be of an older version than the document's.
     span = symbol.node.span

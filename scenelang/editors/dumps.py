@@ -13,6 +13,7 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
@@ -115,11 +116,12 @@ def dump(graph: Graph) -> str:
 
 def look_text(look: Look, space: Space) -> str:
     """A colour; or a texture with its moves and the operations on its colours."""
+    clear = "" if look.opacity == 1.0 else f" opacity({look.opacity:.6g})"
     if look.element is None:
-        return hex_text(space.written(look.colour()))
+        return hex_text(space.written(look.colour())) + clear
     moves = [move_text(Move(step), PLANE) for step in look.texture]
     steps = [f"{kind}({' '.join(f'{v:.6g}' for v in numbers)})" for kind, *numbers in look.colours]
-    return " ".join([look.element.name, *moves, *steps])
+    return " ".join([look.element.name, *moves, *steps]) + clear
 
 
 def move_text(move: Move, space: Space) -> str:
@@ -180,6 +182,7 @@ def graph_data(graph: Graph) -> dict[str, Any]:
         "canvas": list(graph.canvas),
         "background": None if graph.background is None else list(graph.background),
         "dimension": graph.space.dimension,
+        **({} if graph.samples == 4 else {"samples": graph.samples}),
         **({} if graph.stage is None else {"stage": stage_data(graph.stage)}),
         "root": root,
     }
@@ -193,6 +196,8 @@ def _node(node: Node) -> dict[str, Any]:
             "material": node.look.material,
             "rgb": list(node.look.colour()),
         }
+        if node.look.opacity != 1.0:
+            look["opacity"] = node.look.opacity
         if (element := node.look.element) is not None:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
@@ -203,7 +208,9 @@ def _node(node: Node) -> dict[str, Any]:
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
-def _texture(element: Element) -> dict[str, Any]:
+def _texture(element: Element | Gradient) -> dict[str, Any]:
+    if isinstance(element, Gradient):
+        return {"name": element.name, "stops": [list(stop) for stop in element.stops]}
     return {"name": element.name, "digest": element.digest}
 
 
@@ -227,6 +234,7 @@ def program_data(program: Program) -> dict[str, Any]:
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),
+        **({} if program.samples == 4 else {"samples": program.samples}),
         **({} if program.stage is None else {"stage": stage_data(program.stage)}),
         "model": program.model,
         "weights": program.weights,

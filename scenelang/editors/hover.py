@@ -78,8 +78,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             node = next((n for n in _calls(document, use) if n.name.text == text), None)
             return about and about + _node_facts(document, node)
         case "material":
-            textures = dict.fromkeys(words.TEXTURES, "A texture, in flat and in solid scenes.")
-            return _offered(f"material {text}", text, words.MATERIALS | textures)
+            return _offered(f"material {text}", text, words.MATERIALS | words.PAINTS)
         case "model":
             try:
                 return _model(load_manifest(text))
@@ -105,7 +104,8 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
     if zoo is None:
         return ""
-    result = [element for element in zoo.elements if element.name == name and element.material == worn]
+    names = (name, name.removesuffix("_size"))  # what an element says has its size
+    result = [element for element in zoo.elements if element.name in names and element.material == worn]
     parts = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
         parts.append(f"```text\n{name}(): {told(zoo.groups[name])}\n```")

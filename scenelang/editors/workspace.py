@@ -10,7 +10,7 @@ import os
 import re
 import threading
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path, PureWindowsPath
@@ -224,6 +224,8 @@ class Settings(Record):
 
 
 MAX_FILES: Final = 2000  # of a workspace that are searched for references and symbols
+_WHOLE: Final = ("E0104", "E0105", "E0106", "E0115", "E0120", "E0121")  # mistakes that concern a whole text
+_MOST_MISTAKES: Final = 50  # with more of them a text is parsed as a whole
 MAX_TEXT: Final = 2_000_000
 """Characters of a text that is parsed; its tree, tokens and places take a hundred times as many bytes."""
 
@@ -240,6 +242,7 @@ class Document:
     checked: Checked | None = None  # of the last evaluation that ended, perhaps of an older text
     edits: list[Edit] = field(default_factory=list)  # since that
     semantic: list[Diagnostic] = field(default_factory=list)  # of that, at their current places
+    _known: list[tree.Kept] = field(default_factory=list)  # sound statements that are as they were parsed
 
     @property
     def name(self) -> str:
@@ -258,15 +261,34 @@ class Document:
     def names(self) -> Names:
         return Names(self.file)
 
+    def names_at(self, offset: int) -> Names:
+        """The names in sight of an offset."""
+        return Names(self._file(lambda span: span.start <= offset <= span.end), offset)
+
     @property
+    def heads(self) -> list[tree.Stmt]:
+        """The statements at top level, perhaps at places of an older text."""
+        return [s.stmt if isinstance(s, tree.Kept) else s for s in self._parsed[0].statements]
+
+    @cached_property
     def file(self) -> tree.File:
-        return self._parsed[0]
+        return self._file(lambda span: True)
+
+    def _file(self, deep: Callable[[Span], bool]) -> tree.File:
+        file = self._parsed[0]
+        read = [s.moved(deep(s.span)) if isinstance(s, tree.Kept) else s for s in file.statements]
+        return tree.File(file.span, tuple(read))
 
     @cached_property
     def tokens(self) -> Tokens:
         """The tokens as they stand in the text; none of one that is too long."""
+        return self.tokens_to(len(self.text))
+
+    def tokens_to(self, offset: int) -> Tokens:
+        """The tokens up to the end of an offset's line."""
         source = SourceFile(self.source.name, "") if self._is_too_long else self.source
-        return scan(source, Report(source))
+        stop = source.text.find("\n", offset)
+        return scan(source, Report(source), stop if stop >= 0 else len(source.text))
 
     @property
     def syntax(self) -> tuple[Diagnostic, ...]:
@@ -286,7 +308,7 @@ class Document:
             nowhere = Span(self.source, 0, 0)
             return tree.File(nowhere, ()), (Diagnostic("E0324", message, nowhere, help=help),)
         result = Diagnostics()
-        return parse(self.source, result), tuple(result)
+        return parse(self.source, result, self._known), tuple(result)
 
     def change(self, change: types.TextDocumentContentChangeEvent) -> None:
         """Take over one change of the client's."""
@@ -297,11 +319,28 @@ class Document:
         else:
             text, edit = change.text, difference(self.text, change.text)
         source = SourceFile(self.source.name, text)
+        self._known = self._left(edit, source)
         self.source = source
         self.edits.append(edit)
         self.semantic = [moved for d in self.semantic if (moved := _carried(d, edit, source)) is not None]
-        for name in ("_parsed", "lines", "names", "tokens"):
+        for name in ("_parsed", "file", "lines", "names", "tokens"):
             self.__dict__.pop(name, None)
+
+    def _left(self, edit: Edit, source: SourceFile) -> list[tree.Kept]:
+        """The sound statements that an edit does not touch, at their places after it."""
+        known: Sequence[tree.Stmt] = self._known
+        if "_parsed" in self.__dict__:
+            bad = [d.span for d in self.syntax if d.span is not None and d.code not in _WHOLE]
+            sound = len(bad) == len(self.syntax) <= _MOST_MISTAKES
+            known = self.__dict__.get("file", self._parsed[0]).statements if sound else ()
+            known = [s for s in known if all(b.start > s.span.end or b.end < s.span.start for b in bad)]
+        result = []
+        for stmt in known:
+            if stmt.span.end < edit.start or stmt.span.start > edit.old_end:
+                delta = edit.delta if stmt.span.start > edit.old_end else 0
+                span = Span(source, stmt.span.start + delta, stmt.span.end + delta)
+                result.append(tree.Kept(span, stmt.stmt if isinstance(stmt, tree.Kept) else stmt))
+        return result
 
     def before(self, offset: int) -> int | None:
         """The offset of a place in the text that was checked; None where it has been edited since."""
@@ -435,7 +474,7 @@ class Workspace:
         library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
         if library is None:
             return None
-        result = library.names.top.symbols.get(use.text.partition(".")[0])
+        result = library.names.top.names.get(use.text.partition(".")[0])
         return (library, result) if result is not None and result.is_exported else None
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:

@@ -62,6 +62,7 @@ class _Parts(NamedTuple):
     geometry: Tensor  # geometry vectors, and behind them how far leaves grow and their shells (N, G + 2, n)
     colours: Tensor  # (N, 3, n)
     widths: Tensor  # of the blends by which objects join (N, n)
+    clear: Tensor  # 1 - opacities (N, n)
     behind: Tensor  # colour of the background (3, n)
 
 
@@ -78,7 +79,7 @@ class SoftPlane:
         self.canvas, self.count = program.canvas, count
         tokens = program.tokens.astype(np.int64)
         self.cell = [part[tokens][..., None] for part in network.cell_weights()]
-        self.smooth = torch.from_numpy(tokens == SMOOTH)
+        self.smooth, self.union = (torch.from_numpy(tokens == token) for token in (SMOOTH, UNION))
         parts = layout.unpack(program.vectors)
         self.late = torch.from_numpy(parts.order % 2).to(dtype)[:, None]  # of leaves that grow behind a shell
         self.widest = float(parts.width[tokens == SMOOTH].max(initial=BLEND))
@@ -102,6 +103,7 @@ class SoftPlane:
             if any(part.geometry[:, at : at + STRENGTHS].any() for part in (still, moving))
         ]
         self.skinned = any(bool(part.geometry[:, -2:].any()) for part in (still, moving))
+        self.clear = bool(still.clear.any() or moving.clear.any())
         moving.colours.mul_((still.colours >= 0) & (still.colours <= 1))
         still.colours.clamp_(0.0, 1.0)
         pieces = torch.split(self.points, max(1, PAIRS // self.count), 1)
@@ -119,23 +121,24 @@ class SoftPlane:
         colours = vectors[:, self.layout.places.rgb] * self.albedo[:, :, None]
         at = self.layout.places
         geometry = vectors[:, [*range(self.layout.geometry), at.grow, at.shell]]
-        return _Parts(geometry, colours, vectors[:, at.width], behind)
+        return _Parts(geometry, colours, vectors[:, at.width], vectors[:, at.clear], behind)
 
     def _changes(self, p: Tensor, still: _Parts, moving: _Parts) -> tuple[Tensor, Tensor]:
         """Colours (3, M) of points (2, M), and their derivatives (3, M, n)."""
         count = p.shape[1]
         with torch.no_grad():
             d = self._distances(p, still.geometry)
-        shape, each = (3, self.count, count), (d, still.colours.swapaxes(0, 1), still.widths)
+        shape, each = (3, self.count, count), (d, still.colours.swapaxes(0, 1), still.widths, still.clear)
         leaves = [part.expand(shape).clone().requires_grad_() for part in each]
         leaves.append(still.behind.expand(3, count).clone().requires_grad_())
         shown = self._fold(*leaves)
-        by_distance, by_colour, by_width, by_behind = torch.autograd.grad(
+        by_distance, by_colour, by_width, by_clear, by_behind = torch.autograd.grad(
             shown.sum(), leaves, materialize_grads=True
         )
         slopes = by_behind[..., None] * moving.behind[:, None]
         slopes += by_colour.swapaxes(1, 2) @ moving.colours.swapaxes(0, 1)
         slopes += by_width.swapaxes(1, 2) @ moving.widths
+        slopes += by_clear.swapaxes(1, 2) @ moving.clear
         near = by_distance.any(0).any(0).nonzero()[:, 0]
         own = still.geometry.expand(-1, -1, len(near)).clone().requires_grad_()
         (by_number,) = torch.autograd.grad(self._distances(p[:, near], own).sum(), own)
@@ -172,19 +175,29 @@ class SoftPlane:
             d = torch.where(shell > 0, d.abs() - shell / 2, d) - self.late * grow
         return d * _scale(*maps)
 
-    def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, behind: Tensor) -> Tensor:
-        """Channels (3, M) of points, by distances, colours and widths (3, N, M) and what is behind (3, M)."""
+    def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, clear: Tensor, behind: Tensor) -> Tensor:
+        """Channels (3, M) of points, by distances, colours, widths and 1 - opacities (3, N, M) and what is
+        behind (3, M).
+        """
         lines, bias, candidate, bump = self.cell
         state = d.new_full((3, 1, d.shape[2]), EMPTY * self.widest / BLEND)
-        colour = torch.zeros_like(state)
+        colour = torch.zeros_like(torch.cat([state] * (1 + self.clear), 1))  # and coverage behind it
+        slope = self.network.read_slope.exp() / 4
         for i in range(self.count):
             own, narrow = d[:, i : i + 1], BLEND / widths[:, i : i + 1] if self.smooth[i] else 1.0
             levels = bias[i] + (lines[i, :, 0] * own + lines[i, :, 1] * state) * narrow
+            given = colours[:, i : i + 1]
+            if self.clear:
+                through = clear[:, i : i + 1]
+                given = torch.cat([given, torch.ones_like(given)], 1) * (1 - through)
+                if self.union[i]:
+                    given = given + (0.5 - state * slope).clamp(0.0, 1.0) * through * colour
             state, colour = self.network.update(
-                levels, candidate[i, :, 0] * own, bump[i, 0] / narrow, state, colour, colours[:, i : i + 1]
+                levels, candidate[i, :, 0] * own, bump[i, 0] / narrow, state, colour, given
             )
-        coverage = (0.5 - state * (self.network.read_slope.exp() / 4)).clamp(0.0, 1.0)
-        shown: Tensor = (colour * coverage)[:, 0] + (1 - coverage[:, 0]) * behind
+        coverage = (0.5 - state * slope).clamp(0.0, 1.0)
+        hidden = coverage * colour[:, 1:] if self.clear else coverage
+        shown: Tensor = (colour * coverage)[:, 0] + (1 - hidden[:, 0]) * behind
         return shown
 
 
@@ -225,6 +238,7 @@ def alike(a: Program, b: Program) -> bool:
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
     plain = (a.background is None) == (b.background is None)
     named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
+    plain = plain and a.samples == b.samples
     return tables and plain and named
 
 

@@ -1,4 +1,4 @@
-"""Elements learned from meshes, drawings and pictures."""
+"""Elements learned from meshes, drawings and pictures, and fonts."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ from scenelang.assets.element_file import (
     read_zoo,
 )
 from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
+from scenelang.assets.font import Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
 from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
 from scenelang.drawing.exact.originals import MOST_OF, said
 from scenelang.inverse.colours import fit_colours
+from scenelang.inverse.fonts import MOST_OF_FONT, ranges_of, read_font
 from scenelang.inverse.grids import NEAR, THIN, Rung, fit
 from scenelang.inverse.sandbox import (
     CPU_S,
@@ -63,8 +65,11 @@ class LearnOptions:
     parts: bool | None = None
     # root mean square off of a mesh's colours that is near enough, of channels in [0, 1]
     color_error: float | None = None
+    letters: str | None = None  # of fonts: ranges of code points, as `ranges_of` reads them
 
     def __post_init__(self) -> None:
+        if self.letters is not None:
+            ranges_of(self.letters)
         for text in (self.license, self.source):
             if text is not None and not is_said(text):
                 raise ValueError("a license or a source is at most 2,000 characters, all of them printable")
@@ -77,6 +82,7 @@ class LearnOptions:
         asked: dict[str, str | float | None]
         asked = {"sign": None if self.sign == "auto" else self.sign, "max_error": self.max_error}
         asked |= {"texels": None if self.texels == TEXELS else self.texels, "color_error": self.color_error}
+        asked |= {"letters": self.letters}
         asked |= {"parts": None if self.parts is None else "apart" if self.parts else "together"}
         return {key: value for key, value in (said | asked).items() if value is not None}
 
@@ -84,16 +90,19 @@ class LearnOptions:
         """Return whether files of a suffix become textures."""
         return self.pictures == "texture" and suffix.lower() in outline.MOST_OF_PICTURE
 
-    def made(self, element: Element, about: dict[str, str | float]) -> bool:
-        """Return whether making an element again would give the same one."""
+    def made(self, element: Element | Font, about: dict[str, str | float]) -> bool:
+        """Return whether making an element or a font again would give the same one."""
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
+        known = element.material or element.size is not None  # early files do not say
         ended = not cut_short or said.get("steps") == self.steps
-        return ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
+        return known and ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
-ASKED: Final = frozenset(("license", "source", "sign", "max_error", "texels", "color_error", "parts"))
+ASKED: Final = frozenset(
+    ("license", "source", "sign", "max_error", "texels", "color_error", "parts", "letters")
+)
 
 
 class _Job(NamedTuple):
@@ -121,6 +130,10 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     """
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
+    if suffix in MOST_OF_FONT:
+        read = read_font(data, request["about"], options.letters, lambda said: job.say(f"{name}: {said}"))
+        job.say(f"{name}: {', '.join(read.notes)}")
+        return element_file_bytes([], font=read.font)
     if options.paints(suffix):
         return element_file_bytes([_texture(data, name, job)])
     brought = originals.brought(data, suffix, name, request["files"], options.sign, options.parts)
@@ -152,6 +165,9 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
         )
 
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
+    centre = [f"{x:.6g}" for x in shape.centre]
+    job.say(f"{name}: {name}_size is {shape.size:.6g}, the file's ({', '.join(centre)}) is the origin")
+    job = job._replace(about=job.about | {"size": shape.size, "centre": " ".join(centre)})
     element, tried = fit(
         shape,
         name,
@@ -246,9 +262,13 @@ def learn_files(
     def asked() -> Iterator[tuple[int, Asked]]:
         for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
             with noted(index):
-                known = _named(held).get((called, options.paints(file.suffix)))
+                font = file.suffix.lower() in MOST_OF_FONT
+                known = held.font if font else _named(held).get((called, options.paints(file.suffix)))
                 result = _request(file, called, options, known)
-                if isinstance(result, Element):
+                if isinstance(result, Font):
+                    say(f"{called}: made before of this file")
+                    results[index] = replace(ElementFile.of(()), geometries=result.glyphs, font=result)
+                elif isinstance(result, Element):
                     say(f"{called}: made before of this file")
                     groups = {called: held.groups[called]} if called in held.groups else {}
                     results[index] = replace(ElementFile.of([result]), groups=groups)
@@ -301,6 +321,9 @@ def names_of(
     names = [f"_{word}" if word[:1].isdigit() else word for word in names]
     if name is not None:
         names = [name] * len(files)
+    fonts = [file for file in files if Path(file).suffix.lower() in MOST_OF_FONT]
+    if len(fonts) > 1:
+        raise ValueError(f"`{fonts[0]}` and `{fonts[1]}` are fonts, of which a file of elements has one")
     owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
     for file, word in zip(files, names, strict=True):
         if not (word.isascii() and word.isidentifier()):
@@ -330,18 +353,19 @@ def _writable(out: str | os.PathLike[str]) -> ElementFile:
 
 
 def _named(zoo: ElementFile) -> dict[tuple[str, bool], Element]:
-    return {(element.name, element.material): element for element in zoo.elements}
+    letters = {} if zoo.font is None else zoo.font.glyphs
+    return {(e.name, e.material): e for e in zoo.elements if e.material or e.name not in letters}
 
 
 def _written(
     out: str | os.PathLike[str], held: ElementFile, made: Iterable[tuple[str, ElementFile]]
 ) -> ElementFile:
     """Write a file's elements and the new ones, which replace those of the same names and their groups."""
-    elements, groups = _named(held), dict(held.groups)
+    elements, groups, font = _named(held), dict(held.groups), held.font
     for name, zoo in made:
         groups.pop(name, None)
-        elements, groups = elements | _named(zoo), groups | zoo.groups
-    data = element_file_bytes(elements.values(), groups)
+        elements, groups, font = elements | _named(zoo), groups | zoo.groups, zoo.font or font
+    data = element_file_bytes(elements.values(), groups, font)
     try:
         result = read_zoo(data)
     except TensorError as error:
@@ -350,14 +374,18 @@ def _written(
     return result
 
 
-def _request(path: Path, name: str, options: LearnOptions, known: Element | None) -> Asked | Element:
-    """The request of a file to the sandbox and its bytes, or the element made of it before."""
-    suffix = path.suffix.lower()
-    if suffix not in MOST_OF:
-        raise FitError(f"not one of {', '.join(MOST_OF)}")
-    data = read_regular(path, MOST_OF[suffix])
-    if len(data) > MOST_OF[suffix]:
-        raise FitError(f"more than {MOST_OF[suffix] >> 20:,} MiB")
+def _request(
+    path: Path, name: str, options: LearnOptions, known: Element | Font | None
+) -> Asked | Element | Font:
+    """The request of a file to the sandbox and its bytes, or what was made of it before."""
+    suffix, sizes = path.suffix.lower(), MOST_OF | MOST_OF_FONT
+    if suffix in (".woff", ".woff2"):
+        raise FitError("a packed font for the web: unpack it to .ttf or .otf first")
+    if suffix not in sizes:
+        raise FitError(f"not one of {', '.join(sizes)}")
+    data = read_regular(path, sizes[suffix])
+    if len(data) > sizes[suffix]:
+        raise FitError(f"more than {sizes[suffix] >> 20:,} MiB")
     about = options.about(path, data)
     if known is not None and options.made(known, about):
         return known
@@ -380,6 +408,7 @@ def learn(
     sign: Sign = "auto",
     pictures: Literal["texture", "outline"] = "texture",
     parts: bool | None = None,
+    letters: str | None = None,
     cluster: str | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Elements:
@@ -389,7 +418,7 @@ def learn(
     reused.
 
     Args:
-        files: meshes, drawings and pictures, or one.
+        files: meshes, drawings, pictures and fonts, or one.
         out: a file of elements, which may exist.
         name: of the one element; by default that of the file.
         max_error: how far off is near enough, by default what the command says.
@@ -399,6 +428,7 @@ def learn(
         sign: rule for the inside of a mesh.
         pictures: kind of element that a picture becomes: a texture or, by its outline, a geometry.
         parts: true makes each part of a file an element; if left out, only those of drawings.
+        letters: ranges of code points to take of a font, ``"U+20-7E, U+3B1"``; by default all.
         cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
             the extra ``dask``, and what makes elements on each.
         say: called with lines of the report; with a cluster, for each file when it is done.
@@ -414,7 +444,7 @@ def learn(
     """
     options = LearnOptions(
         sign=sign, max_error=max_error, budget_s=budget_s, steps=steps,
-        license=license, source=source, pictures=pictures, parts=parts,
+        license=license, source=source, pictures=pictures, parts=parts, letters=letters,
     )  # fmt: skip
     listed = [files] if isinstance(files, str | os.PathLike) else files
     learn_files(listed, out, options, name=name, cluster=cluster, say=say)

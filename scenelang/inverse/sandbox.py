@@ -37,7 +37,7 @@ sandbox.serve(learn.make)
 _SENDS: Final = ("socket.connect", "socket.getaddrinfo", "socket.sendto")
 _REFUSED: Final = (*_SENDS, "subprocess.", "os.system", "os.exec")
 # packages that make elements besides ours; other versions may give other bytes
-LIBRARIES: Final = ("contourpy", "libigl", "pillow", "scipy", "svgelements", "trimesh")
+LIBRARIES: Final = ("contourpy", "libigl", "pillow", "scipy", "svgelements", "trimesh", "uharfbuzz")
 Hear = Callable[..., None]
 Asked = tuple[dict[str, Any], bytes]  # a request, and the bytes that it is about
 

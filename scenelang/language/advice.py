@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
-from scenelang.language import foreign, library, tree
+from scenelang.language import foreign, library, scopes, tree
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Edit, Fix, Label, SourceFile, Span, did_you_mean, listing
 from scenelang.language.reporter import Advice, Reporter
@@ -113,7 +113,6 @@ def drawn(place: Place) -> str:
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"
 
 
-VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
 
 
@@ -166,6 +165,9 @@ def unknown_member(
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
+        element = exported.scope.names.get(rest.removesuffix("_size"))
+        if element is not None and element.kind == "element" and rest.endswith("_size"):
+            return f"its file does not say how large `{rest[:-5]}` was; learn it again", None
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
         shape = foreign.SHAPES.get(rest.lower()) if library.holds(exported.source) else None
         if help is None and shape is not None:
@@ -184,8 +186,8 @@ def _last(name: tree.Name) -> Span:
 
 def report_early(name: tree.Name, place: Place) -> bool:
     """Report a name that a later line defines, if one does."""
-    scopes = place.scope.outwards()
-    later = next((scope.later[name.text] for scope in scopes if name.text in scope.later), None)
+    around = place.scope.outwards()
+    later = next((scope.later[name.text] for scope in around if name.text in scope.later), None)
     if later is not None:
         message, labels = f"`{name.text}` is used before its line", (Label(later, "defined here"),)
         help = f"move the definition of `{name.text}` above this line"
@@ -227,7 +229,7 @@ def _advice(name: tree.Name, place: Place, call: tree.CallExpr | None) -> Advice
     if text in ("x", "y", "z") and before.replace(" ", "").endswith("axis="):
         return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))
     own = {*FUNCTIONS} if call else {*CONSTANTS, *ANIMATED, "true", "false"}
-    kinds = ("fn",) if call else (*VALUES, "import")
+    kinds = ("fn",) if call else (*scopes.VALUES, "import")
     if not call and lower in foreign.VALUES:
         return foreign.VALUES[lower], None
     here = None if call else foreign.NAMES.get(lower)
@@ -248,6 +250,8 @@ def report_problem(
     at = problem.operand
     operand = operands[at] if at is not None and at < len(operands) else None
     place = operand.span if operand else span
+    if problem.letter is not None and isinstance(operand, tree.String):
+        place = operand.character(problem.letter)
     if (place.source, place) in report.reported:
         return
     help, fix = problem.help, None

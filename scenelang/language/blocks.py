@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
-from scenelang.language.advice import VALUES
 from scenelang.language.builder import Action, Builder, ChainBuilder, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span, did_you_mean, listing
 from scenelang.language.expressions import (
     VARIES,
+    Code,
     bind,
+    computed,
     condition,
     entering,
     guarded,
@@ -24,9 +25,10 @@ from scenelang.language.library import SpanMap, Written
 from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
 from scenelang.language.nodes import blend_width
 from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object, objects_of
+from scenelang.language.scopes import VALUES, head_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
-from scenelang.language.values import POISON, Problem, RangeValue, Vec, number, show, unexpected
-from scenelang.language.words import KEYWORDS, LANGUAGE, NEWER, SETTINGS
+from scenelang.language.values import MAX_VECTOR, POISON, Problem, RangeValue, Vec, number, show, unexpected
+from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
 
 
 class Body(NamedTuple):
@@ -222,17 +224,87 @@ def _items(value: Any) -> Any:
     raise unexpected("a range or a vector", value, advice)
 
 
-def prepare_for(stmt: tree.For, place: Place) -> Action | None:
+def _prepare_loop(stmt: tree.For | tree.ForItem, place: Place) -> tuple[Callable[[Env], Any], int, Place]:
+    """How to get what a loop runs over, the slot of its variable, and the place inside it."""
     get = prepare(stmt.iterable, place).run
     loop = place.inner()._replace(repeated=True)
     slot = loop.scope.slots.add()
     define(stmt.variable, Binding("loop", stmt.variable.span, loop.scope.slots, slot), loop)
+    check = guarded(place, _items, stmt.iterable.span, (), item_steps=0)
+    return lambda env: check(get(env)), slot, loop
+
+
+def prepare_vector(expr: tree.Vector, place: Place) -> Code:
+    """Prepare a vector; with loops in it the items of each run are counted before it is made."""
+    if not any(isinstance(item, tree.ForItem | tree.IfItem) for item in expr.items):
+        return computed(place, _vector, expr.span, expr.items, item_steps=0)
+    fills = [_prepare_item(item, place) for item in expr.items]
+    make = guarded(place, lambda items: Vec(tuple(items)), expr.span, (), item_steps=0)
+
+    def run(env: Env) -> Any:
+        items: list[Any] = []
+        return make(items) if all(fill(env, items) for fill in fills) else POISON
+
+    return Code(run)
+
+
+def _vector(*items: Any) -> Vec:
+    for index, item in enumerate(items):
+        if item.__class__ is RangeValue:
+            raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
+    return Vec(items)
+
+
+def _prepare_item(item: tree.Expr, place: Place) -> Callable[[Env, list[Any]], bool]:
+    """Prepare how an item adds its values to those of a vector; false where one of them is poison."""
+    session, file = place.session, place.file
+    if isinstance(item, tree.IfItem):
+        test, then = condition(item.condition, place).run, _prepare_item(item.body, place)
+
+        def chosen(env: Env, out: list[Any]) -> bool:
+            value = test(env)
+            return then(env, out) if value is True else value is False
+
+        return chosen
+    if isinstance(item, tree.ForItem):
+        values_of, slot, loop = _prepare_loop(item, place)
+        name, before = item.variable.span, file.weight
+        fill = _prepare_item(item.body, loop)
+        weight, file.weight = 2 + (file.weight - before) // 2, before + HALF_STEPS[tree.For]
+
+        def repeated(env: Env, out: list[Any]) -> bool:
+            values = values_of(env)
+            for value in values if values is not POISON else ():
+                env[slot] = value
+                if session.watch is not None:
+                    session.watch(name, value)
+                session.tick(weight, item.iterable.span)
+                if not fill(env, out):
+                    return False
+                if len(out) > MAX_VECTOR:  # which is reported where the vector is made
+                    break
+            return values is not POISON
+
+        return repeated
+    get, check = prepare(item, place).run, guarded(place, _vector, item.span, (item,), item_steps=0)
+
+    def one(env: Env, out: list[Any]) -> bool:
+        value = get(env)
+        if value is POISON or (value.__class__ is RangeValue and check(value) is POISON):
+            return False
+        out.append(value)
+        return True
+
+    return one
+
+
+def prepare_for(stmt: tree.For, place: Place) -> Action | None:
+    values_of, slot, loop = _prepare_loop(stmt, place)
     actions, weight = prepare_inner(stmt.body, loop.inner())
     session, span = place.session, stmt.iterable.span
-    check = guarded(place, _items, span, (), item_steps=0)
 
     def action(env: Env, out: Builder) -> None:
-        values = check(get(env))
+        values = values_of(env)
         if values is POISON:
             return
         for value in values:
@@ -472,8 +544,8 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
     child, makes = stmt.child, isinstance(stmt.child, tree.Node)
     if isinstance(child, tree.Call):
         binding = lookup(child.name, place)
-        moves = child.name.text in LANGUAGE or (child.name.text in NEWER and binding is None)
-        makes = not moves and (binding is None or binding.kind not in VALUES)
+        head = head_of(child, binding, place.kind)
+        makes = head == "leaf" or (head == "own" and binding is not None and binding.kind not in VALUES)
     if not makes:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)

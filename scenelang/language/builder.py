@@ -38,13 +38,14 @@ def make(cls: type[M], fields: dict[str, Any]) -> M:
 class Builder:
     """Contents of a node, from its block's statements; ``moved`` is the place of the first transform."""
 
-    __slots__ = ("children", "material", "material_span", "moved", "transforms")
+    __slots__ = ("children", "material", "material_span", "moved", "properties", "transforms")
 
     def __init__(
         self, material: Material | None = None, material_span: Span | None = None, moved: Span | None = None
     ) -> None:
         self.children: list[Any] = []  # nodes, or the links of a chain
         self.transforms: list[Any] = []  # or the operations of a material
+        self.properties: dict[str, tuple[Span, Any]] = {}  # of a material: place and value, None if wrong
         self.material, self.material_span, self.moved = material, material_span, moved
 
     def add(self, node: Any) -> None:

@@ -8,18 +8,9 @@ from dataclasses import field
 from typing import Any, Final, Literal
 
 from scenelang.assets.records import Record
-from scenelang.language import tree
+from scenelang.language import scopes, tree
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, SourceFile, Span, removal
-from scenelang.language.words import (
-    ANIMATED,
-    CONSTANTS,
-    FUNCTIONS,
-    NEWER,
-    OPERATIONS,
-    SETTINGS,
-    STAGE,
-    TRANSFORMS,
-)
+from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, LANGUAGE, OPERATIONS, TRANSFORMS
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -50,7 +41,7 @@ class Symbol(Record, frozen=False):
     name: str
     kind: Kind
     span: Span
-    node: tree.Stmt | tree.Parameter
+    node: tree.Stmt | tree.Parameter | tree.ForItem
     scope: Scope
     since: int  # the offset from which on it is in sight
     owner: Symbol | None = None  # the fn or module that it is a parameter of
@@ -68,18 +59,9 @@ class Scope(Record, frozen=False):
     start: int
     end: int
     parent: Scope | None = None
-    symbols: dict[str, Symbol] = field(default_factory=dict)
+    names: dict[str, Symbol] = field(default_factory=dict)
 
-    def outwards(self) -> Iterator[Scope]:
-        """This scope, and those around it."""
-        scope: Scope | None = self
-        while scope is not None:
-            yield scope
-            scope = scope.parent
-
-    def find(self, name: str) -> Symbol | None:
-        """Definition that a name stands for here."""
-        return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
+    outwards, find = scopes.outwards, scopes.find
 
 
 class Use(Record, frozen=False):
@@ -97,7 +79,9 @@ class Use(Record, frozen=False):
 class Names:
     """All names of a file."""
 
-    def __init__(self, file: tree.File) -> None:
+    def __init__(self, file: tree.File, at: int | None = None) -> None:
+        """Find all names, or those in sight of an offset: of statements elsewhere what they define."""
+        self._at = at
         self.source: SourceFile = file.span.source
         self.top = Scope(0, file.span.end + 1)
         self.uses: list[Use] = []
@@ -133,27 +117,27 @@ class Names:
         """The definitions in sight of an offset, inner ones first, hidden ones left out."""
         seen: set[str] = set()
         for scope in self.scope_at(offset).outwards():
-            for name, symbol in scope.symbols.items():
+            for name, symbol in scope.names.items():
                 if name not in seen and symbol.since <= offset:
                     seen.add(name)
                     yield symbol
 
     def exported(self) -> list[Symbol]:
         """Definitions that files that import this one see."""
-        return [symbol for symbol in self.top.symbols.values() if symbol.is_exported]
+        return [symbol for symbol in self.top.names.values() if symbol.is_exported]
 
     def _define(
         self,
         name: tree.Name,
         kind: Kind,
-        node: tree.Stmt | tree.Parameter,
+        node: tree.Stmt | tree.Parameter | tree.ForItem,
         scope: Scope,
         since: int,
         owner: Symbol | None = None,
     ) -> Symbol:
         symbol = Symbol(name.text, kind, name.span, node, scope, since, owner)
         self.symbols.append(symbol)
-        scope.symbols.setdefault(symbol.name, symbol)
+        scope.names.setdefault(symbol.name, symbol)
         self._add(name.span, name.text, "name", symbol).defines = True
         return symbol
 
@@ -169,16 +153,23 @@ class Names:
                 which: Kind = "fn" if isinstance(stmt, tree.Fn) else "module"
                 bodies.append((stmt, self._define(stmt.name, which, stmt, scope, scope.start)))
         for stmt in statements:
-            if not isinstance(stmt, tree.Fn | tree.Module):
+            near = isinstance(stmt, tree.Let | tree.Param | tree.Import) or self._is_near(stmt, scope)
+            if near and not isinstance(stmt, tree.Fn | tree.Module):
                 self._walk(stmt, scope, kind)
         for definition, symbol in bodies:
             around = self._scope(definition.name.span.end, definition.span.end, scope)
             for param in definition.params:
-                if param.default is not None:
+                if param.default is not None and self._is_near(definition, scope):
                     self._walk(param.default, around, "group")
                 formal = self._define(param.name, "argument", param, around, param.span.end, symbol)
                 symbol.params.append(formal)
-            self._walk(definition.body, around, "group")
+            if self._is_near(definition, scope):
+                self._walk(definition.body, around, "group")
+
+    def _is_near(self, stmt: tree.Stmt, scope: Scope) -> bool:
+        """Test whether what is inside a statement is looked at."""
+        at, span = self._at, stmt.span
+        return at is None or scope is not self.top or span.start <= at <= span.end
 
     def _walk(self, node: Any, scope: Scope, kind: str) -> None:
         """Note the names in a statement or an expression, in a block of some kind."""
@@ -190,15 +181,18 @@ class Names:
                 if isinstance(node.name, tree.String):
                     self._add(node.name.span, node.name.value, "model")
             case tree.Let() | tree.Param():
-                self._children(node, scope, kind)
+                if self._is_near(node, scope):
+                    self._children(node, scope, kind)
                 which: Kind = "let" if isinstance(node, tree.Let) else "param"
                 self._define(node.name, which, node, scope, node.span.end)
             case tree.Import():
                 self._add(node.path.span, node.path.value, "path")
                 self._define(node.alias, "import", node, scope, node.span.end)
-            case tree.For():
+            case tree.For() | tree.ForItem():
                 self._walk(node.iterable, scope, kind)
-                loop = self._scope(node.body.span.start, node.span.end, scope)
+                # An item may be about to be written, or to go on.
+                more = isinstance(node, tree.ForItem) + isinstance(node.body, tree.BadExpr)
+                loop = self._scope(node.body.span.start, node.span.end + more, scope)
                 self._define(node.variable, "loop", node, loop, node.body.span.start)
                 self._walk(node.body, loop, kind)
             case tree.If():
@@ -254,16 +248,14 @@ class Names:
 
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
-        role: Role | None = None
-        own = scope.find(name) if name in STAGE or name in NEWER else None
-        if own is not None and (own.kind == "module" or stmt.args is None):
-            role = None
-        elif name in SETTINGS:
-            role = "setting"
-        elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
-            role = "operation"
-        elif name in TRANSFORMS:
-            role = "transform"
+        own = None if name in LANGUAGE else scope.find(name)
+        meaning = scopes.head_of(stmt, own, kind)
+        role: Role | None = "setting" if meaning == "setting" else None
+        if meaning == "move":
+            moves = name in TRANSFORMS and (kind != "material" or name not in OPERATIONS)
+            role = "transform" if moves else "operation"
+        elif meaning == "leaf" and own is not None:
+            role = "geometry"
         span = stmt.name.span
         head = self._add(span, name, role) if role else self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)

@@ -177,6 +177,7 @@ class Evaluation:
             "model": self._model or settings.model,
             "canvas": settings.canvas,
             "background": settings.background,
+            "samples": settings.samples,
             **{word: settings.stage.get(word, "default") for word in STAGE},
             "animation": settings.animation,
             "elements": tuple(session.elements.values()),

@@ -9,12 +9,13 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from scenelang.language import foreign, limits, tree, values, words
-from scenelang.language.advice import VALUES, member_advice, report_problem, unknown, unknown_member
+from scenelang.language.advice import member_advice, report_problem, unknown, unknown_member
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
 from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX_DEPTH, MAX_NESTING
 from scenelang.language.reporter import Reporter
+from scenelang.language.scopes import VALUES
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs
 from scenelang.language.values import (
     COMPONENTS,
@@ -182,16 +183,6 @@ def prepare_number(expr: tree.Number, place: Place) -> Code:
         place.report.error("E0306", "the number is too large", expr.span)
         return POISONED
     return constant(_LITERALS[expr.unit](value) if expr.unit else value)
-
-
-def prepare_vector(expr: tree.Vector, place: Place) -> Code:
-    def vector(*items: Any) -> Vec:
-        for index, item in enumerate(items):
-            if item.__class__ is RangeValue:
-                raise Problem("E0301", "a range inside a vector", "write it without brackets", index)
-        return Vec(items)
-
-    return computed(place, vector, expr.span, expr.items, item_steps=0)
 
 
 def prepare_range(expr: tree.Range, place: Place) -> Code:
@@ -368,6 +359,8 @@ def value_of(name: tree.Name, binding: Binding, place: Place) -> Code:
     slots, slot, report, span = binding.slots, binding.slot, place.report, name.span
     if binding.needs is not None:
         place.session.needs.on.append(binding.needs)
+    if slots is None and binding.known:
+        return constant(binding.value)
     if binding.kind == "poison" or slots is None:
         return POISONED
     if slots is place.scope.slots:
@@ -406,6 +399,7 @@ def lookup(name: tree.Name, place: Place) -> Binding | None:
 def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, help: str | None = None) -> None:
     """Report a name that stands for something else than is wanted here."""
     kinds = {"fn": "a function", "module": "a module", "import": "an imported file", "element": "a geometry"}
+    kinds |= {"text": "a module", "width": "a function"}
     message = f"`{name.text}` is {kinds.get(binding.kind, 'a value')}, not {wanted}"
     key = "E0213", message, place.file.source, binding.span
     place.report.error_once(key, "E0213", message, name.span, help=help, labels=binding.labels())
@@ -414,7 +408,8 @@ def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, hel
 def _as_value(name: tree.Name, binding: Binding, place: Place) -> Code:
     if binding.kind in VALUES or binding.kind == "poison":
         return value_of(name, binding, place)
-    wrong_kind(name, binding, place, "a value", f"call it: {name.text}(…)" if binding.kind == "fn" else None)
+    called = binding.kind in ("fn", "width")
+    wrong_kind(name, binding, place, "a value", f"call it: {name.text}(…)" if called else None)
     return POISONED
 
 
@@ -552,6 +547,8 @@ def prepare_call(expr: tree.CallExpr, place: Place) -> Code:
         return _call_builtin(expr, given, place)
     if binding.kind == "poison":
         return POISONED
+    if binding.kind == "width":
+        return binding.value(expr, given, place) or POISONED
     if binding.kind != "fn":
         help = "a module makes objects and is called as a statement" if binding.kind == "module" else None
         wrong_kind(name, binding, place, "a function", help)

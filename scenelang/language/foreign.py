@@ -11,7 +11,7 @@ def _each_word(meanings: Mapping[str, str]) -> dict[str, str]:
     return {word: meaning for words, meaning in meanings.items() for word in words.split()}
 
 
-_NO_GRADIENTS: Final = "an object has one colour; for a gradient draw stripes whose colours are mix(a, b, t)"
+_GRADIENTS: Final = "a gradient is a material: material linear { stop(0, #d33); stop(1, #33d); }, or radial"
 
 _UNIT: Final = "glue the unit to the number: 30deg; what is computed is multiplied by 1deg"
 FUNCTIONS: Final = _each_word(
@@ -57,7 +57,7 @@ FUNCTIONS: Final = _each_word(
         "hsl": "write hsv(h, s, v)",
         "deg rad turn radians": _UNIT,
         "degrees": "divide by 1deg for a number of degrees",
-        "gradient linear_gradient linearGradient radial_gradient radialGradient": _NO_GRADIENTS,
+        "gradient linear_gradient linearGradient radial_gradient radialGradient": _GRADIENTS,
         "concat": "vectors are not joined; write all items into one",
         "str": "strings are not put together",
     }
@@ -71,7 +71,9 @@ MATERIALS: Final = _each_word(
         "plain solid unlit constant": "flat",
         "glossy metal metallic mirror chrome shiny glass specular": "nothing reflects: in space there is "
         "diffuse, which is matte, and volumetric, which is mist; in the plane flat",
-        "gradient linear radial linear_gradient lineargradient": _NO_GRADIENTS,
+        "linear_gradient lineargradient": "linear",
+        "radial_gradient radialgradient": "radial",
+        "gradient": _GRADIENTS,
     }
 )
 """Materials under another name, and what there is instead of others."""
@@ -179,12 +181,12 @@ STATEMENTS: Final = _each_word(
         "scalez scale_z": "in space write scale(1, 1, z)",
         "fillet round bevel chamfer": "smooth(k = 0.1) { … } rounds where objects meet, "
         "subtract(k = 0.1) { … } the edge of a cut",
-        "gradient linear_gradient radial_gradient": _NO_GRADIENTS,
+        "gradient linear_gradient radial_gradient": _GRADIENTS,
         "text": "no model draws text",
         "echo print": "nothing is printed while a scene is made",
         "return": "a function is one expression: fn f(x) = x ^ 2;",
         "while": "loops run over a range or a vector: for (i in 0..<n) { … }",
-        "opacity alpha": "objects are opaque, but for `volumetric` in 3D",
+        "alpha": "write opacity(a) in a material's block; in 3D `volumetric` is translucent",
         "rotatex rotate_x rotx": "write rotate(90deg, axis = X);",
         "rotatey rotate_y roty": "write rotate(90deg, axis = Y);",
         "rotatez rotate_z rotz": "write rotate(90deg);",

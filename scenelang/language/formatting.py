@@ -422,6 +422,15 @@ class Layout:
     def vector(self, opening: int, *rest: Any) -> Part:
         return self._bracketed(Bracketed, opening, rest)
 
+    def for_item(
+        self, word: int, opening: int, variable: Part, within: int, iterable: Part, closing: int, item: Part
+    ) -> Part:
+        inside = sequence([variable, " ", self.word(within), " ", iterable])
+        return self.if_item(word, opening, inside, closing, item)
+
+    def if_item(self, word: int, opening: int, inside: Part, closing: int, item: Part) -> Part:
+        return sequence([self.word(word), " ", self.parenthesised(opening, inside, closing), " ", item])
+
     def name_ref(self, name: Part) -> Part:
         return name
 

@@ -112,10 +112,7 @@ _BRACKETS: Final = "vectors stand in brackets"
 _BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
 _JOINS: Final = "`<node>` joins no loop"
 _HOLDS: Final = "the loop stands in its block: <node> { square; for (i in 0..3) { star; } }"
-_LISTED: Final = "vectors are not made by loops"
-_WRITTEN: Final = (
-    "write the items out, or draw in a loop: for (i in 0..<n) { s.disc(0.1) { translate(i, 0); } }"
-)
+_LISTED: Final = "a vector is made by `for` before its values"
 _COMMAS: Final = "`,` between statements"
 _JOINED: Final = "objects are joined by words"
 _ARGUED: Final = "`<node>` takes no objects as arguments"
@@ -241,8 +238,9 @@ HABITS: Final = (
     Habit("material <n> <VALUES>;", "material <n> { color(<VALUES>); }", _OPERATIONS),
     Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
     # expressions
-    _unsafe("[for <E>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
-    _unsafe("[<E> for <F>]", "BAD_EXPRESSION", _LISTED, _WRITTEN),
+    Habit("[for <i> in <F>: <E>]", "[for (<i> in <F>) <E>]", _LISTED),
+    Habit("[<E> for <i> in <F> if <C>]", "[for (<i> in <F>) if (<C>) <E>]", _LISTED),
+    Habit("[<E> for <i> in <F>]", "[for (<i> in <F>) <E>]", _LISTED),
     Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
     Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
     Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
@@ -442,6 +440,7 @@ def _anchors(tokens: Tokens, first: int, at: int) -> dict[str, list[int]]:
             anchors["A"] = [index + 1]
         if depth < 0:
             before = tokens.text(index - 1)
+            anchors |= {"for": [index - 1]} if before == "for" else {}
             operand = before in (")", "]") or (before.isidentifier() and before not in ("in", "return"))
             anchors[text] = [] if operand else [index]
             break

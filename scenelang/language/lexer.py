@@ -183,18 +183,18 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     return re.compile(pattern), kinds, ["", *groups]
 
 
-def scan(source: SourceFile, report: Report) -> Tokens:
-    """All tokens of a text; slips go to ``report``."""
+def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
+    """All tokens of a text, or those before an offset between tokens; slips go to ``report``."""
     pattern, group_kinds, names = _master()
     literals = tables().literals
     name_group, sign_group = names.index("NAME"), names.index("sign")
     name_kind = group_kinds[name_group]
-    tokens = Tokens(source)
+    tokens, text = Tokens(source), source.text
     kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
-    text = source.text
+    stop = len(text) if stop is None else stop
     keyword = literals.get
     slips = _Slips(tokens, report)
-    for match in pattern.finditer(text):
+    for match in pattern.finditer(text, 0, stop):
         group = match.lastindex
         if group is None:
             break
@@ -213,7 +213,7 @@ def scan(source: SourceFile, report: Report) -> Tokens:
         kinds.append(kind)
         starts.append(start)
         ends.append(end)
-    tokens.append(END, len(text), len(text))
+    tokens.append(END, stop, stop)
     return tokens
 
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from scenelang.assets.gradient import STOPS
 from scenelang.assets.records import Record
-from scenelang.language import advice, nodes, tree, words
+from scenelang.language import advice, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -23,10 +24,10 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import Color, Frozen, Grayscale, Shear, singular
+from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
-from scenelang.language.session import Binding, Env
+from scenelang.language.session import Binding, Env, Session
 from scenelang.language.values import (
     POISON,
     Angle,
@@ -78,6 +79,20 @@ def _side(value: Any, operand: int) -> int:
         message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
         raise Problem("E0311", message, operand=operand)
     return int(side)
+
+
+def _share(value: Any, operand: int) -> float:
+    share = number(value, operand)
+    if not 0.0 <= share <= 1.0:
+        raise Problem("E0311", f"an opacity of {show(share)} is outside 0..1", operand=operand)
+    return share
+
+
+def _samples(value: Any, operand: int) -> int:
+    count = number(value, operand)
+    if count not in SAMPLES:
+        raise Problem("E0311", f"{show(count)} samples a pixel, where it takes 4 or 16", operand=operand)
+    return int(count)
 
 
 def _positive(value: Any, operand: int, what: str) -> float:
@@ -157,6 +172,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "opaque": _opaque,
     "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
     "side": _side,
+    "share": _share,
+    "samples": _samples,
     "seconds": lambda value, at: _positive(value, at, "length"),
     "fps": lambda value, at: _positive(value, at, "frame rate"),
     "boolean": _boolean,
@@ -183,7 +200,7 @@ class Spec(Record):
     word: words.Word
     help: str | None  # advice for a wrong number of arguments; None prints the signature
     spread: bool  # whether one vector may stand for all arguments
-    node: type[Frozen] | None  # None for the size and the background of the picture
+    node: type[Frozen] | None  # None for a single value: of a material, or of the picture
     rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]  # field, reader, default, number
     stated: bool  # whether it is a setting
 
@@ -314,15 +331,22 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         if POISON in values:
             return None
         try:
+            if spec.word.name in words.PROPERTIES:
+                return spec.read(values)[spec.word.params[0]]
             node = _shear(spec, values) if spec.node is Shear else spec.build(values)
         except Problem as problem:
             advice.report_problem(session.report, problem, span, operands)
             return None
-        if node.__class__ is Color or node.__class__ is Grayscale:
-            _warn(node, session.report, first.span if first else span)
+        if isinstance(node, Color | Grayscale | Stop):
+            _warn(node, session.report, next((o.span for o in reversed(operands) if o is not None), span))
         return node
 
     def append(node: Any, out: Builder) -> None:
+        if (name := spec.word.name) in words.PROPERTIES:
+            first = out.properties.setdefault(name, (span, node))[0]
+            if first is not span:
+                _twice(name, span, first, session.report)
+            return
         if out.moved is None:
             out.moved = span  # even by a transform with a mistake: children have their order all the same
         if node is not None:
@@ -353,9 +377,14 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     return action
 
 
-def _warn(node: Color | Grayscale, report: Reporter, span: Span) -> None:
+def _twice(name: str, span: Span, first: Span, report: Reporter) -> None:
+    labels = (Label(first, "first given here"),)
+    report.error("E0333", f"`{name}` is given twice", span, labels=labels, help="leave one of them out")
+
+
+def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
     """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
-    components = node.rgb if isinstance(node, Color) else (node.amount,)
+    components = (node.amount,) if isinstance(node, Grayscale) else node.rgb
     outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
     if outside is not None:
         help = "components run from 0 to 1; the result is clamped to that"
@@ -406,18 +435,44 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
     where = Written(name.span, written.span)
 
     def run(env: Env) -> Material:
-        material = make(Material, {"name": called, "ops": operations(env), "shading": shading})
+        ops, given = operations(env)
+        material = make(Material, {"name": called, "ops": ops, "shading": shading, "opacity": 1.0, **given})
         session.spans.record(material, where)
+        _check_stops(material, where, session)
         return material
 
     return run
+
+
+def _check_stops(material: Material, where: Written, session: Session) -> None:
+    """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
+    fault = paint_fault(material)
+    if fault is None:
+        return
+    stop, message = fault
+    statement, report = where.statement, session.report
+    if len([op for op in material.ops if op.kind == "stop"]) < STOPS[0] and any(
+        error.span is not None
+        and error.span.source is statement.source
+        and statement.start <= error.span.start < statement.end
+        for error in report.diagnostics
+        if error.severity == "error"
+    ):
+        return  # a stop was refused already
+    span = (session.spans.span(stop) if stop is not None else None) or where.name
+    if material.name in words.GRADIENTS:
+        help = "as in material linear { stop(0, #d33); stop(0.5, #fff); stop(1, #33d); }: 2 to 8, in order"
+        report.error("E0360", message, span, help=help)
+    else:
+        help = "stops stand in the block of material linear or material radial"
+        report.error("E0330", message, span, help=help)
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
-        known = {*words.MATERIALS, *words.TEXTURES}
+        known = {*words.MATERIALS, *words.PAINTS}
         if alias in known:
             return alias
         _unknown(name, place, known)
@@ -431,7 +486,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
         advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
         wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
-    elif own is not None and own.kind in advice.VALUES:
+    elif own is not None and own.kind in scopes.VALUES:
         _is_value(name, place)
     elif own is not None:
         wrong_kind(name, own, place, "a material")
@@ -455,17 +510,20 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     return word.text
 
 
-def _operations(body: tree.Block | None, place: Place) -> Callable[[Env], tuple[Any, ...]]:
-    """Function that returns the operations of a material's block."""
+def _operations(
+    body: tree.Block | None, place: Place
+) -> Callable[[Env], tuple[tuple[Any, ...], dict[str, Any]]]:
+    """Function that returns the operations of a material's block, and the properties that it gives."""
     if body is None:
-        return lambda env: ()
+        return lambda env: ((), {})
     prepared = prepare_inner(body, place.inner("material"))
     session, span = place.session, body.span
 
-    def run(env: Env) -> tuple[Any, ...]:
+    def run(env: Env) -> tuple[tuple[Any, ...], dict[str, Any]]:
         out = Builder()
         prepared.run(env, out, session, span)
-        return tuple(out.transforms)
+        given = {name: value for name, (_, value) in out.properties.items() if value is not None}
+        return tuple(out.transforms), given
 
     return run
 
@@ -533,9 +591,10 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
             return
         material = value.material
         if stmt.body is not None:
-            ops = (*material.ops, *operations(env))
-            material = make(Material, {"name": material.name, "ops": ops, "shading": material.shading})
+            ops, given = operations(env)
+            material = make(Material, {**material.__dict__, "ops": (*material.ops, *ops), **given})
             session.spans.record(material, where)
+            _check_stops(material, where, session)
         _give(material, span, out, place)
         session.count_parts(1 + len(material.ops), span)
 

@@ -19,16 +19,19 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    SerializerFunctionWrapHandler,
     Tag,
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_serializer,
     model_validator,
 )
 from pydantic_core import ErrorDetails
 
+from scenelang.assets.gradient import stops_fault
 from scenelang.language.diagnostics import plural
-from scenelang.language.words import BLEND, RESERVED, Combine
+from scenelang.language.words import BLEND, GRADIENTS, RESERVED, Combine
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
@@ -158,6 +161,13 @@ def _decoded(name: str, text: str) -> tuple[float, float, float]:
     digits = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:])
     red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
     return red, green, blue
+
+
+def unstated(data: dict[str, Any], name: str, usual: float) -> dict[str, Any]:
+    """Data of a node without a field that came later and has its usual value, so that it is as before."""
+    if data.get(name) == usual:
+        del data[name]
+    return data
 
 
 class Frozen(BaseModel):
@@ -503,8 +513,20 @@ class Hue(_Turn):
         return cls(angle=math.radians(angle_deg))
 
 
+class Stop(Frozen):
+    """A stop of a gradient: the colour ``rgb`` at ``offset``."""
+
+    kind: Literal["stop"] = "stop"
+    offset: Share
+    rgb: Rgb
+
+    if TYPE_CHECKING:
+
+        def __init__(self, offset: float, rgb: str | tuple[float, float, float]) -> None: ...
+
+
 MaterialOp = Annotated[
-    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue,
+    Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue | Stop,
     Field(discriminator="kind"),
 ]
 
@@ -574,10 +596,16 @@ Blend = Annotated[
 ]
 
 
+SAMPLES: Final = 4, 16
+"""Numbers of samples that a pixel may be the mean of, on regular grids."""
+SampleCount = Annotated[Literal[4, 16], Field(description="samples of a pixel"), BeforeValidator(_whole)]
+
+
 class Material(Frozen):
     """A material, with its texture and colour operations in order.
 
-    One of the model that is a texture, or an element's, is lit as its ``shading`` says.
+    One of the model that is a texture, a gradient, or an element's, is lit as its ``shading`` says.
+    ``opacity`` is of flat scenes.
     """
 
     name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
@@ -585,12 +613,21 @@ class Material(Frozen):
     shading: Annotated[
         Word | None, Field(description="of a texture: flat, diffuse or volumetric; null: as usual")
     ] = None
+    opacity: Annotated[Share, Field(description="2D; 0 shows all that lies behind, 1 hides it")] = 1.0
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, name: str, ops: Iterable[MaterialOp] | MaterialOp | str = (), shading: str | None = None
+            self,
+            name: str,
+            ops: Iterable[MaterialOp] | MaterialOp | str = (),
+            shading: str | None = None,
+            opacity: float = 1.0,
         ) -> None: ...
+
+    @model_serializer(mode="wrap")
+    def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return unstated(plain(self), "opacity", 1.0)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
@@ -598,6 +635,22 @@ class Material(Frozen):
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
         return given
+
+    @model_validator(mode="after")
+    def _has_stops(self) -> Self:
+        fault = paint_fault(self)
+        if fault is not None:
+            raise ValueError(fault[1])
+        return self
+
+
+def paint_fault(material: Material) -> tuple[Stop | None, str] | None:
+    """What is wrong with the stops of a material, if anything, and the stop it is wrong with."""
+    stops = [op for op in material.ops if op.kind == "stop"]
+    if material.name not in GRADIENTS:
+        return (stops[0], f"a stop in `{material.name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
 
 
 class Object(Frozen):

@@ -6,7 +6,8 @@ one becomes a `BadExpr`, a statement without its name a `BadStmt`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import accumulate
@@ -32,11 +33,12 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
     "fn": (tree.Fn, (1, 2, 4)),
     "module": (tree.Module, (1, 2, 3)),
     "for_": (tree.For, (2, 4, 6)),
+    "for_item": (tree.ForItem, (2, 4, 6)),
+    "if_item": (tree.IfItem, (2, 4)),
     "conditional": (tree.Conditional, (0, 2, 4)),
     "index": (tree.Index, (0, 2)),
     "member": (tree.Member, (0, 2)),
     "bad_expression": (tree.BadExpr, ()),
-    "bad_statement": (tree.BadStmt, ()),
     "bad_block": (tree.BadStmt, ()),
 }
 """Rules whose node has some of their parts as they are: its class, and which parts."""
@@ -50,9 +52,10 @@ _LITERALS = (tree.Number, tree.String, tree.Bool, tree.Color, tree.NameRef, tree
 class Builder:
     """Makes the nodes of one file; ``report`` takes what is found in literals."""
 
-    def __init__(self, tokens: Tokens, report: Report) -> None:
+    def __init__(self, tokens: Tokens, report: Report, kept: Mapping[int, tree.Stmt] = {}) -> None:
         self.tokens = tokens
         self.report = report
+        self.kept = kept  # statements that need not be read again, by where they begin
         self.source = tokens.source
         self.text = tokens.source.text
         self.starts = tokens.starts
@@ -233,6 +236,9 @@ class Builder:
     def file(self, statements: list[tree.Stmt] | None = None) -> tree.File:
         return tree.File(Span(self.source, 0, len(self.text)), tuple(statements or ()))
 
+    def bad_statement(self, token: int) -> tree.Stmt:
+        return self.kept.get(self.starts[token]) or tree.BadStmt(self._span(token, token))
+
     def version(self, word: int, number: int, semicolon: int) -> tree.Stmt:
         span = self._span(word, semicolon)
         value = self.number(number)
@@ -295,16 +301,50 @@ def _block(last: Any) -> tree.Block | None:
 MAX_DEPTH = 200
 """No tree is deeper, so no later stage can exhaust the stack."""
 
-_OTHER, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(8)
+_OTHER, _LOOP, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(9)
 
 
-def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
-    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes."""
+_REACH: Final = 240
+"""Tokens past a mistake that recovery may look at, with room."""
+
+
+def fold(tokens: Tokens, known: Sequence[tree.Kept]) -> None:
+    """Let one token stand for each known statement, but for those that recovery may look at."""
+    columns, spans = (tokens.kinds, tokens.starts, tokens.ends), [stmt.span for stmt in known]
+    places = [(bisect_left(tokens.starts, span.start), span) for span in spans]
+    found = [(at, bisect_left(tokens.starts, s.end), s) for at, s in places if tokens.starts[at] == s.start]
+    nexts = [*(first for first, _, _ in found[1:]), len(tokens.kinds) - 1]
+    new: tuple[list[int], ...] = ([], [], [])
+    copied = end = 0
+    seen = _REACH  # tokens since something that is not known
+    for (first, stop, span), following in zip(found, nexts, strict=True):
+        seen = seen if first == end else 0
+        if seen >= _REACH and following == stop:
+            token = (tables().kind("BAD_STATEMENT"), span.start, span.end)
+            for target, column, value in zip(new, columns, token, strict=True):
+                target += [*column[copied:first], value]
+            copied = stop
+        seen, end = seen + stop - first, stop
+    for target, column in zip(new, columns, strict=True):
+        column[:copied] = target
+
+
+def parse(source: SourceFile, diagnostics: Diagnostics, known: Sequence[tree.Kept] = ()) -> tree.File:
+    """The tree of a whole text; never raises. It holds `BadStmt` and `BadExpr` where there are mistakes.
+
+    Args:
+        known: sound statements at top level that an edit left as they were, in order; most stand in the tree.
+    """
     report = Report(source)
     tokens = scan(source, report)
+    if known:
+        fold(tokens, known)
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
-    if depths[-1] or min(depths) < 0:  # some brace has no counterpart
+    odd = depths[-1] or min(depths) < 0  # some brace has no counterpart
+    if known and odd:
+        return parse(source, diagnostics)
+    if odd:
         # What only mistakes need is loaded at the first one: most runs start and end without any.
         from scenelang.language.recovery import balance
 
@@ -322,7 +362,10 @@ def parse(source: SourceFile, diagnostics: Diagnostics) -> tree.File:
         unfinished = values
         return recovery.resume(states, values, at)
 
-    file: tree.File | None = run(tokens.kinds, Builder(tokens, report).callbacks(), mend)
+    builder = Builder(tokens, report, {stmt.span.start: stmt for stmt in known})
+    file: tree.File | None = run(tokens.kinds, builder.callbacks(), mend)
+    if known and (file is None or any(d.code in ("E0120", "E0121") for d in report.found)):
+        return parse(source, diagnostics)
     report.flush(diagnostics)
     if file is not None:
         return file
@@ -342,14 +385,15 @@ def _classes() -> tuple[int, ...]:
     operators = ("||", "&&", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", "!", "^", "?", ".")
     classes = dict.fromkeys((*operators, "else"), _OPERATOR)
     classes |= {"(": _OPEN, "[": _OPEN, ")": _CLOSE, "]": _CLOSE, ",": _COMMA, ";": _SEMICOLON}
-    classes |= {"{": _BRACE, "}": _END_BRACE}
+    classes |= {"{": _BRACE, "}": _END_BRACE, "for": _LOOP, "if": _LOOP}
     return tuple(classes.get(name, _OTHER) for name in tables().kinds)
 
 
 def limit_nesting(tokens: Tokens, report: Report) -> None:
     """Report what is nested deeper than `MAX_DEPTH`; its statement and all that follows are given up.
 
-    Open brackets and braces, operators between them and the arms of an `else if` chain make a tree deeper.
+    Open brackets and braces, operators between them, loops in vectors and the arms of an `else if` chain make
+    a tree deeper.
     """
     kinds = tokens.kinds
     classes = _classes()
@@ -360,7 +404,7 @@ def limit_nesting(tokens: Tokens, report: Report) -> None:
     blocks: list[tuple[int, int, int, list[int]]] = []  # the state outside each open block
     for at, kind in enumerate(kinds):
         c = classes[kind]
-        if c == _OTHER:
+        if c == _OTHER or (c == _LOOP and not brackets):  # a statement's block counts
             continue
         if c <= _BRACE:
             if depth == MAX_DEPTH:

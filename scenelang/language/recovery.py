@@ -523,7 +523,9 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_: list[in
         text = tokens.source.text[slice(*tokens.place(at, stop))]
         code, word = ("E0105", "unmatched") if text in (")", "]", "{", "}") else ("E0101", "unexpected")
         twice = text.isalpha() and text in (tokens.text(stop), tokens.text(at - 1))
-        report.add(code, f"{word} {_quoted(text)}", *tokens.place(at, stop), fix="" if twice else None)
+        help = "between values choose with c ? a : b" if text.startswith("else") else None
+        place = tokens.place(at, stop)
+        report.add(code, f"{word} {_quoted(text)}", *place, help=help, fix="" if twice else None)
     else:
         _report_replacement(tokens, report, repair, names)
 

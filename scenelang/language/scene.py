@@ -14,7 +14,15 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidationError,
+    model_serializer,
+)
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.assets import notebook
@@ -26,7 +34,20 @@ from scenelang.assets.tensors import TensorError
 from scenelang.language import library, nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, plural
 from scenelang.language.library import SpanMap, Written
-from scenelang.language.nodes import EITHER, STATED, TAGS, Frozen, Opaque, Pixels, Unsaid, Version, Word, said
+from scenelang.language.nodes import (
+    EITHER,
+    STATED,
+    TAGS,
+    Frozen,
+    Opaque,
+    Pixels,
+    SampleCount,
+    Unsaid,
+    Version,
+    Word,
+    said,
+    unstated,
+)
 from scenelang.language.nodes import MAX_FRAMES as MAX_FRAMES
 from scenelang.language.nodes import MAX_NODE_DEPTH as MAX_NODE_DEPTH
 from scenelang.language.nodes import Animation as Animation
@@ -53,6 +74,7 @@ from scenelang.language.nodes import Scale as Scale
 from scenelang.language.nodes import SceneNode as SceneNode
 from scenelang.language.nodes import Shear as Shear
 from scenelang.language.nodes import Shell as Shell
+from scenelang.language.nodes import Stop as Stop
 from scenelang.language.nodes import Transform as Transform
 from scenelang.language.nodes import Translate as Translate
 from scenelang.language.nodes import Twirl as Twirl
@@ -201,6 +223,7 @@ class Scene(Frozen):
         EITHER,
         Field(description="default: white in 2D, the sky in 3D; null: an image with alpha"),
     ] = "default"
+    samples: SampleCount = 4
     camera: Annotated[Annotated[Camera, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
     light: Annotated[Annotated[Light, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
     ground: Annotated[
@@ -221,6 +244,7 @@ class Scene(Frozen):
             model: str | None = None,
             canvas: tuple[int, int] = (256, 256),
             background: tuple[float, float, float] | str | None = "default",
+            samples: Literal[4, 16] = 4,
             camera: Camera | Unsaid = "default",
             light: Light | Unsaid = "default",
             ground: Ground | Unsaid | None = "default",
@@ -228,6 +252,10 @@ class Scene(Frozen):
             elements: Iterable[Elements] | Elements = (),
             nodes: Iterable[SceneNode] | SceneNode = (),
         ) -> None: ...
+
+    @model_serializer(mode="wrap")
+    def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return unstated(plain(self), "samples", 4)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
@@ -272,6 +300,8 @@ class Scene(Frozen):
             lines.append(f"canvas({self.canvas[0]}, {self.canvas[1]});")
         if self.background != "default":
             lines.append(f"background({'none' if self.background is None else rgb(self.background)});")
+        if self.samples != 4:
+            lines.append(f"samples({self.samples});")
         for word in STAGE:
             if (value := getattr(self, word)) is None:
                 lines.append(f"{word}(none);")
@@ -329,7 +359,7 @@ def same_nodes(a: Scene, b: Scene) -> bool:
     """Test whether two frames hold the very same nodes, on one stage."""
     return (
         len(a.nodes) == len(b.nodes)
-        and all(getattr(a, name) == getattr(b, name) for name in ("canvas", "background", *STAGE))
+        and all(getattr(a, name) == getattr(b, name) for name in ("canvas", "background", "samples", *STAGE))
         and all(x is y for x, y in zip(a.nodes, b.nodes, strict=True))
     )
 
@@ -443,7 +473,9 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
         return {
             name: _plain(item, brief=brief)
             for name, item in value.__dict__.items()
-            if not brief or name in ("kind", "version") or not _same(item, fields[name].default)
+            if not (brief or name in ("opacity", "samples"))
+            or name in ("kind", "version")
+            or not _same(item, fields[name].default)
         }
     return [_plain(item, brief=brief) for item in value] if isinstance(value, tuple) else value
 

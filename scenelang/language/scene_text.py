@@ -91,6 +91,8 @@ def vector(values: Iterable[float]) -> str:
 def material(value: Material) -> str:
     """A material statement."""
     ops = " ".join(map(transform, value.ops))
+    if value.opacity != 1.0:
+        ops += f" opacity({number(value.opacity)});"
     name = value.name if value.shading is None else f"{value.shading} {value.name}"
     return f"material {name} {{ {ops} }}" if ops else f"material {name};"
 
@@ -114,6 +116,8 @@ def transform(t: Transform | MaterialOp) -> str:
             given = f"[{', '.join(map(vector, t.rows))}]"
         case "color":
             given = rgb(t.rgb)
+        case "stop":
+            given = f"{number(t.offset)}, {rgb(t.rgb)}"
         case "hue":
             given = angle(t.angle)
         case _:

@@ -15,7 +15,7 @@ from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
 from scenelang.assets.files import read_regular
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
-from scenelang.language import library, tree
+from scenelang.language import library, scopes, tree
 from scenelang.language.diagnostics import Diagnostics, Fix, Label, SourceFile, Span, listing, nearest
 from scenelang.language.library import SpanMap
 from scenelang.language.limits import MAX_BYTES, MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
@@ -75,16 +75,27 @@ class Definition(Record, frozen=False):
     needs: Needs = field(default_factory=Needs)  # what its body depends on besides its arguments
 
 
+Brought = Literal["text", "width"]
+"""Kinds of bindings of what a font brings."""
+
+
 class Binding(Record, frozen=False):
     """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 
-    kind: Literal["let", "param", "argument", "loop", "fn", "module", "import", "element", "poison"]
+    kind: Literal[
+        "let", "param", "argument", "loop", "fn", "module", "import", "element", "text", "width", "poison"
+    ]
     span: Span | None = None  # None for the language's own names
     slots: Slots | None = None  # what holds its slot
     slot: int = 0
     value: Any = None
     known: bool = False  # whether ``value`` is that of a ``let``
     needs: Needs | None = None  # what the value of a ``let`` depends on
+
+    @property
+    def node(self) -> tree.Fn | tree.Module | None:
+        """The statement of a fn or module."""
+        return self.value.node if isinstance(self.value, Definition) else None
 
     def labels(self, words: str = "defined here") -> tuple[Label, ...]:
         """A label for its definition, if that has a place."""
@@ -99,14 +110,7 @@ class Scope(Record, frozen=False):
     names: dict[str, Binding] = field(default_factory=dict)
     later: dict[str, Span] = field(default_factory=dict)  # names that a later line of this block defines
 
-    def outwards(self) -> Iterator[Scope]:
-        scope: Scope | None = self
-        while scope is not None:
-            yield scope
-            scope = scope.parent
-
-    def find(self, name: str) -> Binding | None:
-        return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
+    outwards, find = scopes.outwards, scopes.find
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
         """All names that can be used here, inner ones first."""
@@ -140,6 +144,7 @@ class Settings(Record, frozen=False):
 
     canvas: tuple[int, int] = (256, 256)  # width and height in pixels
     background: tuple[float, float, float] | Unsaid | None = "default"  # as written; None for transparency
+    samples: int = 4  # of a pixel
     stage: dict[str, Any] = field(default_factory=dict)  # camera, light and ground, where they are stated
     animation: Animation | None = None
     model: str | None = None

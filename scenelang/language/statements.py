@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.element_file import ElementFile
-from scenelang.language import advice, blocks, expressions, foreign, library, modifiers, tree, words
+from scenelang.language import (
+    advice,
+    blocks,
+    expressions,
+    foreign,
+    letters,
+    library,
+    modifiers,
+    scopes,
+    tree,
+    words,
+)
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import (
     Diagnostics,
@@ -96,7 +108,7 @@ def prepare_model(stmt: tree.Model, place: Place) -> Action | None:
 
 
 def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
-    """``canvas``, ``background``, ``animate``, ``camera``, ``light`` or ``ground``."""
+    """A statement of the top level that sets something for the whole picture."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
     if not at_top_level(place, span, "`{}`", name) or not _once(session, name, span):
@@ -139,6 +151,8 @@ def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> N
         session.spans.record(node, where)
     elif name == "animate":
         _animate(spec.read(values), session)
+    elif name == "samples":
+        settings.samples = spec.read(values)["n"]
     elif name == "canvas":
         settings.canvas = tuple(spec.read(spread(values, spec.word)).values())
     else:
@@ -236,6 +250,15 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
     brought = FileContext(source, session, context.loader, context.defines, path)
     for name in (*zoo.geometries, *zoo.groups):
         brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
+    for name, element in zoo.geometries.items():
+        if element.size is not None and f"{name}_size" not in brought.scope.names:
+            size = Binding("let", stmt.alias.span, value=element.size, known=True)
+            brought.scope.names[f"{name}_size"] = size
+    if zoo.font is not None:
+        font = letters.Letters(zoo.font, known)
+        brought.scope.names["text"] = Binding("text", stmt.alias.span, value=font)
+        width = partial(letters.prepare_width, font)
+        brought.scope.names["width"] = Binding("width", stmt.alias.span, value=width)
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
 
@@ -431,11 +454,12 @@ def _is_literal(expr: tree.Expr) -> bool:
 def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     name = stmt.name.text
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
-    if name in words.SETTINGS and not hides(binding, stmt):
+    head = scopes.head_of(stmt, binding, place.kind)
+    if head == "setting":
         return prepare_setting(stmt, place)
-    if name in words.LANGUAGE or (name in words.NEWER and not hides(binding, stmt)):
+    if head == "move":
         return prepare_move(stmt, place)
-    if binding is None:
+    if binding is None or head == "leaf":
         if name in words.GEOMETRIES:
             return blocks.prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
@@ -445,21 +469,16 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
         return None
     if binding.kind == "module":
         return blocks.prepare_module_call(stmt, binding.value, place)
+    if binding.kind == "text":
+        return letters.prepare_text(stmt, place, binding.value)
     if binding.kind == "element":
         return blocks.prepare_element(stmt, place, binding.value)
-    if binding.kind in advice.VALUES:
+    if binding.kind in scopes.VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)
     if binding.kind != "poison":
         wrong_kind(stmt.name, binding, place, "an object or a module")
     return None
-
-
-def hides(binding: Binding | None, stmt: tree.Call) -> bool:
-    """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
-    return binding is not None and (
-        binding.kind in ("module", "poison") or (binding.kind in advice.VALUES and stmt.args is None)
-    )
 
 
 def _boolean(stmt: tree.Call) -> str | None:
@@ -503,7 +522,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
         if alias is None:
             advice.unknown(name, place)
         elif alias.kind == "import":
-            advice.unknown_member(name, place, alias.value, kinds=("module", "element"))
+            advice.unknown_member(name, place, alias.value, kinds=("module", "text", "element"))
         else:
             wrong_kind(name, alias, place, "an imported file")
         return
@@ -566,7 +585,7 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
         return {*words.OPERATIONS}
     if kind == "object" and stmt.args is not None:
         return {*words.TRANSFORMS}
-    names = advice.visible(place, advice.VALUES if kind == "object" else ("module",))
+    names = advice.visible(place, scopes.VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
     known = {*words.GEOMETRIES, *names}
@@ -585,7 +604,7 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.String: lambda expr, place: expressions.constant(expr.value),
     tree.Bool: lambda expr, place: expressions.constant(expr.value),
     tree.Color: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
-    tree.Vector: expressions.prepare_vector,
+    tree.Vector: blocks.prepare_vector,
     tree.Range: expressions.prepare_range,
     tree.NameRef: expressions.prepare_name,
     tree.Unary: expressions.prepare_unary,

@@ -7,7 +7,7 @@ stages skip such nodes silently.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Span
@@ -46,6 +46,17 @@ class Number(Expr):
 class String(Expr):
     value: str
 
+    def character(self, at: int) -> Span:
+        """Place of a character of the value, of one that is escaped with its backslash."""
+        start = self.span.start + 1
+        for _ in range(at):
+            start += self._length(start)
+        return Span(self.span.source, start, start + self._length(start))
+
+    def _length(self, start: int) -> int:
+        text = self.span.source.text
+        return 2 if text[start] == "\\" and text[start + 1] in '"\\nt' else 1
+
 
 class Bool(Expr):
     value: bool
@@ -59,6 +70,21 @@ class Color(Expr):
 
 class Vector(Expr):
     items: tuple[Expr, ...]
+
+
+class ForItem(Expr):
+    """``for (i in …) item`` in a vector: the item's values, once for each turn."""
+
+    variable: Name
+    iterable: Expr
+    body: Expr
+
+
+class IfItem(Expr):
+    """``if (…) item`` in a vector: the item's values, or none."""
+
+    condition: Expr
+    body: Expr
 
 
 class Range(Expr):
@@ -232,6 +258,28 @@ class MaterialUse(Stmt):
 
 class BadStmt(Stmt):
     """Text that recovery could not read as a statement."""
+
+
+class Kept(Stmt):
+    """A statement of an earlier text, as it was read there; the span is its place in this text."""
+
+    stmt: Stmt
+
+    def moved(self, deep: bool = True) -> Stmt:
+        """The statement at its place in this text, or that and its name alone."""
+        source, delta = self.span.source, self.span.start - self.stmt.span.start
+
+        def move(value: Any) -> Any:
+            cls = value.__class__
+            if cls is Span:
+                return Span(source, value.start + delta, value.end + delta)
+            if cls is tuple:
+                return tuple([move(item) for item in value])
+            if isinstance(value, Record) and (deep or cls is Name or value is self.stmt):
+                return cls(*[move(getattr(value, name)) for name in cls.__match_args__])
+            return value
+
+        return cast(Stmt, move(self.stmt))
 
 
 class File(Spanned):

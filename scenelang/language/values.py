@@ -30,6 +30,7 @@ class Problem(Exception):
         operand: which operand or argument is to blame, from 0; None for all of it.
         fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, a ``colour`` of a string.
         notes: words for further operands, by their numbers.
+        letter: which character of that operand, a string.
         found: the kind that is odd about a value; problems that found the same may have one cause.
     """
 
@@ -43,7 +44,9 @@ class Problem(Exception):
         notes: Mapping[int, str] = MappingProxyType({}),
         found: str = "",
         expected: str = "",
+        letter: int | None = None,
     ) -> None:
+        self.letter = letter
         self.code, self.help, self.operand, self.fix, self.notes = code, help, operand, fix, notes
         self.message = message or f"expected {expected}, found {found}"
         self.expected, self.found = expected, found

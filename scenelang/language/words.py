@@ -163,6 +163,15 @@ PLAIN_SETTINGS: Final = _table(
         head="animate(seconds, fps, loop = true)",
     ),
 )
+SAMPLING: Final = _table(
+    _call(
+        "samples",
+        "n:samples",
+        "How many samples a pixel is the mean of, 4 or 16, 4 without it. `--samples` overrides it.",
+        ("4 or 16, on a regular grid",),
+        "samples(${1|16,4|});",
+    ),
+)
 STAGE: Final = _table(
     _call(
         "camera",
@@ -187,7 +196,7 @@ STAGE: Final = _table(
     ),
 )
 """Settings of 3D scenes; a scene's own module of such a name hides them."""
-SETTINGS: Final = PLAIN_SETTINGS | STAGE
+SETTINGS: Final = PLAIN_SETTINGS | SAMPLING | STAGE
 _BOTH: Final = _table(
     _call(
         "translate",
@@ -269,23 +278,44 @@ TRANSFORMS: Final = _BOTH | _table(
         "shell(${1:0.1});",
     ),
 )
-OPERATIONS: Final = _BOTH | _table(
-    _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
+PROPERTIES: Final = _table(
     _call(
-        "color",
-        "c:colour",
-        "Multiplies the material's colour.",
-        ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
-        "color(${1:#d33});",
+        "opacity",
+        "a:share",
+        "2D: how much of what lies behind an object it hides; anywhere in the block, and once.",
+        ("0 shows all of it, 1 none",),
+        "opacity(${1:0.5});",
     ),
-    _call(
-        "grayscale",
-        "a",
-        "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
-        ("0 keeps the colour, 1 is grey",),
-        "grayscale(${1:1});",
-    ),
-    _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+)
+"""Properties of a material: they stand in its block, in no order with its operations."""
+OPERATIONS: Final = (
+    _BOTH
+    | PROPERTIES
+    | _table(
+        _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
+        _call(
+            "color",
+            "c:colour",
+            "Multiplies the material's colour.",
+            ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
+            "color(${1:#d33});",
+        ),
+        _call(
+            "grayscale",
+            "a",
+            "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
+            ("0 keeps the colour, 1 is grey",),
+            "grayscale(${1:1});",
+        ),
+        _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
+        _call(
+            "stop",
+            "offset c:colour",
+            "A stop of a gradient, which has 2 to 8 in order; of equal offsets the edge is hard.",
+            ("where it lies, 0 to 1", "`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`"),
+            "stop(${1:0}, ${2:#d33});",
+        ),
+    )
 )
 """Operations in a material's block."""
 
@@ -322,6 +352,24 @@ FUNCTIONS: Final = _table(
     _call("rgb", "r g b", "A colour; components in 0..1."),
     _call("hsv", "h s v", "A colour by hue (turns or an angle), saturation and value."),
 )
+LETTERS: Final = _table(
+    _call(
+        "text",
+        "text:string size? align?:string",
+        "A line of letters of an imported font, a union, with its baseline on y = 0.",
+        ("a string", "the em in world units, 1 by default", '`"left"`, `"center"` or `"right"` of x = 0'),
+        'text("$1", size = ${2:0.5});',
+        head='text("Ag", size = 1, align = "left")',
+    ),
+    _call(
+        "width",
+        "text:string size?",
+        "The width of a line of letters of an imported font, in world units.",
+        ("a string", "the em in world units, 1 by default"),
+        head='width("Ag", size = 1)',
+    ),
+)
+"""What a font brings, behind the name of its import."""
 CONSTANTS: Final = _table(
     _word("PI", "3.14159…, a number; half a turn is `0.5turn`."),
     _word("TAU", "2π, a number."),
@@ -344,10 +392,17 @@ LEAVES: Final[dict[int, dict[str, str]]] = {
         "triangle": "Regular, circumradius 1, a vertex at +y.",
         "pentagon": "Regular, circumradius 1, a vertex at +y.",
         "star": "Five points, outer radius 1, inner radius 0.381966, a point at +y.",
+        "disc": "Radius 1.",
+        "hexagon": "Regular, circumradius 1, a vertex at +y.",
     },
     3: {
         "sphere": "Radius 1.",
         "torus": "Radii 0.7 and 0.3, axis y.",
+        "box": "A cube with corners on the unit sphere: half a side is 1/√3, 0.577.",
+        "cylinder": "Axis y, radius and half-height 1/√2, 0.707.",
+        "cone": "Axis y, apex (0, 1, 0), base at y = -0.5 of radius √3/2, 0.866.",
+        "capsule": "All within 0.5 of the segment from (0, -0.5, 0) to (0, 0.5, 0).",
+        "octahedron": "Corners on the axes at 1: |x| + |y| + |z| ≤ 1.",
     },
 }
 """The geometries of the plane and of space."""
@@ -364,13 +419,19 @@ TEXTURES: Final = (
     *("noise", "plaid", "stripes", "terrazzo", "tiles", "waves", "wood", "zigzag"),
 )
 """Materials that are pictures, in the plane and in space."""
+GRADIENTS: Final = {
+    "linear": "A gradient between `stop`s, over x from −1 to 1.",
+    "radial": "A gradient between `stop`s, over the distance from the origin, 0 to 1.",
+}
+PAINTS: Final = dict.fromkeys(TEXTURES, "A texture, in flat and in solid scenes.") | GRADIENTS
+"""Materials whose colour differs from place to place, in the plane and in space."""
 GEOMETRIES: Final = LEAVES[2] | LEAVES[3]
 MATERIALS: Final = SHADINGS[2] | SHADINGS[3]
 SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
 OWN_TRANSFORMS: Final = "grow", "shell", "displace"
 """Transforms of a leaf's own distance, which stand first in its block, each at most once."""
-NEWER: Final = frozenset(("grow", "shell"))
+NEWER: Final = frozenset(("grow", "shell", "stop", *STAGE, *SAMPLING, *PROPERTIES))
 """Words that head a statement unless a scene's own module has their name."""
 SCENES: Final = {2: "flat", 3: "solid"}
 """Names for scenes of a dimension."""

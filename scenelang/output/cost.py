@@ -152,7 +152,7 @@ def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int
     """In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
     ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
     every object)."""
-    samples = program.canvas[0] * program.canvas[1] + 4 * drawing.refined
+    samples = program.canvas[0] * program.canvas[1] + program.samples * drawing.refined
     if model.manifest.renderer != "framed":  # others take every sample, with every object
         samples = drawing.pairs // max(1, len(program))
     return {

@@ -27,7 +27,7 @@ from PIL import GifImagePlugin, Image
 
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import SIGNATURE, chunk
-from scenelang.output.frames import Box, Film, Pixels, changed, delays, runs
+from scenelang.output.frames import VIDEOS, Box, Film, Pixels, changed, delays, runs
 
 Palette = Literal["auto", "global", "frame"]
 Colours = npt.NDArray[np.uint8]
@@ -309,7 +309,6 @@ _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
 _OTHERS: Final = (("libopenh264", "-b:v", "8M"), ("mpeg4", "-q:v", "2"))
 _VP9: Final = ("libvpx-vp9", "-crf", "18", "-b:v", "0", "-row-mt", "1")
 _SCALE: Final = "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int+full_chroma_inp"
-_FORMATS: Final = {".mp4": "mp4", ".m4v": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm"}
 MISSING: Final = "video needs ffmpeg, which is not on the PATH: install it, or pip install 'scenelang[video]'"
 
 
@@ -365,8 +364,8 @@ def write_video(film: Film, part: Path, progress: Callable[[float], None], *, su
         *("-vf", _SCALE, "-c:v", *codec, "-pix_fmt", "yuva420p" if keeps else "yuv420p"),
         *(("-auto-alt-ref", "0") if keeps else ()),
         *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
-        *(("-movflags", "+faststart") if _FORMATS[suffix] in ("mp4", "mov") else ()),
-        *("-f", _FORMATS[suffix], os.fspath(part)),
+        *(("-movflags", "+faststart") if VIDEOS[suffix] in ("mp4", "mov") else ()),
+        *("-f", VIDEOS[suffix], os.fspath(part)),
     ]
     # in a session of its own, so that Ctrl-C reaches us alone and we end it
     with Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=PIPE, start_new_session=True) as process:

@@ -114,7 +114,9 @@ def runs(keys: Sequence[K], lengths: Iterable[int]) -> list[tuple[K, int]]:
 
 Kind = Literal["sequence", "gif", "webp", "apng", "video"]
 
-_VIDEO: Final[dict[str, Kind]] = dict.fromkeys((".mp4", ".m4v", ".mov", ".mkv", ".webm"), "video")
+VIDEOS: Final = {".mp4": "mp4", ".m4v": "mp4", ".mov": "mov", ".mkv": "matroska", ".webm": "webm"}
+"""Suffixes of videos, and the formats that ffmpeg calls them."""
+_VIDEO: Final[dict[str, Kind]] = dict.fromkeys(VIDEOS, "video")
 FILM_FORMATS: Final[dict[str, Kind]] = {".gif": "gif", ".webp": "webp", ".apng": "apng", **_VIDEO}
 PICTURES: Final = frozenset({".gif", ".webp", ".apng"})  # hold a single picture as well
 _NUMBER: Final = re.compile(r"%(0?\d{0,2})d")

@@ -66,11 +66,11 @@ class Painter:
         """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`."""
         program, place = None, "cpu"
         if self.how.backend == "reference":
-            scene = shot.scene.model_copy(update={"animation": None})
+            scene = self.how.sampled(shot.scene.model_copy(update={"animation": None}))
             key = frame_key("reference", _version("scenelang"), scene.to_json())
             names: tuple[object, ...] = (self.clip.texts,)
         else:
-            program = self.clip.program(shot)
+            program = self.how.sampled(self.clip.program(shot))
             place = self._place(program, single or self.single)
             library = place if place == "numpy" else "torch"
             cores = () if place == "numpy" and program.stage is None else (self.split(program),)
@@ -87,7 +87,7 @@ class Painter:
         if single or program.stage is not None or how.backend == "exact":
             from scenelang.drawing.small import choose_drawer
 
-            drawer = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+            drawer = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
             if drawer.library == "numpy":
                 return "numpy"
         started = time.perf_counter()
@@ -105,7 +105,7 @@ class Painter:
         if frame.program is None:
             from scenelang.drawing.render import draw_exact
 
-            return draw_exact(frame.shot.scene, spans=frame.shot.spans)
+            return draw_exact(self.how.sampled(frame.shot.scene), spans=frame.shot.spans)
         from scenelang.drawing.render import draw
 
         how = self.how._replace(threads=self.split(frame.program))

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, has_finer, unpacked
 from scenelang.assets.tensors import TensorError
@@ -26,7 +27,6 @@ from scenelang.compiler.groups import OPERATOR, widths_of
 from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.compiler.spaces import Stage
 from scenelang.drawing.neural.frames import Frames, read_skins
 from scenelang.drawing.solid.passes import read_solid_frame
 
@@ -89,12 +89,19 @@ def packed(data: bytes) -> str:
     return base64.b64encode(zlib.compress(data, 9)).decode()
 
 
-def shapes_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
+def shapes_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
     """Entries of a view's ``shapes`` for the geometries among elements; raises `ProgramError`."""
-    return [_shape(element, store) for element in elements if not element.material]
+    shapes = (element for element in elements if isinstance(element, Element) and not element.material)
+    return [_shape(element, store) for element in shapes]
 
 
-def paints_of(elements: Iterable[Element], store: Store) -> list[dict[str, Any]]:
+def worn_of(program: Program) -> tuple[Element | Gradient, ...]:
+    """The elements of a Program, and a gradient without stops for each kind that it has: those are rows'."""
+    graded = {paint.element.name for paint in program.palette if isinstance(paint.element, Gradient)}
+    return *program.elements, *map(Gradient, sorted(graded))
+
+
+def paints_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
     """Entries of a view's ``paints`` for the materials among elements; raises as `shapes_of`."""
     return [_paint(element, store) for element in elements if element.material]
 
@@ -128,7 +135,9 @@ def bounds_of(element: Element) -> tuple[float, float, float]:
     return max(result[0], 1.0), max(result[1], 1.0), max(result[2], 2.0**0.5)
 
 
-def _paint(element: Element, store: Store) -> dict[str, Any]:
+def _paint(element: Element | Gradient, store: Store) -> dict[str, Any]:
+    if isinstance(element, Gradient):
+        return {"name": element.name, "kind": element.name}
     if element.form != "picture":
         parts = {"kind": "colours", "sides": element.sides, "steps": store.add(_steps(element))}
         return {"name": element.name, **parts, "fineness": element.sizes[1]}
@@ -161,7 +170,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     layout = LAYOUTS[manifest.dimension]
     parts = layout.unpack(program.vectors)
     forms = [at for at, element in enumerate(program.elements) if not element.material]
-    paints = [element for element in program.elements if element.material]
+    paints = [element for element in worn_of(program) if element.material]
     if layout.dimension == 2:  # world distances per leaf distance
         scales = Frames(program.vectors, layout).scale.tolist()
     else:
@@ -176,6 +185,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "steps": _row_steps(v.astype(np.float64), layout),
             "scale": scales[i],
             "colour": parts.rgb[i].tolist(),
+            "opacity": 1.0 - min(max(float(parts.clear[i]), 0.0), 1.0),
             "paint": -1,
             "amount": 0.0,
             "frequency": 0.0,
@@ -189,29 +199,13 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()
         if worn >= 0:
-            paint = program.palette[worn]
-            row |= {"paint": paints.index(paint.element), "paintSteps": paint.steps}
+            element, steps = program.palette[worn]
+            if isinstance(element, Gradient):
+                row["stops"], element = element.stops, Gradient(element.name)
+            row |= {"paint": paints.index(element), "paintSteps": steps}
             row["place"] = parts.texture[i].tolist()
         rows.append(row)
     return rows
-
-
-def stage_of(stage: Stage) -> dict[str, Any]:
-    """A stage as JSON data, with the camera's axes."""
-    camera, light, ground = stage.camera, stage.light, stage.ground
-    return {
-        "eye": camera.eye,
-        "axes": camera.axes(),
-        "target": camera.target,
-        "fov": camera.fov_rad,
-        "light": light.position,
-        "power": light.power,
-        "lightRgb": light.rgb,
-        "ground": ground and {"y": ground.y, "rgb": ground.rgb},
-        "horizon": stage.horizon,
-        "zenith": stage.zenith,
-        "transparent": stage.transparent,
-    }
 
 
 def _index(known: np.ndarray, code: np.ndarray) -> int:

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from scenelang.assets.element import credit_of
+from scenelang.assets.element import Element, credit_of
 from scenelang.assets.files import write_output
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError, load_program
-from scenelang.compiler.spaces import encoded
+from scenelang.compiler.spaces import encoded, stage_data
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import FramedArrays
 from scenelang.drawing.render import render
@@ -38,7 +38,7 @@ from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
-from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, stage_of, web
+from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def view_of(
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
-    elements = (*form.shapes, *form.paints) if form else program.elements
+    elements = (*form.shapes, *form.paints) if form else worn_of(program)
     albedo = network.material_codes @ network.albedo[:-1] + network.albedo[-1]
     geometries = [{"name": name, "kind": "learned"} for name in manifest.geometries]
     figures = manifest.measured.get("sets", {}).get(manifest.set)  # errors on the scenes of its own set
@@ -187,8 +187,9 @@ def view_of(
         "paints": paints_of(elements, store),
         "program": {
             "rows": rows_of(program, manifest, network.codes, network.material_codes),
-            "stage": program.stage and stage_of(program.stage),
+            "stage": program.stage and stage_data(program.stage),
             "background": program.background,
+            "samples": program.samples,
         },
         "form": form and form.data,
         "params": form.params if form else [],
@@ -196,7 +197,9 @@ def view_of(
         "animation": form and animation and {**animation.model_dump(), "frames": animation.frames},
         "source": [{"name": name, "text": text} for name, text in source],
         "licences": [
-            {"name": element.name, "text": credit} for element in elements if (credit := credit_of([element]))
+            {"name": element.name, "text": credit}
+            for element in elements
+            if isinstance(element, Element) and (credit := credit_of([element]))
         ],
     }
     if isinstance(network, FramedArrays):
@@ -365,7 +368,7 @@ def scene_view(
     source: list[tuple[str, str]] = []
     form = None
     if evaluation is not None:
-        form = form_of(evaluation, load_manifest(program.model), program.elements)
+        form = form_of(evaluation, load_manifest(program.model), worn_of(program))
         folder = os.path.dirname(evaluation.sources[0].name)
         for text in evaluation.sources:
             if not library.holds(text):  # a file outside the folder is shown without its path

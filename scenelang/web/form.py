@@ -11,24 +11,30 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from functools import cache
+from typing import Any, Final, TypeVar
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
+from scenelang.compiler.spaces import Stage, stage_data
+from scenelang.language import scene
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
+from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
+from scenelang.language.scopes import find, head_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
 from scenelang.language.words import (
     ANIMATED,
     FUNCTIONS,
+    GRADIENTS,
     LANGUAGE,
-    NEWER,
     OPERATIONS,
     SETTINGS,
     SOLID_TRANSFORMS,
@@ -37,6 +43,7 @@ from scenelang.language.words import (
 )
 
 Json = Any
+T = TypeVar("T", Element, Element | Gradient)
 
 
 @dataclass(slots=True, eq=False)
@@ -58,10 +65,7 @@ class Scope:
     def find(self, name: str) -> Bound | None:
         """The binding of a name, qualified or not."""
         alias, dot, rest = name.partition(".")
-        scope: Scope | None = self
-        while scope is not None and alias not in scope.names:
-            scope = scope.parent
-        result = None if scope is None else scope.names[alias]
+        result = find(self, alias)
         return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
@@ -78,6 +82,7 @@ class Bound:
     at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
     uses: list[Bound] = field(default_factory=list)  # names of files
     element: str = ""  # the name in a Scene of a geometry from a file of elements
+    number: float | None = None  # the value of a size from one
 
 
 @dataclass(slots=True)
@@ -97,9 +102,6 @@ def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[n
     return [bound.get(name) for name in params]
 
 
-_VALUES: Final = ("let", "param", "argument", "loop")
-
-
 class Lacking(Exception):
     """Raised where the page's model lacks a material or an element; the message names it."""
 
@@ -107,7 +109,9 @@ class Lacking(Exception):
 class Writer:
     """Writes statements of a scene's files as forms; ``elements`` come first in `shapes` and `paints`."""
 
-    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Element]) -> None:
+    def __init__(
+        self, context: FileContext, manifest: Manifest, elements: Iterable[Element | Gradient]
+    ) -> None:
         self.slots = 0  # of all files
         self.calls: list[Json] = []  # forms of the fns and modules that are called
         self.uses: list[Bound] = []
@@ -119,8 +123,8 @@ class Writer:
         self.files = {file.name: file.zoo for file in context.session.elements.values()}
         self.brought = Brought.of(tuple(context.session.elements.values()))
         self.textures = load_textures()
-        self.shapes = [element for element in listed if not element.material]
-        self.paints = [element for element in listed if element.material]
+        self.shapes = [e for e in listed if isinstance(e, Element) and not e.material]
+        self.paints: list[Element | Gradient] = [element for element in listed if element.material]
 
     def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
         """A block in a scope of its own."""
@@ -146,7 +150,11 @@ class Writer:
                     lines += self.file(brought, imported_tree, inside, imported=True)
                     continue
                 for name, binding in brought.scope.names.items():
-                    inside.names[name] = Bound("element", inside, file=brought, element=binding.value)
+                    inside.names[name] = bound = Bound(binding.kind, inside, file=brought)
+                    if binding.kind == "element":
+                        bound.element = binding.value
+                    else:
+                        bound.number = binding.value
             elif isinstance(stmt, nodes.Let | nodes.Param):
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
@@ -225,6 +233,8 @@ class Writer:
 
     def value(self, bound: Bound, scope: Scope) -> Json:
         """A variable."""
+        if bound.number is not None:
+            return bound.number
         if bound.scope.frame is None:
             self.uses.append(bound)
             return ["g", bound.slot]
@@ -254,6 +264,12 @@ class Writer:
                 return ["#", *(round(255 * part) for part in expr.rgb)]
             case nodes.Vector():
                 return ["[", *self.given(expr.items, scope)]
+            case nodes.ForItem():
+                items, inside = self.expression(expr.iterable, scope), Scope(scope.frame, scope)
+                target = self._define(expr.variable, "loop", inside)
+                return ["for", *target, items, self.expression(expr.body, inside)]
+            case nodes.IfItem():
+                return ["if", self.expression(expr.condition, scope), self.expression(expr.body, scope)]
             case nodes.Range():
                 ends = self.given((expr.start, expr.stop, expr.step), scope)
                 return ["..", int(expr.exclusive), *ends[: 2 if expr.step is None else 3]]
@@ -296,7 +312,9 @@ class Writer:
         """``["material", index of its shading, index of its paint or -1, block]``."""
         name, shading = written.name.text, written.shading
         alias, dot, rest = name.partition(".")
-        element = self.textures.get(name)
+        element: Element | Gradient | None = self.textures.get(name)
+        if name in GRADIENTS:
+            element = Gradient(name)  # whose stops are among the operations
         if dot and (file := scope.find(alias)) is not None and file.file is not None:
             element = self.brought.materials[file.file.materials[rest]]
         try:
@@ -306,7 +324,9 @@ class Writer:
         ops = [] if written.body is None else self.block(written.body, scope, "material")
         return ["material", *look, ops]
 
-    def _look(self, name: str, element: Element | None, shading: str | None = None) -> tuple[int, int]:
+    def _look(
+        self, name: str, element: Element | Gradient | None, shading: str | None = None
+    ) -> tuple[int, int]:
         """Indices of a material's shading and of its paint, -1 for none."""
         lit = name if element is None else shading or self.manifest.materials[0]
         paint = -1 if element is None else self._element(element, self.paints, name)
@@ -314,7 +334,7 @@ class Writer:
             raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
         return self.manifest.materials.index(lit), paint
 
-    def _element(self, element: Element, known: list[Element], name: str) -> int:
+    def _element(self, element: T, known: list[T], name: str) -> int:
         if element not in known:
             if element.kind not in self.manifest.elements:
                 raise Lacking(f"model `{self.manifest.name}` does not draw `{name}`")
@@ -364,16 +384,17 @@ class Writer:
     def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
-        worn = bound is not None and bound.kind in _VALUES and stmt.args is None
-        if name in SETTINGS and not worn and (bound is None or bound.kind != "module"):
+        head = head_of(stmt, bound, kind)
+        if head == "setting":
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
-            return None if name == "canvas" else [name, *args]
-        if name in LANGUAGE or (name in NEWER and not worn and (bound is None or bound.kind != "module")):
+            word = (name,) if name == "animate" else ("set", name)
+            return None if name == "canvas" else [*word, *args]
+        if head == "move":
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
-        if bound is None:
+        if bound is None or head == "leaf":
             if name not in self.manifest.geometries:
                 return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
             return ["object", self.manifest.geometries.index(name), body or []]
@@ -449,10 +470,12 @@ class PageProgram(Record):
     params: list[Json]  # that matter to the picture: their values, in radians and seconds, and ranges
     fixed: list[Json]  # names of those that no page can change, and why
     shapes: tuple[Element, ...]  # that rows name by index, behind the model's geometries
-    paints: tuple[Element, ...]
+    paints: tuple[Element | Gradient, ...]
 
 
-def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element] = ()) -> PageProgram:
+def form_of(
+    evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element | Gradient] = ()
+) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
     Args:
@@ -473,9 +496,11 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         "slots": writer.slots,
         "calls": writer.calls,
         "plain": 0,
+        "stage": _stage(),
         "media": [at for at, name in enumerate(manifest.materials) if name == "volumetric"],
         "geometries": manifest.geometries,
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],
+        "graded": [int(isinstance(paint, Gradient)) for paint in writer.paints],
         "blends": manifest.any_blend,
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
@@ -487,6 +512,18 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Eleme
         tuple(writer.shapes),
         tuple(writer.paints),
     )
+
+
+@cache
+def _stage() -> Json:
+    """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
+    usual, fields = stage_data(Stage()), {}
+    for name, word in STAGE.items():
+        schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
+        ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
+        columns = zip(usual[name], word.kinds, ranges, strict=True)
+        fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
+    return {"usual": usual, "fields": fields}
 
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:

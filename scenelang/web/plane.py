@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import HARD
 from scenelang.compiler.graph import LUMA
 from scenelang.compiler.program import STEPS, ProgramError
 from scenelang.drawing.neural import field
@@ -67,6 +68,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
         "UNIT": unit,
         "SLOPE": float(np.exp(network.read_slope)) / 4,
         "LUMA": f"vec3{LUMA}",
+        "HARD": HARD,
         **{name.upper(): float(at) for at, name in enumerate(STEPS)},
     }
     defines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())

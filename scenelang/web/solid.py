@@ -6,15 +6,18 @@ Each shape's decoder and each token's cell is prepared here, as a renderer would
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any, Final
 
 import numpy as np
 
+from scenelang.assets.gradient import HARD
 from scenelang.compiler.groups import INTERSECT, SUBTRACT
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage, stage_data
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
+from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import LOOSE, SLACK
 from scenelang.web.arrays import Store, web
 
@@ -29,13 +32,14 @@ _CONSTANTS: Final = {
     "LIFT": LIFT,
     "AMBIENT_EVEN": AMBIENT[0],
     "AMBIENT_UP": AMBIENT[1],
+    "HARD": HARD,
 }
 
 
 def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
-    paint, kind, width = config.paint_lines, config.kind_lines, config.width
+    paint, kind = config.paint_lines, config.kind_lines
     kinds = [*(network.cell(token, BLEND) for token in range(TOKENS))]
     kinds += [network.cut(token, BLEND) for token in (SUBTRACT, INTERSECT)]
     cells = np.concatenate([_cell(each[-1]) for each in kinds])
@@ -43,6 +47,7 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
+    parts += [_struct("Stage", stage_data(Stage()))]
     parts += [
         f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
@@ -59,9 +64,24 @@ def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
             "slack": SLACK,
             "loose": LOOSE,
             "far": RADIUS,
-            "products": width * (width + 4) + 2 * (1 + paint + kind),
+            "products": max(map(_products, decoders)) + 2 * (1 + paint + kind),
         },
     }
+
+
+def _struct(name: str, part: dict[str, Any]) -> str:
+    """GLSL of the type of a part of the stage, behind those of its own parts."""
+    inner = [_struct(field.title(), value) for field, value in part.items() if isinstance(value, dict)]
+    types = {tuple: "vec3", float: "float", bool: "bool"}
+    lines = [f"{types.get(type(value), field.title())} {field};" for field, value in part.items()]
+    return "\n".join([*inner, f"struct {name} {{ {' '.join(lines)} bool on; }};"])
+
+
+def _products(layers: Smooth | Norms) -> int:
+    """How many products an answer takes."""
+    if isinstance(layers, Norms):
+        return layers.products
+    return sum(w.size for w, _ in layers)
 
 
 def _cell(cell: Cell) -> np.ndarray:
@@ -85,14 +105,15 @@ def _gates(paint: int, kind: int) -> str:
     return "".join(f"float {name}{head} {{\n  {largest(*lines)}\n}}\n" for name, lines in parts.items())
 
 
-def _decoders(decoders: Sequence[Smooth], sloped: bool) -> str:
+def _decoders(decoders: Sequence[Smooth | Norms], sloped: bool) -> str:
     """GLSL of the decoders, those of shapes that a scene shows; if sloped with their gradients.
 
     Weights are literals: compilers make three times as much of these as of uniforms.
     """
     lines = []
     for shape, layers in enumerate(decoders):
-        body = [f"    {line}" for line in _decoder(layers, sloped)]
+        made = _norms(layers, sloped) if isinstance(layers, Norms) else _decoder(layers, sloped)
+        body = [f"    {line}" for line in made]
         lines += [f"#ifdef SHAPE_{shape}", f"  if (shape == {shape}) {{", *body, "  }", "#endif"]
     head = f"float decoder(int shape, vec3 q{', out vec3 g' if sloped else ''}) {{"
     return "\n".join([head, *(["  g = vec3(0.0);"] if sloped else []), *lines, "  return EMPTY;", "}"])
@@ -122,6 +143,51 @@ def _decoder(layers: Smooth, sloped: bool) -> list[str]:
         lines.append(f"g = vec3({', '.join(_back(w1[:, j], 'a') for j in range(3))});")
     last = [f"dot(b{k}, {_four(w3[0, 4 * k : 4 * k + 4])})" for k in range(quads)]
     return [*lines, f"return {' + '.join([repr(float(b3[0])), *last])};"]
+
+
+def _norms(layers: Norms, sloped: bool) -> list[str]:
+    """Statements that return the answer of norm units, as `norms.answers`."""
+    names = ("s.x", "s.y", "s.z", "across", "q.y", "most", "least")
+    used = [names[i] for i in layers.features]
+    levels = [
+        " + ".join([repr(float(b)), *(f"{x} * {v!r}" for x, v in zip(used, row.tolist(), strict=True) if v)])
+        for row, b in zip(layers.w, layers.b, strict=True)
+    ]
+    lines = [
+        "vec3 s = abs(q);",
+        "float across = length(q.xz), most = max(max(s.x, s.y), s.z), least = min(min(s.x, s.y), s.z);",
+        *(f"float l{i} = {level};" for i, level in enumerate(levels)),
+    ]
+    outer, at, lengths = sum(layers.units), 0, []
+    lines += [f"l{i} = max(l{i}, 0.0);" for i in range(outer)]
+    for k, size in enumerate(layers.units):
+        squares = [f"l{i} * l{i}" for i in range(at, at + size)]
+        lines.append(f"float u{k} = sqrt({' + '.join(squares)});")
+        lengths.append(f"u{k}")
+        at += size
+    lines.append(f"float far = {_highest(lengths) if lengths else '0.0'};")
+    inner = [f"l{i}" for i in range(outer, len(levels))]
+    lines.append(f"float deep = min({_highest(inner) if inner else '0.0'}, 0.0);")
+    if sloped:
+        lines.append("vec3 a = vec3(0.0); float about = 0.0, up = 0.0, top = 0.0, low = 0.0;")
+        places = ("a.x", "a.y", "a.z", "about", "up", "top", "low")
+        at = 0
+        rates = []
+        for k, size in enumerate(layers.units):
+            rates += [f"u{k} == far ? l{i} / max(far, 1e-18) : 0.0" for i in range(at, at + size)]
+            at += size
+        rates += [f"deep < 0.0 && {name} == deep ? 1.0 : 0.0" for name in inner]
+        for rate, row in zip(rates, layers.w.tolist(), strict=True):
+            terms = [f"{places[i]} += r * {v!r};" for i, v in zip(layers.features, row, strict=True) if v]
+            lines.append(f"{{ float r = {rate}; {' '.join(terms)} }}")
+        lines.append("a += top * vec3(equal(s, vec3(most))) + low * vec3(equal(s, vec3(least)));")
+        lines.append("g = mix(a, -a, vec3(lessThan(q, vec3(0.0)))) + vec3(0.0, up, 0.0);")
+        lines.append("g.xz += q.xz * (about / max(across, 1e-18));")
+    return [*lines, f"return far + deep - {float(layers.radius)!r};"]
+
+
+def _highest(names: Sequence[str]) -> str:
+    return reduce(lambda a, b: f"max({a}, {b})", names)
 
 
 def _padded(w: np.ndarray, b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:

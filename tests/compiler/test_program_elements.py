@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
+from scenelang.assets.element import Element
 from scenelang.assets.element_file import ElementFile
+from scenelang.assets.gradient import Gradient
+from scenelang.assets.tensors import read_tensors
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.emit import emit
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move
@@ -123,6 +126,38 @@ def test_damaged_paints() -> None:
         (lambda h, t: t.update(steps=t["steps"] + np.float32(0.5)), "step that this version"),
         (lambda h, t: t.update(steps=t["steps"] + np.float32(2)), "step that this version"),
         (lambda h, t: t.update(steps=np.full((3, 4), np.nan, np.float32)), "not finite"),
+    ])  # fmt: skip
+
+
+SUNSET = Gradient("radial", ((0.0, 1.0, 0.5, 0.0), (0.5, 0.0, 0.0, 0.25), (0.5, 1.0, 1.0, 1.0)))
+GRADED = painted(Paint(SUNSET, STEPS), Paint(Gradient("linear", SUNSET.stops[:2])), worn=[1, 0], elements=())
+
+
+@pytest.mark.parametrize("elements", [(), (BARK,)])
+def test_gradients_come_back(elements: tuple[Element, ...]) -> None:
+    palette = (*GRADED.palette, *[Paint(element) for element in elements])
+    made = painted(*palette, worn=[len(palette) - 1, 0], elements=elements)
+    found = parse_program(program_bytes(made))
+    assert found.paints() == made.paints()
+    assert found.elements == elements
+    assert found.digest() == made.digest() != PAINTED.digest()
+    assert program_bytes(found) == program_bytes(made)
+    assert read_tensors(program_bytes(made), 1 << 20, (5,)).header["format"] == 5
+
+
+def test_damaged_gradients() -> None:
+    refused(program_bytes(GRADED), [
+        (lambda h, t: h.update(format=4), "other tensors than a program of format 4"),
+        (lambda h, t: t.pop("worn"), "other tensors than a program of format 5"),
+        (lambda h, t: t.pop("stops"), "no stop"),
+        (lambda h, t: t.update(stops=t["stops"][:4]), "one stop"),
+        (lambda h, t: t.update(stops=t["stops"][:, :4]), "tensor `stops` is F32"),
+        (lambda h, t: t.update(paints=np.array([[-3, 3], [-1, 0]], np.int32)), "not listed"),
+        (lambda h, t: t.update(stops=t["stops"] + np.array([1, 0, 0, 0, 0], np.float32)), "no gradient has"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, 3, 1, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, -1, 1, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, 1, 2, 1, 1], np.float32)), "outside 0..1"),
+        (lambda h, t: t.update(stops=t["stops"] * np.array([1, np.nan, 1, 1, 1], np.float32)), "not finite"),
     ])  # fmt: skip
 
 

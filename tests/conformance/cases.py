@@ -20,7 +20,7 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program
 from scenelang.compiler.spaces import stage_data
 from scenelang.drawing.exact.field import evaluate, sample_points
-from scenelang.drawing.exact.picture import reference_image
+from scenelang.drawing.exact.picture import reference_image, true_shapes
 from scenelang.drawing.exact.solid import solid_image
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.evaluation import Source
@@ -120,6 +120,6 @@ def is_stable(graph: Graph, by: float = 1e-9) -> bool:
     points = sample_points(graph.canvas, range(graph.canvas[1]), 2)
     pictures = []
     for dx, dy in ((0.0, 0.0), (by, by), (-by, by), (by, -by), (-by, -by)):
-        d, c = evaluate(graph.root, points + np.array([[dx], [dy]]))
+        d, c = evaluate(graph.root, points + np.array([[dx], [dy]]), brought=true_shapes(graph, None))
         pictures.append(np.where((d < 0)[:, None], c, -1.0))
     return all(np.abs(p - pictures[0]).max() < 1e-6 for p in pictures)

@@ -18,12 +18,13 @@ from scenelang.compiler.lifting import Parts, inverse_frame
 from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage, Triple
 from scenelang.compiler.steps import Affine, Displace, Grow, Shell, Step, Twist, Warp, composed
-from scenelang.compiler.weights import shipped_weights
+from scenelang.compiler.weights import open_weights, shipped_weights
 from scenelang.drawing.neural.files import solid_arrays
 from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import SolidArrays, SolidNetwork, Wanted
 from scenelang.drawing.solid.passes import END, INF, OBJECT, SLOT, WAY, Passes
+from scenelang.language import words
 from scenelang.language.words import BLEND, COMBINE, TOKENS, Combine
 
 
@@ -54,7 +55,7 @@ def sheared(axes: str, k: float) -> Affine:
     return Affine(affine.shearing(axes, k))
 
 
-LEAVES, MATERIALS = ("sphere", "torus"), ("diffuse", "volumetric")
+LEAVES, MATERIALS = (*words.LEAVES[3],), ("diffuse", "volumetric")
 
 
 class Object(NamedTuple):
@@ -82,15 +83,12 @@ def network() -> SolidArrays:
 
 def weights() -> dict[str, np.ndarray]:
     """Of the shipped network, by their names in its file."""
-    net = network()
-    named = {k: v for k, v in vars(net).items() if isinstance(v, np.ndarray)}
-    groups = ("decoder_w", "decoder_b", "segment_w", "segment_b")
-    return named | {f"{group}.{i}": getattr(net, group)[i] for group in groups for i in range(3)}
+    return {name: value.copy() for name, value in open_weights(shipped_weights("solids3d")).arrays.items()}
 
 
 def torch_network() -> Solids:
     """The shipped network in torch."""
-    net = Solids(network().config, 2, 2)
+    net = Solids(network().config, len(LEAVES), len(MATERIALS))
     net.load_state_dict({name: torch.from_numpy(value) for name, value in weights().items()})
     return net.requires_grad_(False)
 
@@ -284,7 +282,7 @@ def random_tree(rng: np.random.Generator, depth: int, media: float = 0.0) -> Tre
                 moved(*rng.uniform(-0.5, 0.5, 3)),
             )
             kind = MATERIALS[int(rng.random() < media)]
-            return Object(str(rng.choice(LEAVES)), steps, kind, tuple(rng.uniform(0.1, 0.9, 3).tolist()))
+            return Object(str(rng.choice(LEAVES[:2])), steps, kind, tuple(rng.uniform(0.1, 0.9, 3).tolist()))
         joins = []
         for at in range(int(rng.integers(2, 4))):
             op: Combine = "union" if at == 0 else COMBINE[rng.integers(4)]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from scenelang.drawing.metrics import compare, flip, flip_map, psnr, ssim
+from scenelang.drawing.metrics import GAP, TEXT, compare, flip, flip_map, psnr, side_by_side, ssim
 
 GREY = np.full((32, 48, 3), 0.5, np.float32)
 
@@ -39,3 +39,12 @@ def test_flip_map_is_where_the_error_is() -> None:
     error = flip_map(spoilt, GREY)
     assert error.shape == (32, 48)
     assert error[:, 44:].mean() > 0.1 > 10 * error[:, :20].mean()
+
+
+@pytest.mark.parametrize("side", [64, 128])
+def test_names_stand_above_their_own_pictures(side: int) -> None:
+    grey = np.full((side, side, 3), 0.5, np.float32)
+    row = side_by_side(grey, grey, "#12 34.5 dB")
+    names = row[-side - TEXT : -side].min(axis=(0, 2))
+    for column in (1, 2):
+        assert names[column * (side + GAP) - GAP :][:GAP].min() == 1.0

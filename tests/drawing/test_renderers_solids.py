@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
-from lab.training.checkpoint import save_tensors
 from scenelang.assets.picture import painted
 from scenelang.assets.pyramid import unpacked
+from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Affine, Displace, Step, Twist
+from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.exact.field import combine, leaf_distance
 from scenelang.drawing.exact.solid import Field, solid_image
-from scenelang.drawing.neural.files import solid_arrays
+from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.network import EMPTY, SolidArrays, SolidConfig, Wanted, element_box, surrounding
+from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted, element_box, surrounding
 from scenelang.drawing.solid.passes import BEGIN, END, RATE, SLACK
 from scenelang.language.words import TOKENS
 from tests.assets.shapes import element, noise, torus
@@ -58,6 +58,8 @@ def test_leaves_are_exact_near_their_surfaces(leaf: str) -> None:
     across = np.cross(normal, found.gradient, axis=0)
     angle = np.degrees(np.arctan2(np.linalg.norm(across, axis=0), (normal * found.gradient).sum(0)))
     assert np.median(angle) < 0.2
+    flat = leaf not in LEAVES[:2]
+    assert np.percentile(angle, 99) < (0.5 if flat else 2)
 
 
 @pytest.mark.parametrize("token", TOKENS)
@@ -135,7 +137,7 @@ def test_tiles_and_threads_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_swapped_codes_swap_shapes() -> None:
     step = (scaled(0.8),)
-    ball, ring = (draw_solids(field([Object(leaf, step)]), Stage(), (32, 32))[0] for leaf in LEAVES)
+    ball, ring = (draw_solids(field([Object(leaf, step)]), Stage(), (32, 32))[0] for leaf in LEAVES[:2])
     g = vector(Object("sphere", step), network())
     g[:4] = network().codes[1]
     swapped, *_ = draw_solids(SolidField(network(), g[None], np.zeros(1, np.int8)), Stage(), (32, 32))
@@ -193,9 +195,12 @@ APART = [
 def test_boxes_are_those_of_the_leaf(leaf: str) -> None:
     net = network()
     found = net.box(net.decoder(net.codes[LEAVES.index(leaf)]))
-    half = [1.0, 0.3 if leaf == "torus" else 1.0, 1.0]
-    assert (abs(found) >= np.array(half) - 0.002).all()
-    assert (abs(found) <= np.array(half) + 0.03).all()
+    half = np.array(GEOMETRIES[leaf].half)
+    beyond = np.stack([-half, half])
+    beyond[0, 1] = -0.5 if leaf == "cone" else beyond[0, 1]
+    beyond = (found - beyond) * [[-1], [1]]
+    assert beyond.min() >= -0.002
+    assert beyond.max() <= 0.03
 
 
 def test_boxes_hold_what_lies_apart_and_askew() -> None:
@@ -311,7 +316,8 @@ FAR = Object("sphere", (scaled(0.3, 0.4, 0.3), moved(-1.1, -0.3, 0.9)), "volumet
 
 def marching() -> SolidArrays:
     """The shipped network without its answers, as files of before had it."""
-    return SolidArrays(SolidConfig(), {k: v for k, v in weights().items() if not k.startswith("segment")})
+    config = replace(network().config, segment=0, answered=0)
+    return SolidArrays(config, {k: v for k, v in weights().items() if not k.startswith("segment")})
 
 
 def rays(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -372,7 +378,9 @@ def test_where_they_do_not_hold_rays_are_marched(objects: list[Object]) -> None:
     touched = lengths(field([MIST])) > 0  # others may pass one ball alone
     asked, marched = lengths(field(objects))[touched], lengths(field(objects, marching()))[touched]
     assert (marched > 0).sum() > 300
-    np.testing.assert_allclose(asked, marched, rtol=0, atol=1e-5)  # batches round differently
+    off = abs(asked - marched)  # batches round differently, and rays are followed from other places
+    assert np.percentile(off, 99) < 2e-4
+    assert off.max() < 3e-3
 
 
 def test_random_weights_draw_other_light_and_none_march() -> None:
@@ -390,12 +398,19 @@ def test_random_weights_draw_other_light_and_none_march() -> None:
     assert psnr_db(mine, theirs) > 80
 
 
-def test_files_of_before_load(tmp_path: Path) -> None:
-    old = {k: torch.from_numpy(v) for k, v in weights().items() if not k.startswith("segment")}
-    sizes = {"code": 4, "material_code": 2, "width": 8, "paint_lines": 2, "kind_lines": 2}
-    save_tensors(tmp_path / "old", old, {"format": 1, "config": {"network": sizes}})
-    found = solid_arrays((tmp_path / "old").read_bytes(), 2, 2)
-    assert (lengths(field([MIST], found)) == lengths(field([MIST], marching()))).all()
+def test_weights_of_before_draw_as_they_did() -> None:
+    """Layers of SiLU units, which knew two leaves by codes that these still have."""
+    digest = "bab13c03f05d30652d0d0c58a7508ae7072d798f881b7a17902d7f66f6384f0a"
+    old, known = load_arrays("solids3d", digest)
+    assert known == digest
+    assert (old.codes == network().codes[:2]).all()
+    q = rng.uniform(-1.2, 1.2, (3, 2000)).astype(np.float32)
+    for leaf, code in zip(LEAVES, old.codes, strict=False):
+        assert isinstance(old.decoder(code), Smooth)
+        exact = leaf_distance(leaf, q)
+        near = abs(exact) < 0.05
+        assert abs(old.field(q, old.decoder(code), False)[0] - exact)[near].max() < 3e-3
+    np.testing.assert_allclose(lengths(field([MIST], old)), lengths(field([MIST])), atol=2e-2)
 
 
 STEPS = (("hue", 0.2), ("grayscale", 0.3), ("color", 0.9, 0.6, 1.0))

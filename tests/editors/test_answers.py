@@ -14,7 +14,7 @@ from PIL import Image
 from scenelang.assets.element import Part
 from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.manifest import available
-from scenelang.language.words import TEXTURES
+from scenelang.language.words import PAINTS
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.editors.client import CAPABILITIES, Client, Json
 from tests.editors.conftest import LIBRARY, SCENE
@@ -128,7 +128,7 @@ def test_completion_of_arguments_members_paths_models_and_units(client: Client, 
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
     client.replace(uri, 'model "shapes2d";\nsquare { material flat; }\n// squ\nlet \n/* sc */\n')
-    assert set(labels(client, client.at(uri, "flat"))) == {"flat", *TEXTURES}
+    assert set(labels(client, client.at(uri, "flat"))) == {"flat", *PAINTS}
     for text in ("// squ", "let ", "/* sc"):  # comments, and names that are made up
         assert labels(client, client.at(uri, text, len(text))) == [], text
 
@@ -291,6 +291,27 @@ def test_rename_goes_across_imports_and_keeps_the_meaning(client: Client, uri: s
     assert client.applied(SCENE, changes[uri]) == SCENE.replace("size = r", "side = r")
 
 
+def test_loops_in_vectors_are_completed_told_and_renamed(client: Client, uri: str) -> None:
+    text = "let late = 1;\nlet v = [for (i in 0..3) if (i > 1) [i, late]];\nsquare { scale(len(v)); }\n"
+    client.replace(uri, text)
+    assert "for (i in 0..3)" in hover(client, client.at(uri, "[i,", 1))
+    edit = client.request("textDocument/rename", {**client.at(uri, "i in", 0), "newName": "turn"})
+    (changes,) = [c["edits"] for c in edit["documentChanges"]]
+    renamed = text.replace("(i in", "(turn in").replace("(i >", "(turn >").replace("[i,", "[turn,")
+    assert client.applied(text, changes) == renamed
+    client.replace(uri, text + "let w = [for (k in 0..3) , for (")
+    for before, offered, withheld in (
+        ("0..3) ,", "k late for if sin", "star"),
+        ("3) , ", "late for if sin", "k"),
+        ("3) , for (", "", "late for"),
+        ("(k ", "in", "late"),
+        ("(i > ", "i late", "for"),
+    ):
+        found = set(labels(client, client.at(uri, before, len(before) - before.endswith(","))))
+        assert set(offered.split()) <= found, before
+        assert not set(withheld.split()) & found, before
+
+
 def test_rename_refuses_what_would_change_the_meaning(client: Client, uri: str) -> None:
     for word, shift, new, why in (
         ("let r", 4, "k", "already defined in line 3"),
@@ -381,7 +402,7 @@ def test_elements_groups_and_materials_are_proposed_and_told_of(
     client.replace(uri, text + "sphere { material diffuse zoo.ring; }\ntorus { material zoo.; }\nzoo.;\n")
     assert labels(client, client.at(uri, "zoo.;\n", 4)) == ["ball", "car()", "ring", "ring()"]
     assert labels(client, client.at(uri, "zoo.; }", 4)) == ["bark", "ring"]
-    assert set(labels(client, client.at(uri, "material diffuse", 9))) >= {"diffuse", "flat", "zoo", *TEXTURES}
+    assert set(labels(client, client.at(uri, "material diffuse", 9))) >= {"diffuse", "flat", "zoo", *PAINTS}
     assert labels(client, client.at(uri, "diffuse zoo", 8))[-1] == "zoo"
     shape = ["element of space: 33 × 33 × 33 distances", "license: none needed", "ring(): group of ring"]
     rows = [("zoo.ring {", 5, shape), ("zoo.ring;", 5, ["texture: 3 × 2 colours"])]

@@ -6,12 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsprotocol import types
 
+import scenelang as nsg
 from scenelang.editors.context import cursor_at
-from scenelang.editors.workspace import Encoding, Lines, difference
+from scenelang.editors.workspace import Encoding, Lines, Workspace, difference
 from scenelang.language import expressions, tree
 from scenelang.language.builder import Place
 from scenelang.language.definitions import Names
@@ -64,6 +65,56 @@ def test_names_mean_what_they_mean_to_the_evaluator(monkeypatch: pytest.MonkeyPa
                 assert use is not None, name
                 assert use.symbol is not None, name
                 assert use.symbol.span == place, name
+
+
+PIECES = [
+    *"{}()[];,\"'#x",
+    "/*",
+    "*/",
+    "//",
+    "\n",
+    "let a = 3;",
+    "star { }",
+    "else { }",
+    "30 deg",
+    "in",
+    "color: red;",
+]
+
+
+@given(st.lists(st.tuples(st.integers(0, 4000), st.integers(0, 30), st.sampled_from(PIECES)), max_size=4))
+@settings(max_examples=8, deadline=None)
+def test_a_text_that_is_typed_reads_as_if_it_were_new(edits: list[tuple[int, int, str]]) -> None:
+    """Statements that are kept are as they would be read, with all places, mistakes and names."""
+    row = "module m{0}(a = {0}) {{ star {{ rotate(a * 1deg); }} }} // note\nm{0}();\nlet b{0} = [{0}, X];\n"
+    document = Workspace().put("untitled:a", "".join(map(row.format, range(50))), 1)
+    assert not document.syntax
+    for at, count, piece in edits:
+        end = at if count > 15 else at + count
+        change = types.TextDocumentContentChangePartial(document.lines.range(at, end), piece)
+        document.change(change)
+        diagnostics = Diagnostics()
+        file = parse(document.source, diagnostics)
+        assert document.syntax == tuple(diagnostics)
+        assert document.names_at(at).top.names.keys() == Names(file).top.names.keys()
+        seen, known = document.names_at(at).visible(at), Names(file).visible(at)
+        assert [(s.name, s.span) for s in seen] == [(s.name, s.span) for s in known]
+        assert document.file == file
+
+
+def test_inside_a_module_named_like_a_leaf_the_bare_name_is_the_leaf() -> None:
+    text = "module star(k) { star { scale(k); } if (k > 1) { star(1); } } star(2); star { }"
+    scene = nsg.loads(
+        "module star(k = 2) { star { scale(k); } if (k > 1) { star(1); } } star(3) { } star { }"
+    )
+    assert [[child.transforms[0].x for child in node.children] for node in scene.nodes] == [[3, 1], [2, 1]]
+    names = Names(parse(SourceFile("", text), Diagnostics()))
+    stars = [use for use in names.uses if use.text == "star"]
+    assert [use.role if use.symbol is None else "module" for use in stars] == [
+        "module",
+        "geometry",
+        *["module"] * 3,
+    ]
 
 
 BLOCKS = [

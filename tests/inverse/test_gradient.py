@@ -29,6 +29,11 @@ SCENES = {
     "blends": "background(none); param x = 0.5 in 0..1; param k = 0.2 in 0.05..0.4; param r = 0.3 in 0..1;"
     "smooth(k = k) { star { scale(0.4); translate(-0.2, 0); material flat { color([r, 0.2, 0.1]); } }"
     "square { scale(0.3); translate(x, 0); material flat { color(#2288dd); } } }",
+    "glass": "background([0.9, 0.8, 0.5]); param x = 0.1 in -1..1; param a = 0.6 in 0..1;"
+    "param r = 0.3 in 0..1;"
+    "chain { square { scale(0.6); material flat { color([r, 0.2, 0.1]); opacity(1 - a); } }"
+    "pentagon { scale(0.4); translate(x, 0.1); material flat { color([0.1, r, 0.9]); opacity(a); } }"
+    "smooth star { scale(0.3); translate(-0.3, x); } }",
     "occlusion": "param x = 0.1 in -1..1; param r = 0.3 in 0..1; param g = 0.4 in 0..1;"
     "background([g, 0.5, 0.2]); square { scale(0.6); material flat { color([r, 0.2, 0.1]); } }"
     "pentagon { scale(0.4); translate(x, 0.1); material flat { color([0.1, r, 0.9]); } }",

@@ -81,6 +81,16 @@ def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     assert abs(pictures[0] - pictures[1]).mean() < 2e-3
 
 
+def test_what_is_learned_keeps_the_size_of_its_file(folder: Path) -> None:
+    code, output = run("2 boxes.stl", "-o", "zoo.safetensors", "--name", "box")
+    assert code == 0
+    assert "box_size is 1.87083, the file's (0, 0, 0) is the origin" in output
+    assert load_element_file("zoo.safetensors").geometries["box"].size == pytest.approx(14**0.5 / 2)
+    Path("scene.nsg").write_text('import "zoo.safetensors" as zoo; zoo.box { scale(zoo.box_size); }')
+    mesh = nsg.to_mesh("scene.nsg", resolution=32)
+    assert abs(np.ptp(mesh.vertices, 0) - [1, 2, 3]).max() < 0.02
+
+
 def test_a_picture_becomes_a_texture_or_an_outline(folder: Path) -> None:
     """Both under one name, a material and a geometry; a second time neither is made again."""
     shades = np.linspace(0, 255, 300 * 200 * 3).reshape(200, 300, 3).astype(np.uint8)

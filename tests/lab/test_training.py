@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
@@ -14,12 +15,16 @@ from lab.training.checkpoint import load_tensors
 from lab.training.config import Phase, SolidsConfig, TrainConfig
 from lab.training.leaves import half_rays
 from lab.training.loop import train
+from lab.training.norms import Start, fitted
 from lab.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
-from lab.training.solids import fit_cell, fit_decoders, polish_decoders, train_solids
+from lab.training.solids import fit_cell, fit_segments, train_solids
+from scenelang.compiler.geometries import GEOMETRIES as GEOMETRY
+from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.files import solid_arrays
 from scenelang.drawing.neural.load import Solids, load_model
 from scenelang.drawing.neural.network import FramedConfig
 from scenelang.drawing.solid.network import SolidConfig
+from scenelang.drawing.solid.norms import answers, norms
 from tests.drawing import oracle
 
 WORDS = ("union", "smooth", "subtract", "intersect")
@@ -129,36 +134,44 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
 
-TINY = SolidsConfig("solids3d", 3, 4, 4, 20, 4, SolidConfig(width=4, segment=4))
+NORMS = SolidConfig(units=2, hidden=8, segment=4, answered=2)
+TINY = SolidsConfig("solids3d", 3, 4, 4, NORMS)
 
 
-def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path) -> None:
+def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
+    monkeypatch.setattr("lab.training.solids.fitted", lambda leaf, seed: (Start(leaf, seed), 1.0))
     assert not train_solids(TINY, tmp_path / "two", budget_s=1e-9)
     while not train_solids(TINY, tmp_path / "two", budget_s=1e-3, report=lambda *a: told.append(a[:2])):
         pass
     assert train_solids(TINY, tmp_path / "one")
     one, two = (
-        solid_arrays((tmp_path / name / "weights.safetensors").read_bytes(), 2, 2) for name in ("one", "two")
+        solid_arrays((tmp_path / name / "weights.safetensors").read_bytes(), 7, 2) for name in ("one", "two")
     )
     assert (one.codes == two.codes).all()
-    assert (one.decoder_w[1] == two.decoder_w[1]).all()
+    assert (one.lines == two.lines).all()
     assert (one.segment_w[1] == two.segment_w[1]).all()
-    assert told[0] == (0, 32)
-    assert told[-1] == (32, 32)
+    assert told[0] == (0, 15)
+    assert told[-1] == (15, 15)
     with pytest.raises(ValueError, match="another configuration"):
         train_solids(replace(TINY, seed=4), tmp_path / "one")
 
 
 def test_every_part_of_the_training_learns() -> None:
     torch.manual_seed(1)
-    network, g = Solids(SolidConfig(width=8), 2, 2), torch.Generator().manual_seed(1)
+    network, g = Solids(NORMS, 7, 2), torch.Generator().manual_seed(1)
     assert fit_cell(network, 300, g) < fit_cell(Solids(SolidConfig(), 2, 2), 1, g) / 2
-    before = fit_decoders(network, 150, g)
-    assert before < 0.5 * fit_decoders(Solids(SolidConfig(width=8), 2, 2), 1, g)
-    first = polish_decoders(network, 1, g, 500)
-    last = polish_decoders(network, 12, g, 500)
-    assert all(last[leaf] < 0.5 * first[leaf] for leaf in first)
+    assert fit_segments(network, 60, g, 256) < fit_segments(network, 2, g, 256)
+
+
+@pytest.mark.parametrize("leaf", ["torus", "octahedron"])
+def test_norm_units_come_out_right(leaf: str) -> None:
+    start, error = fitted(leaf, 1)
+    assert error < 1e-7
+    lines, radius = start.placed(2)
+    decoder = norms(NUMPY, lines, np.float64(radius), 3.0)
+    p = np.random.default_rng(1).uniform(-1.5, 1.5, (3, 1000))
+    np.testing.assert_allclose(answers(NUMPY, p, decoder, False)[0], GEOMETRY[leaf].distance(p), atol=1e-6)
 
 
 def test_half_rays_are_as_long_in_a_sphere_as_in_closed_form() -> None:

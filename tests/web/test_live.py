@@ -19,6 +19,7 @@ from scenelang.compiler.compile import compile_scene, find_model
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.passes import OPTIONAL
 from scenelang.compiler.program import Program
+from scenelang.compiler.spaces import stage_data
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import Diagnostics, SourceFile
@@ -28,7 +29,7 @@ from scenelang.language.reports import SceneError
 from scenelang.language.scene import Camera
 from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
 from scenelang.language.words import FUNCTIONS
-from scenelang.web.arrays import rows_of, stage_of
+from scenelang.web.arrays import rows_of, worn_of
 from scenelang.web.form import PageProgram, Scope, Writer, form_of
 from tests.assets.scenes import IMPORT
 from tests.compiler.random_scenes import blob_scene, full_scene
@@ -36,7 +37,7 @@ from tests.language.test_elements import garage
 
 pytestmark = pytest.mark.browser
 WORDS = ("token", "material", "object")
-NUMBERS = ("colour", "scale", "blend", "amount", "frequency")
+NUMBERS = ("colour", "opacity", "scale", "opacity", "blend", "amount", "frequency")
 POINTS = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 50))
 
 
@@ -49,7 +50,7 @@ class Compiled(NamedTuple):
 
     def form(self) -> PageProgram:
         """The same for a page."""
-        return form_of(self.evaluation, self.manifest, self.program.elements)
+        return form_of(self.evaluation, self.manifest, worn_of(self.program))
 
 
 def compiled(source: SourceFile, path: Path | None = None, frame: int = 0, **inputs: Any) -> Compiled:
@@ -96,13 +97,14 @@ def check_picture(picture: dict[str, Any], expected: Compiled, form: PageProgram
     network, _ = load_arrays(program.model)
     rows = rows_of(program, manifest, network.codes, network.material_codes)
     shapes = [element for element in program.elements if not element.material]
-    paints = [element for element in program.elements if element.material]
+    paints = [element for element in worn_of(program) if element.material]
     assert len(picture["rows"]) == len(rows)
     for row, own in zip(picture["rows"], rows, strict=True):
         assert [row[key] for key in WORDS] == [own[key] for key in WORDS]
         mine, theirs = [*manifest.geometries, *form.shapes], [*manifest.geometries, *shapes]
         assert mine[row["shape"]] == theirs[own["shape"]]
         assert [*form.paints, None][row["paint"]] == [*paints, None][own["paint"]]
+        np.testing.assert_allclose(row.get("stops") or [], own.get("stops", []), atol=1e-6)
         inks, own_inks = row.get("paintSteps") or [], own.get("paintSteps", [])
         assert [step[0] for step in inks] == [step[0] for step in own_inks]
         numbers = [*NUMBERS, *["place"][: row["paint"] >= 0]]
@@ -110,10 +112,11 @@ def check_picture(picture: dict[str, Any], expected: Compiled, form: PageProgram
             np.testing.assert_allclose(_numbers(one), _numbers(other), rtol=1e-5, atol=1e-6)
         here, there = (carried(one["steps"], POINTS[: manifest.dimension]) for one in (row, own))
         np.testing.assert_allclose(here, there, rtol=2e-4, atol=2e-4)
-    stage = None if program.stage is None else stage_of(program.stage)
+    stage = None if program.stage is None else stage_data(program.stage)
     assert _flat(picture["stage"]).keys() == _flat(stage).keys()
     for name, number in _flat(stage).items():
         np.testing.assert_allclose(_flat(picture["stage"])[name], number, atol=1e-9, err_msg=name)
+    assert picture["samples"] == program.samples
     assert picture["background"] == (None if program.background is None else list(program.background))
 
 
@@ -258,6 +261,9 @@ MISTAKES = [
     ("group { square; if (n > 1) { scale(2); } star; }", 2, "a child after a transform"),
     ("chain { if (n < 2) { square; } subtract star; }", 2, "nothing before it"),
     ('square { rotate(n > 1 ? "no" : 0); }', 2, "expected an angle, found a string"),
+    ("star { material flat { opacity(n); } }", 2, "opacity of 2 is outside"),
+    ("star { material flat { opacity(0.5); if (n > 1) { opacity(0.6); } } }", 2, "given twice"),
+    ("samples(n > 1 ? 9 : 16); star;", 2, "9 samples"),
     ("param k = 1 in 0..n; square { scale(k); }", 0.5, "`k` is outside its range"),
     ("square { twirl(1); for (i in 1..n) { scale(1, 2); bend(1); } }", 4, "deformations"),
 ]

@@ -35,6 +35,7 @@ from scenelang.web.plane import leaves
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.browser import watched
 from tests.drawing.test_bounds import of_sets, rng_of, wild
+from tests.drawing.test_opacity import see_through
 from tests.drawing.test_trees import LEFT, scene_of
 from tests.pictures import premultiplied, psnr_db
 from tests.test_examples import SCENES, sized
@@ -122,7 +123,7 @@ def asked(program: Program, p: np.ndarray) -> np.ndarray:
     coverage, points = Coverage(field, skip=False), np.ascontiguousarray(p.T)[:, :, None]
     trace = field.trace(len(p), count)
     memory = coverage.ask(meetings, points, tile, trace)[2]
-    add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool), 0.0)
+    add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool))
     found: np.ndarray = memory[:, :, 0]
     found[:, 0] /= field.unit
     return found
@@ -184,6 +185,27 @@ def test_pictures_of_examples_are_the_networks(page: Any) -> None:
     assert not {name: (db, least) for name, (db, least) in found.items() if db < least}
 
 
+GRADED = """
+    nsg 1; canvas(96, 64); background(none);
+    chain {
+      square { scale(1.1, 0.6);
+        material linear { stop(0.1, #f00); stop(0.4, #0f0); stop(1, #00f); rotate(40deg); } }
+      smooth star { scale(0.7);
+        material radial { stop(0, #ff0); stop(0.3, #f0f); stop(0.3, #000); hue(80deg); } }
+      subtract pentagon { scale(0.2); translate(0.4, 0.2); }
+      triangle { scale(0.5); bend(0.5); translate(-0.6, 0.2); material bricks { scale(0.5); } }
+    }
+"""
+
+
+@pytest.mark.browser
+def test_gradients_are_the_networks(page: Any) -> None:
+    program = nsg.compile(nsg.loads(GRADED))
+    assert compared(page, program) > LEAST_DB[2]
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (500, 2)).astype(np.float32)
+    np.testing.assert_allclose(answered(page, program, points), asked(program, points), atol=2e-3)
+
+
 @pytest.mark.browser
 def test_random_pictures_are_the_networks(page: Any) -> None:
     """Elements, textures, blends of any width and warps, through the lists of tiles."""
@@ -218,6 +240,20 @@ def test_trees_are_the_networks(page: Any) -> None:
         found[seed] = compared(page, program)
     assert depths == {1, 2, 3}
     assert not {name: db for name, db in found.items() if db < LEAST_DB[2]}
+
+
+@pytest.mark.browser
+def test_what_is_seen_through_and_sixteen_samples_are_the_networks(page: Any) -> None:
+    found = {}
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        scene = see_through(random_scene(rng, SETS["trees" if seed % 2 else "textures2d"]), rng)
+        changes = {"background": None if seed % 3 else "default", "samples": 16 if seed % 4 == 1 else 4}
+        program = nsg.compile(scene.sized((88, 80)).model_copy(update=changes))
+        found[seed] = compared(page, program)
+    assert min(found.values()) > LEAST_DB[2], found
+    solid = random_solid(np.random.default_rng(4), SOLID_SETS["diffuse"]).sized((48, 40))
+    assert compared(page, nsg.compile(solid.model_copy(update={"samples": 16}))) > LEAST_DB[3]
 
 
 @pytest.mark.browser
@@ -261,6 +297,14 @@ CORNERS = {
             subtract sphere { scale(1.2, 0.9, 0.6); translate(-0.2, 0.3, 0.5); }
             subtract sphere { scale(0.7, 0.8, 1.05); translate(0.8, 0.3, -0.6); }
         }
+        """,
+    "gradients": """
+        import "zoo.safetensors" as zoo; canvas(64, 48); background(none);
+        torus { rotate(60deg, axis = X); scale(0.8); translate(-0.6, 0.2, 0);
+            material radial { stop(0, #ff0); stop(0.5, #f00); stop(0.5, #00f); stop(1, #fff); hue(36deg); } }
+        sphere { scale(0.6); translate(0.8, -0.2, 0.6);
+            material volumetric linear { stop(0.2, #f22); stop(0.7, #22f); rotate(60deg); scale(0.6); } }
+        sphere { scale(0.4); translate(0, -0.6, 1); material diffuse zoo.bark; }
         """,
     "inside": """
         canvas(48, 48); camera(eye = [0.1, 0.2, 0.6], target = [0, 0, -1], fov = 70deg);

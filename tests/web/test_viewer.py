@@ -231,7 +231,7 @@ def test_orbits_zooms_and_pans(shown: Any) -> None:
     assert not isinstance(stated, str)
     np.testing.assert_allclose(stated.eye, camera["eye"], atol=6e-5)
     np.testing.assert_allclose(
-        ask(page, "drawn.program.stage.eye && viewer.program.stage.eye"), camera["eye"]
+        ask(page, "drawn.program.stage.camera.eye && viewer.program.stage.camera.eye"), camera["eye"]
     )
 
 

@@ -15,8 +15,7 @@ CLAIMS = [
     f"2 x 2 pixels, enlarged | {Figure(ONE.gap)} | {Figure(ONE.nodes)} |",
 ]
 GIVEN = {
-    "under 0.002 nobody sees it, at 0.01": "a rule of thumb",
-    "at 0.1 it is another picture": "a rule of thumb",
+    "under 0.002 nobody sees it": "a rule of thumb",
     "what is thinner than 0.01": "the language's definition",
     "lose a shell of 0.03": "what was looked at",
     "2 x 2 pixels": "a setting",

@@ -1,4 +1,4 @@
-"""``scenelang learn``: elements from meshes, drawings and pictures, into a file that scenes import."""
+"""``scenelang learn``: elements from meshes, drawings, pictures and fonts, into a file that scenes import."""
 
 from __future__ import annotations
 
@@ -56,6 +56,7 @@ from scenelang.cli.say import Bar
     "colours, by default 0.01.",
     high=1,
 )
+@click.option("--letters", metavar="RANGES", help="Letters to take of a font, U+20-7E,U+3B1; by default all.")
 @options.positive("--budget", "SECONDS", "Time after which nothing new is begun, for each file.")
 @options.count("--steps", help="Largest number of forms to try, whatever the time.")
 @click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")
@@ -71,10 +72,10 @@ def command(
     preview: str | None,
     **given: Any,  # fields of `LearnOptions` by their names
 ) -> None:
-    """Make meshes and drawings elements, which scenes import.
+    """Make meshes, drawings and fonts elements, which scenes import.
 
     Meshes (.obj, .ply, .stl, .glb) become solids, what a drawing (.svg) paints a flat shape, and pictures
-    (.png, .jpg) textures.
+    (.png, .jpg) textures. A font (.ttf, .otf) brings the file the module text and the function width.
 
     What comes out is no network: a grid of distances, or a compressed picture, the smallest that is as near
     as asked. A shape lies in the unit ball or disc, the middle of its bounding box at the origin; a texture

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
+from click.core import ParameterSource
 
+from scenelang.assets.files import write_output
 from scenelang.cli import options
-from scenelang.cli.files import PROGRAM, check_outputs, targets
+from scenelang.cli.files import DRAWING, PROGRAM, SHAPES, check_outputs, targets
 from scenelang.cli.main import Trouble, describe
 from scenelang.cli.say import Bar, Clock, say_diagnostics
 from scenelang.drawing.how import How, threads_for
@@ -18,7 +21,6 @@ from scenelang.language.reports import SceneError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from scenelang.cli.inputs import Input
     from scenelang.cli.options import Film
@@ -29,7 +31,12 @@ _SECTIONS: Final = {
     "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
     "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
     "More than a picture": "--output --prove --redraw --verbose",
+    "Meshes": "--resolution",
 }
+
+
+_OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backend", "strict", "verbose")
+"""Parameters that shapes have too."""
 
 
 @click.command("render", cls=options.Sectioned, sections=_SECTIONS)
@@ -53,6 +60,7 @@ _SECTIONS: Final = {
     "--max-flip", "E", "Choose the fastest way to draw whose promised FLIP error is at most E.",
     type=options.Real(0, 1),
 )  # fmt: skip
+@options.count("--resolution", low=8, high=512, default=128, help="Cells of a mesh along its longest side.")
 @options.originals
 @options.strict
 @options.verbose
@@ -69,6 +77,7 @@ def command(
     redraw: bool,
     max_ms: float | None,
     max_flip: float | None,
+    resolution: int,
     strict: bool,
     verbose: bool,
 ) -> None:
@@ -87,6 +96,9 @@ def command(
       FOLDER/                       FOLDER/STEM-0000.png and so on
     A run that was interrupted goes on where it stopped.
 
+    OUT may hold shapes in place of pixels: curves of a flat scene (.svg), or the solids of a scene as one
+    closed mesh with colours (.glb .ply .obj) or without (.stl), wherever the camera looks.
+
     With --output, PNG files have 16 bits and say what they hold in a text `scenelang`; an .exr holds the
     picture and all outputs as layers of floats.
 
@@ -98,6 +110,11 @@ def command(
     """
     from scenelang.cli.inputs import prepare_all, read_input, unused_defines
 
+    if Path(out).suffix.lower() in SHAPES and not Path(out).is_dir():
+        _shape(ctx, files, out, request, how, resolution, strict, verbose)
+        return
+    if ctx.get_parameter_source("resolution") == ParameterSource.COMMANDLINE:
+        raise click.UsageError("--resolution is of meshes: .stl, .glb, .ply and .obj.")
     outputs, limits = tuple(dict.fromkeys(outputs)), max_ms is not None or max_flip is not None
     prove |= redraw or "proof" in outputs
     if request.frame is not None and film.certain:
@@ -158,6 +175,69 @@ def command(
     if verbose and able:
         click.echo(clock.report(), err=True)
     ctx.exit(code)
+
+
+def _shape(
+    ctx: click.Context,
+    files: tuple[str, ...],
+    out: str,
+    request: options.Request,
+    how: How,
+    resolution: int,
+    strict: bool,
+    verbose: bool,
+) -> None:
+    """Write the outlines or the surface of one scene."""
+    from scenelang.cli.inputs import prepare_all, read_input
+    from scenelang.compiler.compile import compile_scene
+    from scenelang.language.diagnostics import Diagnostics
+    from scenelang.output.shapes import UNSEEN, refuse_animation, solid_mesh, svg_text
+
+    curves = Path(out).suffix.lower() == DRAWING
+    known = {*_OF_SHAPES, "size" if curves else "resolution"}
+    for param in ctx.command.params:
+        given = ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
+        if given and param.name not in known:
+            raise click.UsageError(f"{param.opts[0]} is of pictures, and `{out}` holds no pixels.")
+    if len(files) > 1:
+        raise click.UsageError(f"`{out}` is one file, and holds one scene.")
+    if how.backend == "reference":
+        raise click.UsageError("--backend reference draws pictures; shapes are those of the model's field.")
+    (path,) = targets(files, out)
+    clock, first, result = Clock(), None, Diagnostics()
+    if not files[0].endswith(PROGRAM):
+        try:
+            first = read_input(files[0], request, clock, how)
+        except OSError as error:
+            raise Trouble(describe(error)) from None
+        if first.evaluation is not None and first.evaluation.animates and request.frame is None:
+            refuse_animation(files[0], first.diagnostics)
+    (job,), code = prepare_all(files, request, clock, how, strict=strict, first=first)
+    if job is None or job.failed(strict) or job.program is None:
+        ctx.exit(code)
+    with clock("curves" if curves else "mesh"):
+        if curves:
+            drawing = svg_text(job.program, how, result)
+        else:
+            program = job.program
+            if job.scene is not None:
+                program = compile_scene(job.scene, spans=job.spans, without=UNSEEN)
+            mesh = solid_mesh(program, resolution, how, result)
+    say_diagnostics(result)
+    if strict and result.items:
+        ctx.exit(1)
+    try:
+        if curves:
+            write_output(path, drawing.encode())
+        else:
+            mesh.save(path)
+    except OSError as error:
+        raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
+    if verbose:
+        if not curves:
+            job.notes.append(f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")
+        lines = "".join(f"\n  {note}" for note in (*job.notes, f"{path.stat().st_size:,} bytes"))
+        click.echo(f"{job.name} -> {path}{lines}\n{clock.report()}", err=True)
 
 
 def _moves(job: Input, target: Target, film: Film, out: str) -> bool:
@@ -253,7 +333,7 @@ def _save(
     if prove and job.program is not None:
         with clock("prove"):
             image, proof = prove_drawn(
-                job.graphs, job.program.model, lambda: _draw(job, clock, progress), redraw
+                job.graphs, job.program.model, lambda: _draw(job, clock, progress), redraw, job.how
             )
     else:
         image = _draw(job, clock, progress)
@@ -277,13 +357,14 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
     if how.backend == "reference":
         assert job.scene is not None
         with clock("draw"):
-            image = draw_exact(job.scene, spans=job.spans, progress=progress)
-        job.notes.append("drew the exact picture, four samples a pixel")
+            scene = how.sampled(job.scene)
+            image = draw_exact(scene, spans=job.spans, progress=progress)
+        job.notes.append(f"drew the exact picture, {scene.samples} samples a pixel")
         return image
     assert program is not None
     from scenelang.drawing.small import choose_drawer
 
-    library, why = choose_drawer(program, how.device, how.samples, exact=how.backend == "exact")
+    library, why = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
     if library == "numpy":
         cores = how.threads or threads_for(program.canvas) if program.stage else 1
         device, place = "numpy", "one core" if cores == 1 else f"{cores} cores"

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import Gradient
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves
@@ -45,6 +46,8 @@ def sample_points(
 def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
     """Colours (M, 3) of a look with an element at its own coordinates (d, M), linear if ``light``."""
     assert look.element is not None
+    if isinstance(look.element, Gradient):  # whose stops are in the space that colours are averaged in
+        return _stepped(_graded(look.element, *q), look.colours)
     values = _values(look.element, light)
     if values.ndim == 4:
         places = [(np.clip(x, -1, 1) + 1) / 2 * (len(values) - 1) for x in q]
@@ -52,6 +55,22 @@ def colour_at(look: Look, q: Sequence[Floats], light: bool = False) -> Floats:
         (u, v), (high, wide) = q, values.shape[:2]
         places = [(1 - v) / 2 * high - 0.5, (u + 1) / 2 * wide - 0.5]
     return _stepped(_mixed(values, places), look.colours)
+
+
+def along(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Offsets (M,) of points (u, v) on a gradient."""
+    return np.asarray((u + 1) / 2 if gradient.name == "linear" else np.hypot(u, v))
+
+
+def _graded(gradient: Gradient, u: Floats, v: Floats) -> Floats:
+    """Colours (M, 3) of a gradient at points (u, v), before operations."""
+    offsets, colours = np.split(np.array(gradient.stops, np.float64), [1], 1)
+    s = along(gradient, u, v)
+    after = np.searchsorted(offsets[:, 0], s, "right")  # of equal offsets the last has been passed
+    a, b = np.maximum(after - 1, 0), np.minimum(after, len(offsets) - 1)
+    gap = (offsets[b] - offsets[a])[:, 0]
+    share = np.where(gap > 0, (s - offsets[a, 0]) / np.where(gap > 0, gap, 1), 0.0)[:, None]
+    return np.asarray(colours[a] * (1 - share) + colours[b] * share)
 
 
 @lru_cache(maxsize=16)
@@ -143,13 +162,17 @@ def fold(
 def combine(
     big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = 0.0
 ) -> tuple[Array, Array]:
-    """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one."""
+    """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one. Colours of
+    four channels are premultiplied, with the coverage behind.
+    """
     xp = namespace(d)
     if isinstance(token, int):
         out_d, share, _ = folded(xp, token, k or BLEND * (token == SMOOTH), big_d, d)
         if share is None:
             return out_d, big_c
         share = share[..., None]
+        if token == UNION and c.shape[-1] == 4:
+            c = c + (1.0 - c[..., 3:]) * xp.where((big_d < 0.0)[..., None], big_c, 0.0)
         return out_d, big_c + (c - big_c) * share if token == SMOOTH else xp.where(share, c, big_c)
     out_d, out_c = big_d, big_c
     for value in TOKENS.values():
@@ -222,23 +245,31 @@ def evaluate(
     p: Array,
     outer: tuple[Step, ...] = (),
     *,
+    clear: bool = False,
     owners: bool = False,
     brought: Brought | None = None,
 ) -> tuple[Any, Any]:
     """Distance D (M,) and colour C (M, 3) of a node at world points (d, M), float64, with steps of the folds
-    around it, nearest first; if ``owners``, the number (M, 1) of the object that paints in place of C.
+    around it, nearest first. In place of C, if ``clear``, premultiplied colour and coverage (M, 4), and if
+    ``owners``, the number of the object that shows most, how much it does, and coverage (M, 3).
     """
     steps = (*(move.step for move in node.moves), *outer)
     if isinstance(node, Leaf):
         q = carry_back(steps, p)
         d = worn(steps, leaf_distance(node.geometry, q, brought), q) * distance_scale(steps, len(p))
-        if node.look.element is not None and not owners:
-            return d, colour_at(node.look, carry_back(node.look.texture, q[: node.look.element.dimension]))
-        paint = np.asarray((node.number,) if owners else node.look.colour(), np.float64)
-        return d, np.broadcast_to(paint, (*d.shape, len(paint)))
-    big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 1 if owners else 3))
+        look = node.look
+        if owners:
+            c = np.asarray((node.number, look.opacity, look.opacity), np.float64)
+        elif look.element is not None:
+            c = colour_at(look, carry_back(look.texture, q[: look.element.dimension]))
+        else:
+            c = np.asarray(look.colour(), np.float64)
+        if clear:
+            c = look.opacity * np.concatenate([c, np.ones((*c.shape[:-1], 1))], -1)
+        return d, np.broadcast_to(c, (*d.shape, c.shape[-1]))
+    big_d, big_c = np.full(p[0].shape, np.inf), np.zeros((*p[0].shape, 4 if clear else 3))
     for index, link in enumerate(node.links):
-        d, c = evaluate(link.node, p, steps, owners=owners, brought=brought)
+        d, c = evaluate(link.node, p, steps, clear=clear, owners=owners, brought=brought)
         if index == 0:
             big_d, big_c = d, c
         else:
@@ -248,11 +279,23 @@ def evaluate(
             width = 0.0 if empty else link.width
             with np.errstate(invalid="ignore"):
                 if owners:
-                    big_d, share = combine(big_d, 0.0 * c, d, 0.0 * c + 1.0, token, width)
-                    big_c = np.where(share > 0.5, c, big_c)
+                    behind = np.where(big_d[:, None] < 0.0, 1.0 - c[:, 2:], 0.0) * (token == UNION)
+                    blank = np.zeros((len(c), 1))
+                    big_d, share = combine(big_d, blank, d, blank + 1.0, token, width)
+                    big_c = _owned(big_c, c, share, behind)
                 else:
                     big_d, big_c = combine(big_d, big_c, d, c, token, width)
     return big_d, big_c
+
+
+def _owned(big_c: Floats, c: Floats, share: Floats, behind: Floats) -> Floats:
+    """Owners (M, 3) as of `evaluate` behind an operand's, which comes in by a share (M, 1); ``behind`` (M, 1)
+    is how much is seen through it.
+    """
+    left = (1.0 - share * (1.0 - behind)) * big_c[:, 1:]
+    comes = (share > 0.5) & (c[:, 1:2] >= behind * big_c[:, 1:2])
+    number, most = np.where(comes, c[:, :1], big_c[:, :1]), np.where(comes, share * c[:, 1:2], left[:, :1])
+    return np.concatenate([number, most, left[:, 1:] + share * c[:, 2:]], 1)
 
 
 def placed_leaves(

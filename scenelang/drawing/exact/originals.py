@@ -163,10 +163,11 @@ FOLDER: Final = "SCENELANG_ORIGINALS"
 
 
 def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
-    """The true shapes of a scene's elements, by geometry, from files in the folder that the environment's
-    `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
+    """The true shapes of a scene's elements but outlines, by geometry, from files in the folder that the
+    environment's `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
     """
     shown = {leaf.geometry for leaf in leaves(graph.root)} & graph.elements.keys()
+    shown = {name for name in shown if graph.elements[name].form != "outline"}
     beside = {file.name: file.zoo.folder for file in scene.elements if file.zoo is not None}
     folders = {name: os.environ.get(FOLDER) or beside[name.partition(".")[0]] for name in sorted(shown)}
     return {name: _original(name, graph.elements[name], folder) for name, folder in folders.items()}

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
 
@@ -21,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
 
+from scenelang.assets.curves import curves_of
 from scenelang.assets.element import TEXELS, Element, Painted
 from scenelang.assets.picture import frame_of, painted, texels
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
@@ -166,6 +168,7 @@ MOST_TRACED: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
 _STRIP: Final = 64  # points of neighbouring heights
 _TOGETHER: Final = 10_000  # edges that are asked at a time
+_FINE: Final = 0.002  # leaf units: longest edge along a curve of an element
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
@@ -214,12 +217,17 @@ def _normals(edges: Edges) -> Points:
 
 class Outline:
     """A flat shape in the unit disc: the midpoint of its bounding box is the origin, its farthest point at 1.
-    Raises `FitError` where the layers cover nothing.
+    Another ``disc`` may be given, by its middle and radius. Raises `FitError` where the layers cover nothing.
     """
 
     dimension = 2
 
-    def __init__(self, layers: list[Layer], notes: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        layers: list[Layer],
+        notes: tuple[str, ...] = (),
+        disc: tuple[tuple[float, float], float] | None = None,
+    ) -> None:
         from scipy.spatial import cKDTree
 
         self.notes, self._source = notes, layers
@@ -232,8 +240,9 @@ class Outline:
         low, high = (ends - halves).min(0), (ends + halves).max(0)
         if not np.isfinite([low, high]).all():
             raise FitError("a point is not finite")
-        middle = (low + high) / 2
+        middle = (low + high) / 2 if disc is None else np.array(disc[0])
         self.size = float((np.linalg.norm(ends - middle, axis=1) + halves[:, 0]).max())
+        self.size = self.size if disc is None else disc[1]
         self.centre = (float(middle[0]), float(middle[1]))
         if not self.size > 1e-12 * (1 + abs(middle).max()):
             raise FitError("all of it lies at one point")
@@ -291,6 +300,20 @@ class Outline:
         if not len(result):
             raise FitError(f"it is nowhere thicker than {_BESIDE:g} of its radius")
         return result, out, thin
+
+
+@lru_cache(maxsize=256)
+def of_curves(element: Element) -> Outline:
+    """The outline of an element of quadratic curves, in its own disc."""
+    a, b, c = curves_of(element).swapaxes(0, 1)
+    length = np.where((2 * b == a + c).all(1), 0.0, np.hypot(*(b - a).T) + np.hypot(*(c - b).T))
+    edges = []
+    for start, by, end, count in zip(a, b, c, np.ceil(length / _FINE).astype(int).clip(1), strict=True):
+        t = np.linspace(0, 1, count + 1)[:, None]
+        points = (1 - t) ** 2 * start + 2 * t * (1 - t) * by + t**2 * end
+        edges.append(np.stack([points[:-1], points[1:]], 1))
+    joined = np.concatenate(edges)
+    return Outline([Layer(joined, winding(joined, odd=False))], disc=((0.0, 0.0), 1.0))
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:

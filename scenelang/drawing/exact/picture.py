@@ -6,12 +6,14 @@ It is drawn from the graph as written, before any pass, so that it checks the co
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isqrt
 
 import numpy as np
 
-from scenelang.compiler.graph import Graph, leaves
+from scenelang.compiler.graph import Graph, Node, leaves
 from scenelang.compiler.spaces import EXTINCTION, Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
+from scenelang.drawing.exact.outline import of_curves
 from scenelang.drawing.exact.solid import OPAQUE, TILE, Field, facing, seen_along, solid_image, ways
 from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
 
@@ -19,18 +21,20 @@ from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
 def reference_image(
     graph: Graph,
     *,
-    per_side: int = 2,
+    per_side: int | None = None,
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
     """Draw the exact picture of a lowered graph: (H, W, 3), or (H, W, 4) with straight alpha where the
     background is none.
 
-    A pixel has ``per_side`` samples along each side, by definition 2; ``brought`` are shapes of elements;
+    A pixel has ``per_side`` samples along each side, by default as the scene says; ``brought`` are shapes of
+    elements;
     ``progress`` is called with the share done. Raises `ValueError` where the eye is inside something opaque,
     or a shape is known only by what was made of it.
     """
-    check_shapes(graph, brought)
+    brought = true_shapes(graph, brought)
+    per_side = per_side or isqrt(graph.samples)
     if graph.stage is not None:
         return solid_image(
             graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought, progress=progress
@@ -40,12 +44,13 @@ def reference_image(
     alpha = np.empty((height, width))
     done = 0
     for node, rows, columns in parts(graph.root, graph.canvas, brought):
-        d, c = evaluate(node, sample_points(graph.canvas, rows, per_side, columns), brought=brought)
+        clear, p = translucent(node), sample_points(graph.canvas, rows, per_side, columns)
+        d, c = evaluate(node, p, clear=clear, brought=brought)
         inside = (d < 0).reshape(len(rows), per_side, len(columns), per_side)
-        shown = np.where(inside[..., None], c.reshape(*inside.shape, 3), 0.0)
+        shown = np.where(inside[..., None], c.reshape(*inside.shape, -1), 0.0)
         part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
-        colour[part] = shown.mean((1, 3))
-        alpha[part] = inside.mean((1, 3))
+        colour[part] = shown[..., :3].mean((1, 3))
+        alpha[part] = (shown[..., 3] if clear else inside).mean((1, 3))
         done += len(rows) * len(columns)
         progress(done / (width * height))
     if graph.background is None:
@@ -53,36 +58,51 @@ def reference_image(
     return from_samples(colour + (1 - alpha)[..., None] * np.asarray(graph.background), None)
 
 
-def check_shapes(graph: Graph, brought: Brought | None) -> None:
-    """Raise `ValueError` where a graph shows an element whose true shape is not given."""
-    unknown = graph.elements.keys() - (brought or {}).keys()
-    name = next((leaf.geometry for leaf in leaves(graph.root) if leaf.geometry in unknown), None)
-    if name is not None:
-        raise ValueError(f"the exact shape of `{name}` is not known")
+def translucent(node: Node) -> bool:
+    """Return whether some object of a node is not opaque."""
+    return any(leaf.look.opacity < 1.0 for leaf in leaves(node))
+
+
+def true_shapes(graph: Graph, brought: Brought | None) -> Brought:
+    """True shapes of the elements that a graph shows, those of outlines from their curves; raises
+    `ValueError` where another one is not given.
+    """
+    result = dict(brought or {})
+    for leaf in leaves(graph.root):
+        element = graph.elements.get(name := leaf.geometry)
+        if element is not None and name not in result:
+            if element.form != "outline":
+                raise ValueError(f"the exact shape of `{name}` is not known")
+            result[name] = of_curves(element)
+    return result
 
 
 def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     """All outputs that a lowered graph has; raises as `reference_image`."""
-    check_shapes(graph, brought)
+    brought = true_shapes(graph, brought)
     width, height = graph.canvas
     result = np.zeros((6, height, width))  # depth, normal, object and alpha
+    side = isqrt(graph.samples)
     if graph.stage is None:
         for node, rows, columns in parts(graph.root, graph.canvas, brought):
             part = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
             p = sample_points(graph.canvas, rows, 1, columns)
             d, owner = evaluate(node, p, owners=True, brought=brought)
             result[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
-            covered = evaluate(node, sample_points(graph.canvas, rows, 2, columns), brought=brought)[0] < 0
-            result[5][part] = covered.reshape(len(rows), 2, len(columns), 2).mean((1, 3))
+            d, owner = evaluate(
+                node, sample_points(graph.canvas, rows, side, columns), owners=True, brought=brought
+            )
+            covered = np.where(d < 0, owner[:, 2], 0.0).reshape(len(rows), side, len(columns), side)
+            result[5][part] = covered.mean((1, 3))
         return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
-    step = max(1, TILE // (4 * width))
+    step = max(1, TILE // (graph.samples * width))
     field = Field(graph.root, brought)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
-        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, 2))
+        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))
         result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
-        result[5, rows.start : rows.stop] = alpha.reshape(len(rows), 2, width, 2).mean((1, 3))
+        result[5, rows.start : rows.stop] = alpha.reshape(len(rows), side, width, side).mean((1, 3))
     depth, normal, owner, alpha = result[0], np.moveaxis(result[1:4], 0, 2), result[4], result[5]
     return Outputs(
         depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)

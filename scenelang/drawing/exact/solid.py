@@ -435,7 +435,7 @@ def solid_image(
     progress: Callable[[float], None] = lambda _: None,
 ) -> Image:
     """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too."""
-    if fault := stage.camera.fault() or stage.light.fault():
+    if fault := stage.fault():
         raise ValueError(fault)
     field = Field(root, brought)
     width, height = canvas

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from scenelang.assets.element import Element
+from scenelang.assets.gradient import HARD, Gradient
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import unpacked
 from scenelang.assets.tensors import TensorError
@@ -182,6 +185,7 @@ def grid_shape(element: Element, xp: Arrays, like: Array, grown: bool = False) -
     return (GrownShape if grown else GridShape)(xp, xp.array(grid.reshape(-1), like), len(grid), grid.ndim)
 
 
+EDGE = 64.0  # texels to a leaf unit that a hard edge counts as
 MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
@@ -190,24 +194,27 @@ class Texture:
     picture (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
     """
 
+    texels: Any = None
+
     def __init__(self, xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> None:
         self._xp, self.steps = xp, paint.steps
+        assert isinstance(paint.element, Element)
         values = _nodes(paint.element, light)
         flat = xp.array(values.reshape(3, -1), like)
         self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
-        if not abs(frame).max() < MOST:
-            raise ProgramError("a texture's frame beyond float32")
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
-        (a, b, u), (c, d, v) = frame.astype(np.float64).reshape(2, 3).tolist()
+        (a, b, u), (c, d, v) = _rows(frame)
         self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
         self.texels, self.sides = flat, values.shape[-2:]
-        across = abs(np.array([row[:2] for row in self.place.rows])).max() if values.ndim == 3 else 0.5
-        self.detail = float(across) * max(values.shape)  # Texels that a way of a leaf unit may cross, about
+        across = _across(self.place) if values.ndim == 3 else 0.5
+        self.detail = across * max(values.shape)  # Texels that a way of a leaf unit may cross, about
 
     def at(self, q: Array) -> Array:
         """Colours (3, M) at leaf coordinates (d, M)."""
-        result = self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
-        return stepped(self._xp, result, self.steps)
+        return stepped(self._xp, self._colours(q), self.steps)
+
+    def _colours(self, q: Array) -> Array:
+        return self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
 
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides
@@ -217,6 +224,47 @@ class Texture:
             cells.append(xp.whole(place))
             shares.append(place - xp.narrow(cells[-1]))
         return blended(xp, self.texels, cells[1] * wide + cells[0], shares[::-1], [0, wide])
+
+
+class _Graded(Texture):
+    """The same of a gradient, whose stops are in the space that colours are averaged in."""
+
+    def __init__(
+        self, xp: Arrays, gradient: Gradient, steps: tuple[ColourStep, ...], frame: np.ndarray
+    ) -> None:
+        self._xp, self.steps, self.gradient = xp, steps, gradient
+        self.place = Affine(_rows(frame))
+        self.detail = EDGE if gradient.edges else min(_across(self.place) * gradient.slope, EDGE)
+
+    def _colours(self, q: Array) -> Array:
+        xp, stops = self._xp, self.gradient.stops
+        u, v = self.place(xp, [q[0], q[1]])
+        s = (u + 1.0) * 0.5 if self.gradient.name == "linear" else xp.length([u, v])
+        rows = [xp.full((len(s),), value, s) for value in stops[0][1:]]
+        for (begin, *a), (end, *b) in pairwise(stops):
+            over = end - begin
+            share = ((s - begin) * (1.0 / over)).clip(0.0, 1.0) if over > HARD else xp.narrow(s >= end)
+            rows = [row + share * (y - x) for row, x, y in zip(rows, a, b, strict=True)]
+        return xp.stack(rows, 0)
+
+
+def texture_of(xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> Texture:
+    """The texture of a paint, which may be a gradient; as `Texture`."""
+    if isinstance(paint.element, Gradient):
+        return _Graded(xp, paint.element, paint.steps, frame)
+    return Texture(xp, paint, frame, like, light)
+
+
+def _rows(frame: np.ndarray) -> Any:
+    """Rows of a texture's frame (6,); raises ProgramError where they are beyond float32."""
+    if not abs(frame).max() < MOST:
+        raise ProgramError("a texture's frame beyond float32")
+    return frame.astype(np.float64).reshape(2, 3).tolist()
+
+
+def _across(place: Affine) -> float:
+    """The most that a coordinate changes over a leaf unit, about."""
+    return float(abs(np.array([row[:2] for row in place.rows])).max())
 
 
 @lru_cache(maxsize=32)

@@ -6,15 +6,16 @@ block, and intervals through the cell bound what the block shows (`meetings.py`)
 filled; of the others, objects that are proved to change nothing there are dropped, and so is what lies behind
 one that hides it. What is left is asked again in smaller blocks, and pixel by pixel in the end.
 
-A pixel is the mean of four samples at a quarter of a pixel from its centre. Most pixels have no outline near
-them and one look at the centre is as good; only pixels that the network says are near one are sampled four
-times. Blocks lie where they do whatever the tiles are, so that tiles and threads change nothing.
+A pixel is the mean of 4 or 16 samples on a regular grid. Most pixels have no outline near them and one look
+at the centre is as good; only pixels that the network says are near one are sampled so often. Blocks lie
+where they do whatever the tiles are, so that tiles and threads change nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import isqrt
 
 import numpy as np
 
@@ -35,29 +36,36 @@ from scenelang.drawing.neural.meetings import (
 )
 from scenelang.drawing.neural.network import RADIUS
 
-QUARTER = np.array([[-0.25, 0.25, -0.25, 0.25], [-0.25, -0.25, 0.25, 0.25]], np.float32)
-"""Places of a pixel's samples (2, 4), pixels from its centre."""
-CORNER = 0.36  # pixels from the centre to a sample, a little rounded up
+CORNERS = {4: 0.36, 16: 0.54}  # pixels from the centre to the farthest of samples, a little rounded up
 NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
 LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 
 
-def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """A mask of pixels (groups, B), of a side, that may have samples in a narrow blend with a texture."""
+def sample_places(count: int) -> np.ndarray:
+    """Places of a pixel's samples (2, count), pixels from its centre."""
+    side = isqrt(count)
+    axis = (np.arange(side) + 0.5) / side - 0.5
+    return np.stack([np.tile(axis, side), np.repeat(axis, side)]).astype(np.float32)
+
+
+def blending(field: Field, meetings: Meetings, trace: Trace, px: float, corner: float) -> Array:
+    """A mask of pixels (groups, B), of a side, that may have samples in a narrow blend with a texture;
+    ``corner`` is as in `CORNERS`.
+    """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
     result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
     worn = np.zeros(len(meetings.columns), bool)
     worn[place[field.texture[objects] != NO_TEXTURE]] = True
     width = field.widths[objects]
     narrow = (field.tokens[objects] == SMOOTH) & (px > NARROW * width) & ~meetings.pairs.open & worn[place]
-    gap = xp.array((width + CORNER * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
+    gap = xp.array((width + corner * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
     for part in meetings.slots():
         if narrow[part].any():
             some = result[:, : part.stop - part.start]
             some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
     if trace.joined and worn.any():
-        most = CORNER * px * (1 + float(field.frames.stretch.max()))
-        for (columns, groups, _), _, margin, _ in trace.joined:
+        most = corner * px * (1 + float(field.frames.stretch.max()))
+        for (columns, groups, _), _, margin, *_ in trace.joined:
             width = field.group_widths[groups]
             narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
             near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
@@ -65,43 +73,66 @@ def blending(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array
     return result
 
 
-def ties(field: Field, meetings: Meetings, trace: Trace, px: float) -> Array:
-    """A mask (groups, B) of pixels of a side where one object's colour may tie with another's."""
+def beneath(field: Field, meetings: Meetings, trace: Trace, d: Array, width: float) -> Array:
+    """A mask (groups, B) of pixels within a width, world units, of an outline that lies beneath something."""
+    result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
+    for part in meetings.slots():
+        outline = abs(trace.margin[:, part] + d[:, 0, part])
+        some = result[:, : part.stop - part.start]
+        some |= (outline < width) & (trace.paint[:, part] > 0)
+    for (columns, *_), paint, margin, _, distance in trace.joined:
+        result[:, columns] |= (abs(margin + distance) < width) & (paint > 0)
+    return result
+
+
+def ties(field: Field, meetings: Meetings, trace: Trace, reach: float) -> Array:
+    """A mask (groups, B) of pixels where one object's colour may tie with another's at a sample, ``reach``
+    world units from the centre at most.
+    """
     xp, token = field.xp, field.tokens[meetings.pairs.object]
     joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
     tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
     for part in meetings.slots():
         n, paint = part.stop - part.start, trace.paint[:, part]
         shown[:, :n] |= tied[:, :n] & blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
-        tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * CORNER * px)
+        tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * reach)
     if not trace.joined:
         return shown
     blended = 0.0 * tied > 0
     for part in meetings.slots():
         n, paint = part.stop - part.start, trace.paint[:, part]
         blended[:, :n] |= blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
-    for (columns, groups, _), paint, margin, _ in trace.joined:
+    for (columns, groups, _), paint, margin, *_ in trace.joined:
         joins, blends = (xp.array(field.groups.joins[groups] == kind, field.like) for kind in (UNION, SMOOTH))
         blended[:, columns] |= blends & (paint > LEAST) & (paint < 1 - LEAST)
-        tied[:, columns] |= joins & (abs(margin) < 2 * CORNER * px)
+        tied[:, columns] |= joins & (abs(margin) < 2 * reach)
     return shown | (tied & blended)
 
 
 def add_textures(
-    field: Field, meetings: Meetings, trace: Trace, p: Array, memory: Array, seen: Array, px: float
+    field: Field,
+    meetings: Meetings,
+    trace: Trace,
+    p: Array,
+    memory: Array,
+    seen: Array,
+    places: np.ndarray | None = None,
 ) -> None:
     """Add the textures that points (2, groups, B) show, where ``seen``, to their colours in ``memory``
-    (groups, S + 3, B); ``px`` is the side of pixels, world units, whose textures are looked up four times.
+    (groups, S + R, B); of pixels they are looked up at several ``places`` (2, n) about the points.
     """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
     shares = trace.shares(xp, nesting(meetings, field.groups), seen)
     groups, columns = seen.shape
-    offsets = xp.array(QUARTER * np.float32(px), p)[:, :, None] if px else None
+    offsets = None if places is None else xp.array(places, p)[:, :, None]
     total = xp.full((3, groups * columns), 0.0, p)
     texture = field.texture[objects]
     for number in np.unique(texture[texture != NO_TEXTURE]).tolist():
         pairs = np.flatnonzero(texture == number)
-        share = xp.take(shares, xp.array(pairs, p)).reshape(-1)
+        share = xp.take(shares, xp.array(pairs, p))
+        if field.clear:
+            share = share * xp.array(field.opacity[objects[pairs]], p)
+        share = share.reshape(-1)
         some = xp.where(share > LEAST)
         if not len(some):
             continue
@@ -133,7 +164,7 @@ class Tile:
     picture: np.ndarray
     background: np.ndarray | None  # (3,), if any
     pairs: int = 0  # (object, sample) pairs that went through the network
-    refined: int = 0  # pixels that were sampled four times
+    refined: int = 0  # pixels of which all samples were taken
     met: int = 0  # pixels that were asked one by one
 
     def over(self, picture: np.ndarray) -> np.ndarray:
@@ -145,9 +176,13 @@ class Tile:
 
 
 class Coverage:
-    """Asks a field for pixels; ``skip`` leaves out what is out of reach or proved not to matter."""
+    """Asks a field for pixels, of ``count`` samples each; ``skip`` leaves out what is out of reach or proved
+    not to matter.
+    """
 
-    def __init__(self, field: Field, *, skip: bool = True, prove: bool = True) -> None:
+    def __init__(self, field: Field, *, skip: bool = True, prove: bool = True, count: int = 4) -> None:
+        self.count, self.places, self.corner = count, sample_places(count), CORNERS[count]
+        self.near = NEAR + (self.corner - CORNERS[4])
         self.field, self.xp, self.skip = field, field.xp, skip
         self.prove = prove and field.provable
         self._all_draw = bool(field.draws.all())
@@ -182,7 +217,7 @@ class Coverage:
         """Pictures (groups, 4, B) of pixels with centres (2, groups, B)."""
         if samples == "four":
             tile.refined += p.shape[1] * p.shape[2] if wanted is None else int(wanted.sum())
-            return self._four(meetings, p, px, tile)
+            return self._sampled(meetings, p, px, tile)
         if samples == "one":
             return self._picture(meetings, p, tile)
         field = self.field
@@ -195,15 +230,18 @@ class Coverage:
         for part in meetings.slots():
             some = edge[:, : part.stop - part.start]
             some[:] = self.xp.minimum(some, near[:, part])
-        for (columns, _, _), _, _, distance in trace.joined if trace is not None else ():
+        for (columns, *_), *_, distance in trace.joined if trace is not None else ():
             edge[:, columns] = self.xp.minimum(edge[:, columns], abs(distance))
-        near = edge < NEAR * px
+        near = edge < self.near * px
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
-            near = near | (seen & ties(field, meetings, trace, px))
+            near = near | (seen & ties(field, meetings, trace, self.corner * px))
+            if field.clear and field.rounded:
+                near = near | (seen & beneath(field, meetings, trace, d, self.near * px))
             if field.textured:
-                near = near | (seen & blending(field, meetings, trace, px))
-                add_textures(field, meetings, trace, p, memory, seen & ~near, px)
+                near = near | (seen & blending(field, meetings, trace, px, self.corner))
+                places = self.places * np.float32(px)
+                add_textures(field, meetings, trace, p, memory, seen & ~near, places)
         picture = field.picture(memory)
         close = self.xp.to_numpy(near)
         column, group = np.nonzero((close if wanted is None else close & wanted).T)
@@ -221,16 +259,16 @@ class Coverage:
             tile.refined += len(column)
             flat = self.xp.array(group * p.shape[2] + column, p)
             centres = self.xp.take(p.reshape(2, -1), flat)[:, None]
-            for first, portion in _portions(some, 4):
+            for first, portion in _portions(some, self.count):
                 last = first + len(portion.columns)
-                result = self._four(portion, centres[..., first:last], px, tile)[0]
+                result = self._sampled(portion, centres[..., first:last], px, tile)[0]
                 self.xp.put(planes, flat[first:last], result)
         return planes.reshape(4, *p.shape[1:]).swapaxes(0, 1)
 
     def _matter(
         self, meetings: Meetings, column: Index, group: Index, px: float, q: Array, d: Array
     ) -> tuple[Meetings, tuple[Index, Index]]:
-        """Pairs that matter to the four samples of pixels, but for pixels proved to be as their middles."""
+        """Pairs that matter to the samples of pixels, but for pixels proved to be as their middles."""
         some, source = meetings.some(column)
         place = some.places()
         by = np.argsort(place, kind="stable")
@@ -238,7 +276,7 @@ class Coverage:
         pairs = replace(some.pairs.take(by), block=place)
         middle = self.xp.to_numpy(d)[group[place], 0, source]
         here = self.xp.to_numpy(q)[:, group[place], source].astype(np.float64)
-        rise = self.field.rise(pairs.object, here, pairs.rate * (CORNER * px))
+        rise = self.field.rise(pairs.object, here, pairs.rate * (self.corner * px))
         some, _ = meetings_of(self._proved(pairs, middle, rise)[0])
         return some, (column[some.columns], group[some.columns])
 
@@ -253,31 +291,41 @@ class Coverage:
             for columns, part, points in self._pixels(grid, side, meetings):
                 trace = self.field.trace(points.shape[1], len(part.pairs))
                 memory = self.ask(part, points, tile, trace)[2]
-                painted = self.xp.to_numpy(trace.paint) > 0.5
-                own = self._owners(part, trace, painted)
-                covered = self.xp.to_numpy(self.field.picture(memory)[:, 3]) > 0.5
+                own = self._owners(part, trace)
+                covered = self.xp.to_numpy(memory[:, 0]) * self.field.slope < 0.0
                 values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
                 blocks[columns[1] // side, :, columns[0] // side] = values
         return result[: len(rows), : canvas[0]]
 
-    def _owners(self, meetings: Meetings, trace: Trace, painted: np.ndarray) -> np.ndarray:
-        """Numbers (groups, B), from 1, of the objects that paint; 0 for none."""
+    def _owners(self, meetings: Meetings, trace: Trace) -> np.ndarray:
+        """Numbers (groups, B), from 1, of the objects that show most; 0 for none."""
         nest, count = nesting(meetings, self.field.groups), len(meetings.columns)
-        own = np.zeros((len(painted), nest.levels * count), np.int32)
+        objects, host = meetings.pairs.object, self.xp.to_numpy
+        own = np.zeros((2, trace.paint.shape[0], nest.levels * count))  # numbers, and how much they show
+        mine = np.stack([objects + 1, self.field.opacity[objects]])
         rounds = iter(trace.joined)
 
+        def take(at: Index | slice, given: np.ndarray, paint: Array, through: Array | None) -> None:
+            share, clear = host(paint), 0.0 if through is None else host(through)
+            old, left = own[..., at], 1.0 - share * (1.0 - clear)
+            comes = (share > 0.5) & (given[1] >= clear * old[1])
+            own[..., at] = np.where(
+                comes, [given[0] + 0.0 * share, share * given[1]], [old[0], left * old[1]]
+            )
+
         def close(closings: list[Closing]) -> None:
-            for (columns, _, level), (_, paint, *_) in zip(closings, rounds, strict=False):
+            for (columns, _, level), (_, paint, _, through, _) in zip(closings, rounds, strict=False):
                 top, below = level * count + columns, (level - 1) * count + columns
-                own[:, below] = np.where(self.xp.to_numpy(paint) > 0.5, own[:, top], own[:, below])
-                own[:, top] = 0
+                take(below, own[..., top], paint, through)
+                own[..., top] = 0.0
 
         for turn in nest.turns:
             close(turn.before)
-            at, part = nest.places(turn, count), turn.part
-            own[:, at] = np.where(painted[:, part], meetings.pairs.object[part] + 1, own[:, at])
+            part, through = turn.part, trace.through
+            seen = None if through is None else through[:, part]
+            take(nest.places(turn, count), mine[:, None, part], trace.paint[:, part], seen)
             close(turn.after)
-        return own[:, :count]
+        return own[0, :, :count].astype(np.int32)
 
     def _pixels(
         self, grid: Raster, side: int, meetings: Meetings
@@ -287,12 +335,12 @@ class Coverage:
             columns = grid.place(part.columns, side)
             yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
 
-    def _four(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
-        """Means (groups, 4, B) of the four samples of pixels."""
-        offsets = self.xp.array(QUARTER * np.float32(px), p)
+    def _sampled(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
+        """Means (groups, 4, B) of all samples of pixels."""
+        offsets = self.xp.array(self.places * np.float32(px), p)
         samples = (p[:, :, None] + offsets[:, None, :, None]).reshape(2, -1, p.shape[2])
         picture = self._picture(meetings, samples, tile)
-        return picture.reshape(p.shape[1], 4, 4, p.shape[2]).mean(1)
+        return picture.reshape(p.shape[1], self.count, 4, p.shape[2]).mean(1)
 
     def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
         """Premultiplied colour and coverage (groups, 4, B) at single points (2, groups, B)."""
@@ -301,13 +349,13 @@ class Coverage:
         memory = self.ask(meetings, p, tile, trace)[2]
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
-            add_textures(field, meetings, trace, p, memory, seen, 0.0)
+            add_textures(field, meetings, trace, p, memory, seen)
         return field.picture(memory)
 
     def ask(
         self, meetings: Meetings, p: Array, tile: Tile, trace: Trace | None = None
     ) -> tuple[Array, Array, Array]:
-        """Leaf coordinates (2, groups, P), features (groups, F, P), memory (groups, S + 3, B)."""
+        """Leaf coordinates (2, groups, P), features (groups, F, P), memory (groups, S + R, B)."""
         field, objects = self.field, meetings.pairs.object
         q = field.frames.local(self.xp, objects, self.xp.take(p, self.xp.array(meetings.places(), p)))
         d = field.features(objects, q, meetings.pairs.far)

@@ -326,8 +326,9 @@ def ready() -> bool:
 
 def draw_on_device(network: Framed, program: Program, samples: str = "adaptive") -> Drawing | None:
     """Draw a Program as `draw_objects` does, with four samples a pixel where that is adaptive; None of what
-    the kernel does not know: solids, decoders of more than 32 units, features beside a distance, a state of
-    more than one number, leaves with skins, frames that need float64. Raises `ProgramError` as `draw` does.
+    the kernel does not know: solids, gradients, outlines, leaves with skins, what is not opaque, 16 samples,
+    decoders of more than 32 units, features beside a distance, a state of more than one number, and frames
+    that need float64. Raises `ProgramError` as `draw` does.
     """
     if samples == "draft":
         result = draw_on_device(network, halved(program), "one")
@@ -338,7 +339,9 @@ def draw_on_device(network: Framed, program: Program, samples: str = "adaptive")
     versions = [(id(p), 0 if p.is_inference() else p._version) for p in network.parameters()]
     host = on_host(network, tuple(versions))
     field = Field(host, program.vectors, program.tokens, program.brought(), program.paints())
-    if field.frames.wild.any() or field.skins is not None:
+    gradient = any(texture.texels is None for texture in field.textures)
+    more = field.clear or (program.samples != 4 and samples != "one") or (field.outline >= 0).any()
+    if field.frames.wild.any() or field.skins is not None or gradient or more:
         return None
     grid = raster(program.canvas, range(program.canvas[1]))
     pairs = Coverage(field, prove=False).candidates(grid)

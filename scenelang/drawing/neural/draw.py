@@ -62,6 +62,7 @@ class TileCache:
         )
         common = (
             repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()
+            + bytes([coverage.count])
             + scene.codes.tobytes()
         )
         keys = []
@@ -100,7 +101,7 @@ class Drawing:
 
     image: Image  # (H, W, 3), or (H, W, 4) with straight alpha
     pairs: int  # (object, sample) pairs that went through the network
-    refined: int  # pixels that were sampled four times
+    refined: int  # pixels of which all samples were taken
     met: int  # pixels that an object reached; the others show the background, unseen by the network
     work: Work | None = None  # of solids, what it took in rays and steps
 
@@ -112,7 +113,7 @@ def draw_objects(
 
     Solids are drawn anew in each picture, and always with the rules that ``skip`` leaves out; all of their
     pixels count as met. There are two further ``samples``: ``"draft"``, one for each 2 x 2 pixels, and
-    ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled four times.
+    ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled more than once.
     """
     if run.get("samples") == "draft":
         run |= {"samples": "one", "split": None, "kept": None}
@@ -135,6 +136,7 @@ def draw_objects(
         threads=run.get("threads") or 1,
         split=run.get("split"),
         samples=run.get("samples", "adaptive"),
+        count=program.samples,
         progress=run.get("progress"),
     )
     return Drawing(image, work.met, work.refined, image.shape[0] * image.shape[1], work)
@@ -159,7 +161,7 @@ def draw(
     """
     (width, height), threads = program.canvas, threads or 1
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
-    coverage = Coverage(field, skip=skip)
+    coverage = Coverage(field, skip=skip, count=program.samples)
     rows = max(1, min(tile // width, -(-height // (split or threads))))
     rows = LEVELS[0] * -(-rows // LEVELS[0])
     tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
@@ -205,7 +207,7 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
     """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene."""
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
-        result = solid_outputs(solids, program.stage, program.canvas, threads=threads)
+        result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
     else:
         result = _plane(network, program)  # type: ignore[arg-type]
     assert result.object is not None

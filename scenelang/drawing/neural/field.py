@@ -17,7 +17,7 @@ from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape
+from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
 from scenelang.drawing.neural.frames import FAR, Frames, Skins, read_skins
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import (
@@ -30,6 +30,7 @@ from scenelang.drawing.neural.network import (
     FramedNetwork,
     Slopes,
 )
+from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
@@ -48,28 +49,35 @@ class Trace:
 
     paint: Array  # (groups, P) how far the object's colour came in
     margin: Array  # (groups, P) by how much what was there before is nearer than the object, world units
-    # the same of groups of the stream that ended, round by round, with their distances
-    joined: list[tuple[Closing, Array, Array, Array]] = field(default_factory=list)
+    through: Array | None = None  # (groups, P) how much is seen through the object, None where nothing is
+    # paint, margin and through of groups of the stream that ended, round by round, with their distances
+    joined: list[tuple[Closing, Array, Array, Array | None, Array]] = field(default_factory=list)
 
     def shares(self, xp: Arrays, nest: Nesting, seen: Array) -> Array:
         """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
-        count, result = seen.shape[1], 0.0 * self.paint
+        count, result, through = seen.shape[1], 0.0 * self.paint, self.through
         left = xp.concat([1.0 * seen, *[0.0 * seen] * (nest.levels - 1)], 1)
         rounds = iter(reversed(self.joined))
 
         def opened(closings: list[Closing]) -> None:
-            for (columns, _, level), (_, paint, *_) in zip(reversed(closings), rounds, strict=False):
+            for (columns, _, level), (_, paint, _, clear, _) in zip(reversed(closings), rounds, strict=False):
                 top, below = level * count + columns, (level - 1) * count + columns
                 rest = left[:, below]
-                left[:, top], left[:, below] = rest * paint, rest * (1.0 - paint)
+                left[:, top], left[:, below] = rest * paint, rest * _left(paint, clear)
 
         for turn in reversed(nest.turns):
             opened(turn.after)
             at, paint = nest.places(turn, count), self.paint[:, turn.part]
             rest = left[:, at]
-            result[:, turn.part], left[:, at] = rest * paint, rest * (1.0 - paint)
+            clear = None if through is None else through[:, turn.part]
+            result[:, turn.part], left[:, at] = rest * paint, rest * _left(paint, clear)
             opened(turn.before)
         return result
+
+
+def _left(paint: Array, through: Array | None) -> Array:
+    """Share of what was before that is left behind an object that came in by ``paint``."""
+    return 1.0 - paint if through is None else 1.0 - paint * (1.0 - through)
 
 
 class Field:
@@ -78,8 +86,9 @@ class Field:
     Of rows of vectors (N, 64), ``brought`` has what users brought, None where it is a geometry of the model,
     and ``paints`` textures, None where it is the colour of its vector. ``reach`` (N,) is in leaf units from
     an object's origin, beyond which it changes nothing, inf where it concerns every point; ``draws`` (N,)
-    says whether it may be seen where nothing was before. Raises `ProgramError` where a vector holds no way to
-    a leaf, or an element cannot be drawn.
+    says whether it may be seen where nothing was before, and ``opacity`` (N,) how much it hides. Registers
+    hold colours, and if some objects are ``clear`` premultiplied ones, with their coverage. Raises
+    `ProgramError` where a vector holds no way to a leaf, or an element cannot be drawn.
     """
 
     def __init__(
@@ -102,6 +111,9 @@ class Field:
         self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
         self.skins = read_skins(self.parts)
         self.skinned = np.zeros(len(vectors), bool) if self.skins is None else np.any(self.skins[:3], axis=0)
+        self.opacity = np.where(self.draws, 1.0 - self.parts.clear, 1.0).clip(0.0, 1.0).astype(np.float32)
+        self.clear = bool((self.opacity < 1.0).any())
+        self.register = 4 if self.clear else 3
         with self.xp.inference():
             self.slope = float(self.xp.exp(network.read_slope)) / 4
             self.unit = float(np.linalg.norm(self.xp.to_numpy(network.cell_weights()[2][UNION, 0])))
@@ -118,7 +130,9 @@ class Field:
         codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
         self.codes = codes = codes.reshape(len(result), every.shape[1])
         """Codes of the leaves in use (K, C), whose decoders are computed together."""
-        self.shapes: list[Decoder | GridShape] = [*network.decoders(xp.array(codes, self.like))]
+        self.shapes: list[Decoder | GridShape | OutlineShapes] = [
+            *network.decoders(xp.array(codes, self.like))
+        ]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
         self.levels: list[tuple[int, Lattice, float, float]] = []
@@ -130,12 +144,21 @@ class Field:
                 lattice = Lattice(xp, xp.array(grid.reshape(-1), self.like), len(grid), 2)
                 self.levels.append((at, lattice, steep * (len(grid) - 1) / 2 / EXTENT, float(np.ptp(grid))))
         grown = {self.brought[i] for i in more}
-        for element in dict.fromkeys(element for element in self.brought if element is not None):
-            if network.config.features != 1:
-                raise ProgramError("elements for a network that knows more than distances")
-            self.shape[[held == element for held in self.brought]] = len(self.shapes)
-            self.shapes.append(grid_shape(element, xp, self.like, element in grown))
-            self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+        elements = dict.fromkeys(element for element in self.brought if element is not None)
+        if elements and network.config.features != 1:
+            raise ProgramError("elements for a network that knows more than distances")
+        outlines = {element: at for at, element in enumerate(e for e in elements if e.form == "outline")}
+        self.outline = np.array([outlines.get(held, -1) for held in self.brought], np.intp)  # type: ignore[arg-type]
+        """Numbers of outlines among all that are drawn together (N,), -1 for other shapes."""
+        for element in elements:
+            if element not in outlines:
+                self.shape[[held == element for held in self.brought]] = len(self.shapes)
+                self.shapes.append(grid_shape(element, xp, self.like, element in grown))
+                self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+        if outlines:
+            self.shape[self.outline >= 0] = len(self.shapes)
+            self.shapes.append(OutlineShapes(xp, [*outlines], self.like))
+            self.slopes.append(true_slopes())
 
     def _cells(self) -> None:
         """Cells by operator and width of the blend; behind them the same with gates that are open."""
@@ -174,7 +197,7 @@ class Field:
         xp, parts = self.xp, self.parts
         albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
         self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
-        """Colours of the objects (3, N); 0 for those with a texture."""
+        """Colours of the objects (3 or 4, N), as registers hold them; 0 for those with a texture."""
         self.textures: list[Texture] = []
         self.texture = np.full(len(self.paints), NO_TEXTURE)  # Index of each object's texture (N,)
         known: dict[tuple[Paint, bytes], int] = {}
@@ -183,8 +206,11 @@ class Field:
                 continue
             self.texture[i] = known.setdefault((paint, parts.texture[i].tobytes()), len(known))
             if len(known) > len(self.textures):
-                self.textures.append(Texture(xp, paint, parts.texture[i], self.like, light=False))
+                self.textures.append(texture_of(xp, paint, parts.texture[i], self.like, light=False))
             self.colours[:, i] = 0.0
+        if self.clear:
+            opacity = xp.array(self.opacity, self.like)
+            self.colours = xp.concat([self.colours * opacity, opacity[None]], 0)
 
     @property
     def provable(self) -> bool:
@@ -195,6 +221,11 @@ class Field:
     def blended(self) -> bool:
         """True where some object joins by a blend."""
         return bool((self._raw == SMOOTH).any())
+
+    @property
+    def rounded(self) -> bool:
+        """True where outlines lie elsewhere than those of the objects."""
+        return bool((self.parts.width > 0.0).any()) or self.blended
 
     @property
     def textured(self) -> bool:
@@ -214,9 +245,10 @@ class Field:
         """Cells of all groups, which come last, on the host."""
         return Cell(*(part.take(self._joins, -1) for part in self._host))
 
-    def empty(self, groups: int, count: int, register: int = 3) -> Array:
-        """State and register (groups, S + R, count) of points that have met nothing."""
-        memory = self.xp.full((groups, self.network.config.state + register, count), 0.0, self.like)
+    def empty(self, groups: int, count: int, more: int = 0) -> Array:
+        """State and register (groups, S + R, count) of points that have met nothing, with room for more."""
+        size = self.network.config.state + self.register + more
+        memory = self.xp.full((groups, size, count), 0.0, self.like)
         memory[:, 0] = self.nothing
         return memory
 
@@ -232,9 +264,13 @@ class Field:
             index = None if len(used) == 1 else np.flatnonzero(shape == at)
             part = q if index is None else xp.take(q, xp.array(index, q))
             rim = far.any() if index is None else far[index].any()
-            one = self._decoded(self.shapes[at], part.reshape(2, -1), bool(rim)).reshape(
-                -1, groups, part.shape[2]
-            )
+            kind, flat = self.shapes[at], part.reshape(2, -1)
+            if isinstance(kind, OutlineShapes):
+                which = self.outline[objects if index is None else objects[index]]
+                one = kind.distance(flat, xp.array(np.tile(which, groups), q))[None]
+            else:
+                one = self._decoded(kind, flat, bool(rim))
+            one = one.reshape(-1, groups, part.shape[2])
             if index is None:
                 result = one
                 break
@@ -278,18 +314,19 @@ class Field:
         return path, joins[path], np.append(self.group_widths, -1.0)[path]
 
     def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
-        """State and register (groups, S + 3, B) of columns that have met their objects, by the features
+        """State and register (groups, S + R, B) of columns that have met their objects, by the features
         (groups, F, P) of the pairs; ``trace`` takes down what each object did.
         """
         xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
         nest, count = nesting(meetings, self.groups), len(meetings.columns)
         fresh = pairs.open | np.concatenate([pairs.open[:0], *(turn.fresh for turn in nest.turns)])
-        memory = self.empty(features.shape[0], count, 3 if trace is None else 4)
+        memory = self.empty(features.shape[0], count, int(trace is not None))
         stack = memory if nest.levels == 1 else xp.concat([memory] * nest.levels, 2)
         lines, bias, candidate, bump = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
         colours = xp.take(self.colours, xp.array(pairs.object, self.like))
         if trace is not None:  # a colour of 1 over a register of 0 shows the gate
             colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
+        over = self._over(self.tokens[pairs.object], fresh)
 
         def put(index: Array, values: Array) -> None:
             for plane, new in zip(stack, values, strict=True):
@@ -302,9 +339,10 @@ class Field:
                 below = xp.array((level - 1) * count + columns, self.like)
                 inner, outer = xp.take(stack, top), xp.take(stack, below)
                 if trace is not None:
-                    inner[:, s + 3] = 1.0
+                    inner[:, -1] = 1.0
                 given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
-                took = self._took(outer, *given, trace is not None)
+                lies = self._over(self.groups.joins[groups])
+                took = self._took(outer, *given, trace is not None, lies)
                 if trace is not None:
                     trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
                 put(below, outer)
@@ -316,21 +354,34 @@ class Field:
             index = at if isinstance(at, slice) else xp.array(at, self.like)
             old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
             own = Cell(lines[..., part], bias[:, part], candidate[..., part], bump[:, part])
-            took = self._took(old, own, features[..., part], colours[:, part], trace is not None)
+            lies = None if over is None else over[part]
+            took = self._took(old, own, features[..., part], colours[:, part], trace is not None, lies)
             if not isinstance(at, slice):
                 put(index, old)
             if trace is not None:
-                trace.paint[:, part], trace.margin[:, part] = took
+                trace.paint[:, part], trace.margin[:, part], through = took
+                if trace.through is not None:
+                    trace.through[:, part] = through
             close(turn.after)
-        return stack[:, : s + 3, :count]
+        return stack[:, : s + self.register, :count]
+
+    def _over(self, operators: np.ndarray, fresh: np.ndarray | None = None) -> Array | None:
+        """1 for operands (n,) that lie over what was before, 0 for others; None where none is clear."""
+        if not self.clear:
+            return None
+        over = operators == UNION
+        return self.xp.array((over if fresh is None else over & ~fresh).astype(np.float32), self.like)
 
     def _cells_at(self, kinds: np.ndarray) -> Cell:
         index = self.xp.array(kinds, self.like)
         return Cell(*(self.xp.take(part, index) for part in self._table))
 
-    def _took(self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool) -> tuple[Array, Array]:
-        """Let memories (groups, S + R, n) take an object in each; how far its colour came in, and the margin.
-        ``d`` are features (groups, F, n), colours registers (R, n) or (groups, R, n).
+    def _took(
+        self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool, over: Array | None
+    ) -> tuple[Array, Array, Array]:
+        """Let memories (groups, S + R, n) take an object in each; how far its colour came in, the margin, and
+        how much is seen through it. ``d`` are features (groups, F, n), colours registers (R, n) or (groups,
+        R, n), ``over`` as of `_over`.
         """
         s, (lines, bias, candidate, bump) = self.network.config.state, cell
         levels, wanted = bias, 0.0
@@ -339,24 +390,29 @@ class Field:
             wanted = wanted + d[:, i : i + 1] * candidate[:, i]
         for i in range(s):
             levels = levels + memory[:, i : i + 1] * lines[:, d.shape[1] + i]
-        paint = margin = None
+        paint = margin = through = None
         if traced:
             margin = memory[:, 0] / self.unit - d[:, 0]
-            memory[:, s + 3] = 0.0
+            memory[:, -1] = 0.0
+        if over is not None:  # a union shows what it covers, through what is clear of it
+            through = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0) * over * (1.0 - colours[..., 3:4, :])
+            colours = colours + through * memory[:, s:]
+            through = through[:, 0]
         new = self.network.update(levels, wanted, bump, memory[:, :s], memory[:, s:], colours)
         memory[:, :s], memory[:, s:] = new
         if traced:
-            paint = memory[:, s + 3] + 0.0
-        return paint, margin
+            paint = memory[:, -1] + 0.0
+        return paint, margin, through
 
     def trace(self, groups: int, pairs: int) -> Trace:
         """Room for a trace."""
-        return Trace(*(self.xp.full((groups, pairs), 0.0, self.like) for _ in range(2)))
+        return Trace(*(self.xp.full((groups, pairs), 0.0, self.like) for _ in range(3 if self.clear else 2)))
 
     def picture(self, memory: Array) -> Array:
         """Premultiplied colour and coverage (groups, 4, B), in [0, 1], of points that met all objects."""
         coverage = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0)
-        return self.xp.concat([memory[:, self.network.config.state :] * coverage, coverage], 1)
+        shown = memory[:, self.network.config.state :] * coverage
+        return shown if self.clear else self.xp.concat([shown, coverage], 1)
 
     def middles(self, objects: np.ndarray, q: Floats) -> np.ndarray:
         """World distances (P,) at leaf coordinates (2, P)."""
@@ -384,12 +440,14 @@ class Field:
         objects = meetings.pairs.object
         cell = self.cells(objects)
         dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
-        colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, 1.0))
+        colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, self.opacity[objects]))
+        lies = [tokens == UNION for tokens in (self.tokens[objects], self.groups.joins)]
         with np.errstate(all="ignore"):
             rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
             distance = Interval(middle - rise, middle + rise)
             nest = nesting(meetings, self.groups)
-            return shown(meetings, distance, cell, colours, self.nothing, self.slope, nest, self.joins())
+            fold = distance, cell, colours, self.nothing, self.slope, nest, self.joins()
+            return shown(meetings, *fold, lies if self.clear else None)
 
 
 def rounded(cells: Cell, s: int) -> Cell:

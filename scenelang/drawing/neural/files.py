@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from scenelang.assets.files import read_regular
 from scenelang.assets.tensors import TensorError, read_tensors
-from scenelang.compiler.manifest import Manifest, load_manifest
+from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.weights import (
     ModelError,
     check_shapes,
+    manifest_of,
     open_weights,
     replaced,
     shipped_weights,
@@ -95,7 +96,7 @@ def _sizes(kind: type[Config], config: Any, most: int) -> Config:
     sizes = config.get("network") if isinstance(config, dict) else None
     if not isinstance(sizes, dict):
         raise ModelError("no network sizes")
-    least = {"segment": 0}
+    least = {"segment": 0, "units": 0, "hidden": 0, "answered": 0}
     if any(type(v) is not int or not least.get(name, 1) <= v <= most for name, v in sizes.items()):
         raise ModelError("a network size is out of range")
     try:
@@ -152,7 +153,7 @@ def load_arrays(name: str, weights: str = "") -> ArrayModel:
 
 @lru_cache(maxsize=8)
 def _load(name: str, weights: str) -> ArrayModel:
-    manifest, data = load_manifest(name), shipped_weights(name, weights)
+    manifest, data = manifest_of(name, weights), shipped_weights(name, weights)
     digest = hashlib.sha256(data).hexdigest()
     if manifest.renderer == "solid":
         return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)

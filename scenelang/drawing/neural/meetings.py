@@ -10,7 +10,7 @@ rounding error of float32.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
@@ -243,15 +243,18 @@ class Interval(NamedTuple):
 
 
 class State(NamedTuple):
-    """Intervals of distances (B,) and colours (3, B): of the states of a fold, or of operands."""
+    """Intervals of distances (B,) and colours (R, B): of the states of a fold, or of operands. Four channels
+    are premultiplied, with the coverage behind.
+    """
 
     distance: Interval
     colour: Interval
 
     @classmethod
-    def empty(cls, distance: float, count: int, dtype: npt.DTypeLike = np.float32) -> Self:
+    def empty(cls, distance: float, count: int, dtype: npt.DTypeLike = np.float32, channels: int = 3) -> Self:
         """States before the first object, whose distance is given."""
-        return cls(Interval(*np.full((2, count), distance, dtype)), Interval(*np.zeros((2, 3, count), dtype)))
+        colours = np.zeros((2, channels, count), dtype)
+        return cls(Interval(*np.full((2, count), distance, dtype)), Interval(*colours))
 
     def at(self, columns: Index | slice) -> Self:
         """Select some columns."""
@@ -262,11 +265,16 @@ class State(NamedTuple):
         for side, colour in zip(self.distance, self.colour, strict=True):
             side[columns], colour[:, columns] = distance, 0.0
 
-    def paint(self, columns: Index | slice, colour: Interval, share: Interval) -> None:
-        """Move the colours of some columns towards others (3, n), by shares (n,) of the way."""
-        for side, own, choose in zip(self.colour, colour, (np.minimum, np.maximum), strict=True):
+    def paint(
+        self, columns: Index | slice, colour: Interval, share: Interval, through: Interval | None = None
+    ) -> None:
+        """Move the colours of some columns towards others (R, n), by shares (n,) of the way; through these
+        some of what was before is seen, ``through`` (n,).
+        """
+        seen = through or (0.0, 0.0)
+        for side, own, choose, clear in zip(self.colour, colour, (np.minimum, np.maximum), seen, strict=True):
             now = side[:, columns]
-            more = own - now
+            more = own - now if through is None else own + (clear - 1.0) * now
             side[:, columns] = now + choose(share.low * more, share.high * more)
 
 
@@ -288,19 +296,21 @@ def shown(
     slope: float,
     nest: Nesting,
     joins: Cell,
+    lies: Sequence[Mask] | None = None,
 ) -> Shown:
     """Fold intervals, of a network whose state is one number and that knows one feature.
 
-    Distances (P,), world units, and colours (3, P) are of the pairs. Cells, of the pairs and of the groups,
+    Distances (P,), world units, and colours (R, P) are of the pairs. Cells, of the pairs and of the groups,
     come last in their arrays. ``empty`` is the state before the first object, ``slope`` that of coverage per
-    world unit.
+    world unit; ``lies`` says which pairs and groups lie over what was before, if some are clear.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _Learned.empty(empty, blocks * nest.levels)
+    state = _Learned.empty(empty, blocks * nest.levels, channels=len(colours.low))
     shut, wide = np.zeros((2, len(given)), bool)
     operands = State(distance, colours)
     fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns)])
-    gates = _Gates.of(cell, distance, given | fresh)
+    over, groups_over = lies or (None, None)
+    gates = _Gates.of(cell, distance, given | fresh, over, slope)
 
     def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
         part = turn.part
@@ -309,29 +319,35 @@ def shown(
 
     def group(top: Index, below: Index, ended: Index) -> tuple[Mask, Mask]:
         operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
-        joined = state.join(below, operand, _Gates.of(cells, operand.distance, np.zeros(len(ended), bool)))
+        over = None if groups_over is None else groups_over[ended]
+        given = np.zeros(len(ended), bool)
+        joined = state.join(below, operand, _Gates.of(cells, operand.distance, given, over, slope))
         state.clear(top, empty)
         return joined
 
     nest.fold(blocks, shut, wide, pair, group)
     low, high = (side[:blocks] for side in state.distance)
     covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
-    sides = zip(state.colour, covered, strict=True)
-    picture = Interval(*(np.vstack([c[:, :blocks] * share, share]) for c, share in sides))
+    sides = [(c[:, :blocks] * share, share) for c, share in zip(state.colour, covered, strict=True)]
+    picture = Interval(*(np.vstack(side) if lies is None else side[0] for side in sides))
     return Shown(picture, shut, wide)
 
 
 class _Gates(NamedTuple):
-    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's."""
+    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's; and
+    which lie over what was before, if some are clear, with the slope of coverage.
+    """
 
     cell: Cell
     own: Interval
     up: Floats32
     down: Floats32
     given: Mask
+    over: Mask | None
+    slope: float
 
     @classmethod
-    def of(cls, cell: Cell, d: Interval, given: Mask) -> _Gates:
+    def of(cls, cell: Cell, d: Interval, given: Mask, over: Mask | None, slope: float) -> _Gates:
         # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
         up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
         own = Interval(
@@ -339,7 +355,7 @@ class _Gates(NamedTuple):
             up[:, 0] * d.high + down[:, 0] * d.low + cell.bias,
         )
         own.low[:, given] = own.high[:, given] = np.inf
-        return cls(cell, own, up[:, 1], down[:, 1], given)
+        return cls(cell, own, up[:, 1], down[:, 1], given, None if over is None else over & ~given, slope)
 
     def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
@@ -350,7 +366,22 @@ class _Gates(NamedTuple):
             self.up[:, which],
             self.down[:, which],
             self.given[which],
+            None if self.over is None else self.over[which],
+            self.slope,
         )
+
+    def through(self, state: Interval, coverage: Interval) -> Interval | None:
+        """How much is seen through operands of a coverage (n,), of states (n,) before them."""
+        if self.over is None:
+            return None
+        ends = (
+            (0.5 - self.slope * state.high, 1.0 - coverage.high),
+            (
+                0.5 - self.slope * state.low,
+                1.0 - coverage.low,
+            ),
+        )
+        return Interval(*(inside.clip(0.0, 1.0) * clear * self.over for inside, clear in ends))
 
 
 class _Learned(State):
@@ -360,7 +391,8 @@ class _Learned(State):
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
-        cell, own, up, down, given = gates
+        cell, own, up, down, given, *_ = gates
+        through = gates.through(Interval(low, high), Interval(own_colour.low[-1], own_colour.high[-1]))
         past = up * high + down * low
         least, most = own.low + (up * low + down * high), own.high + past
         paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
@@ -377,8 +409,9 @@ class _Learned(State):
         self.distance.high[columns] = np.maximum(
             np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
         ) - np.minimum(dent, 0.0)
-        self.paint(columns, own_colour, paint)
-        return ~takes & (paint.high <= 0), ~keeps & (paint.low >= 1)
+        self.paint(columns, own_colour, paint, through)
+        hides = ~keeps & (paint.low >= 1)
+        return ~takes & (paint.high <= 0), hides if through is None else hides & (through.high <= 0)
 
 
 def _capped(x: Interval, factor: Floats32, most: Floats32) -> Interval:

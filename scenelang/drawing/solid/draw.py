@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,8 @@ class Lighting:
     """A field under the light of its stage, drawn at a pace."""
 
     def __init__(self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL) -> None:
+        if field.edged:  # rays may clip these
+            pace = pace._replace(gap=pace.gap / 2)
         self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
@@ -412,7 +415,13 @@ def _length(xp: Arrays, a: Array) -> Array:
 
 
 TILE = 1 << 16  # samples at a time
-QUARTER = np.array([[0.25, 0.75, 0.25, 0.75], [0.25, 0.25, 0.75, 0.75]])  # x and y of a pixel's samples in it
+
+
+def samples_in(count: int) -> np.ndarray:
+    """Places of samples (2, count) in their pixel, pixels from its upper left corner."""
+    side = isqrt(count)
+    axis = (np.arange(side) + 0.5) / side
+    return np.stack([np.tile(axis, side), np.repeat(axis, side)])
 
 
 def draw_solids(
@@ -423,20 +432,21 @@ def draw_solids(
     threads: int = 1,
     split: int | None = None,
     samples: str = "adaptive",
+    count: int = 4,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Image, Work]:
-    """Draw a field of solids: the picture, and what it took; arguments are those of `Run`. Raises
-    `ProgramError` for numbers out of all proportion, which no compiled scene has.
+    """Draw a field of solids: the picture, and what it took; arguments are those of `Run`, and ``count`` of
+    samples of a pixel. Raises `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
     width, height = canvas
-    lighting = Lighting(field, stage, MARCH_SETTINGS.get(samples, CAREFUL))
+    lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
     out = np.empty((4, height, width), np.float32)
-    rows = max(1, min(TILE // width, -(-height // (split or threads))))
+    rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     costs: list[Work] = []
 
     def one(band: range) -> None:
-        out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples)
+        out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples, count)
         costs.append(work)
         if progress is not None:
             progress(len(costs) / len(bands))
@@ -447,7 +457,9 @@ def draw_solids(
     return from_light(out, stage.transparent), sum(costs, Work())
 
 
-def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str) -> tuple[np.ndarray, Work]:
+def _band(
+    lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str, count: int
+) -> tuple[np.ndarray, Work]:
     """Premultiplied radiance and alpha (4, rows, W) of some rows of pixels, and what they took."""
     width, height = canvas
     if samples == "one":
@@ -466,8 +478,9 @@ def _band(lighting: Lighting, canvas: tuple[int, int], rows: range, samples: str
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
-        four, more = _shade(lighting, canvas, x[:, None] + QUARTER[0], y[:, None] + rows.start + QUARTER[1])
-        picture[:, y, x] = four[:4].mean(2)
+        across, down = samples_in(count)
+        every, more = _shade(lighting, canvas, x[:, None] + across, y[:, None] + rows.start + down)
+        picture[:, y, x] = every[:4].mean(2)
         work += more + Work(refined=len(x))
     return picture, work
 
@@ -508,8 +521,10 @@ def rough(picture: np.ndarray, contrast: float = CAREFUL.contrast) -> np.ndarray
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
-def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1) -> Outputs:
-    """Outputs of a field, by pixels' centres, alpha by four samples; objects are numbered from 1."""
+def solid_outputs(
+    field: SolidField, stage: Stage, canvas: tuple[int, int], *, threads: int = 1, count: int = 4
+) -> Outputs:
+    """Outputs of a field, by pixels' centres, alpha by ``count`` samples; objects are numbered from 1."""
     width, height = canvas
     lighting = Lighting(field, stage)
     result = np.empty((ROWS, height, width), np.float32)
@@ -519,16 +534,17 @@ def solid_outputs(field: SolidField, stage: Stage, canvas: tuple[int, int], *, t
         y = np.arange(top, min(top + every, height))[:, None] + 0.5
         result[:, top : top + every] = _shown(lighting, directions(stage.camera, canvas, x_centres, y))
 
-    def four(start: int) -> None:
-        at = slice(start, start + TILE // 4)
-        way = directions(stage.camera, canvas, across[at, None] + QUARTER[0], down[at, None] + QUARTER[1])
+    def sampled(start: int) -> None:
+        at = slice(start, start + TILE // count)
+        way = directions(stage.camera, canvas, across[at, None] + right, down[at, None] + below)
         alpha = _alpha(lighting, way.reshape(3, -1))[1]
-        result[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, 4).mean(1)
+        result[5, down[at], across[at]] = field.xp.to_numpy(alpha).reshape(-1, count).mean(1)
 
     x_centres = np.arange(width) + 0.5
     field.xp.each(threads, row, range(0, height, every))
     down, across = np.nonzero(rough(result[5:]))
-    field.xp.each(threads, four, range(0, len(down), TILE // 4))
+    right, below = samples_in(count)
+    field.xp.each(threads, sampled, range(0, len(down), TILE // count))
     return Outputs(result[0], np.moveaxis(result[1:4], 0, 2), result[4].astype(np.int32), result[5])
 
 

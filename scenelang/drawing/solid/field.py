@@ -30,9 +30,10 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
 from scenelang.drawing.arrays import Array, Arrays, Smooth
-from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape
+from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import (
     BEGIN,
     END,
@@ -199,6 +200,8 @@ class SolidField:
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         drawn = np.array([solid.draws for solid in self.solids], bool)
+        # whether leaves have edges, which lines inside make
+        self.edged = any(isinstance(decoder, Norms) and decoder.inner > 0 for decoder in self.decoders)
         self.draws = bool(drawn.all())  # whether all objects draw
         self.media = bool(kinds.any())  # whether some object is a medium
         self.mixed = self.media and not kinds.all()  # whether some are and some are not
@@ -261,7 +264,7 @@ class SolidField:
         """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
         xp, like = self.xp, self.network.codes
         worn = {
-            i: Texture(xp, paint, frames[i], like, light=True)
+            i: texture_of(xp, paint, frames[i], like, light=True)
             for i, paint in enumerate(paints)
             if paint is not None and self.solids[i].draws  # the others leave colours as they are
         }
@@ -310,15 +313,17 @@ class SolidField:
                 sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * max(solid.radius - 1, 0.0)
                 low, high = (xp.array(side, network.codes) for side in sides.astype(np.float32))
                 self.solids[i] = replace(solid, box=(low, high))
-        plain = [
-            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps and not skinned
-            for element, s, skinned in zip(brought, self.solids, self.skinned.tolist(), strict=True)
+        plain = ~self.skinned & [
+            element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
+            for element, s in zip(brought, self.solids, strict=True)
         ]
+        media = np.asarray(xp.to_numpy(self.looks))[-1] > 0.5
+        self.segments = [network.segment(code) for code in learned] if (plain & media).any() else []
+        known = np.array([bool(own) for own in self.segments] + [False] * len(ordered), bool)
+        asked = plain & media & known[np.array([number[key] for key in keys], np.intp)]
         # 1 where the network for whole segments may answer
-        self.asked = xp.array(np.array(plain, np.float32), network.codes) * (self.looks[-1] > 0.5)
-        self.answered = bool(self.asked.sum() > 0)
-        known = len(network.segment_w) and self.answered
-        self.segments = [network.segment(code) for code in learned] if known else []
+        self.asked = xp.array(asked.astype(np.float32), network.codes)
+        self.answered = bool(asked.any())
 
     def _alone(self) -> None:
         """Prepare the answers for points that meet one object alone, or meet it first."""

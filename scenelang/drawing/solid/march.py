@@ -380,8 +380,11 @@ class MarchSettings(NamedTuple):
 
 
 CAREFUL = MarchSettings()
-MARCH_SETTINGS = {"quick": MarchSettings(0.04, 2, 0.15), "one": MarchSettings(0.04, 2)}
-"""Settings of the ways to sample solids; the others are `CAREFUL`."""
+MARCH_SETTINGS = {
+    **{"four": CAREFUL, "adaptive": CAREFUL},
+    **{"quick": MarchSettings(0.04, 2, 0.15), "one": MarchSettings(0.04, 2)},
+}
+"""Settings of each way to sample solids."""
 
 
 def march(
@@ -405,7 +408,7 @@ def march(
     ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
     trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes)
     trail.work.near = len(ids)
-    if whole and solids.segments and len(ids):
+    if whole and solids.answered and len(ids):
         sure = known(solids, passes)
         some, rest = xp.where(sure), xp.where(~sure)
         if len(some):

@@ -1,10 +1,12 @@
 """The solids' network, from top to bottom, for parameters of either library, and boxes around its leaves.
 
-Letters: N objects, M points, C = `code`, G = `width`, S = `segment`, L = `paint_lines`, K = `kind_lines`.
-Distances are in world units, leaf coordinates in leaf units, points lie last. Two parts are learned:
+Letters: N objects, M points, C = `code`, C' = C + `hidden` + 1, H = `hidden`, G = `width`, S = `segment`, L =
+`paint_lines`, K = `kind_lines`. Distances are in world units, leaf coordinates in leaf units, points lie
+last. Two parts are learned:
 
-1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code.
-   Light shows normals, so its units are smooth: SiLU (Elfwing et al. 2018).
+1. The decoder turns leaf coordinates into a distance. Its weights are a linear function of the object's code,
+   behind a hidden layer where the network has one. Its units are norms (`norms.py`), or, in networks that
+   know round leaves alone, SiLU (Elfwing et al. 2018).
 2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
    by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
 
@@ -31,10 +33,19 @@ from scenelang.compiler.groups import SMOOTH, SUBTRACT
 from scenelang.compiler.lifting import SOLID_LAYOUT, Layout
 from scenelang.drawing.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
 from scenelang.drawing.neural.network import TOKENS
+from scenelang.drawing.solid.norms import FEATURES, LINES, Norms, answers, norms
 
 LEVELS = 7  # of halvings of the cube's cells
 STEEPEST = 1.1  # change of a distance over a way of 1 at most; the march trusts in 1
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)), np.float32).T[:, None]  # (3, 1, 8)
+
+
+@lru_cache(maxsize=64)
+def norms_box(numbers: bytes, shape: tuple[int, int], *rest: Any) -> np.ndarray:
+    """The box (2, 3) of a decoder of norm units: its lines and radius, their shape, and the rest of it."""
+    flat = np.frombuffer(numbers, np.float32)
+    layers = Norms(flat[: shape[0] * shape[1]].reshape(shape), flat[-shape[0] - 1 : -1], flat[-1], *rest)
+    return surrounding(lambda q: answers(NUMPY, q, layers, False)[0])
 
 
 @lru_cache(maxsize=64)
@@ -92,10 +103,13 @@ class SolidConfig:
 
     code: int = 4  # entries of the codes
     material_code: int = 2
-    width: int = 8  # hidden units of the decoder's two layers
+    width: int = 8  # hidden units of the decoder's two layers, where it has SiLU
+    units: int = 0  # norm units of the decoder; 0: it has SiLU
+    hidden: int = 0  # rectified units between the codes and the weights
     paint_lines: int = 2  # lines of which the highest opens the gate of colour
     kind_lines: int = 2  # and that of medium
     segment: int = 0  # hidden units of the two layers that answer for whole segments; 0: there are none
+    answered: int = 0  # geometries, the first ones, that these answer for; 0: all
 
 
 class Cell(NamedTuple):
@@ -125,26 +139,43 @@ class SolidNetwork:
     codes: Any  # (geometries, C)
     material_codes: Any  # (materials, material_code)
     albedo: Any  # (material_code + 1, 4): colour and medium
-    decoder_w: Any  # (C + 1, 3, G), (C + 1, G, G), (C + 1, G, 1)
-    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, 1)
-    segment_w: Any  # (C + 1, 5, S), (C + 1, S, S), (C + 1, S, 1), or none
-    segment_b: Any  # (C + 1, S), (C + 1, S), (C + 1, 1), or none
+    lift_w: Any  # (C, H), or none
+    lift_b: Any  # (H,), or none
+    lines: Any  # (C', 3 units + 3, FEATURES), or none
+    radius: Any  # (C',), or none
+    decoder_w: Any  # (C', 3, G), (C', G, G), (C', G, 1), or none
+    decoder_b: Any  # (C', G), (C', G), (C', 1), or none
+    segment_w: Any  # (C', 5, S), (C', S, S), (C', S, 1), or none
+    segment_b: Any  # (C', S), (C', S), (C', 1), or none
     cell_lines: Any  # (TOKENS, 2, 1 + L + K)
     cell_gain: Any  # (TOKENS, 1 + L + K): a logarithm
     cell_bias: Any  # (TOKENS, 1 + L + K)
     candidate: Any  # (TOKENS,)
     bump: Any  # (TOKENS,)
 
-    def decoder(self, code: Array) -> Smooth:
-        """The decoder of a code (C,): each weight is linear in (code, 1)."""
-        return self._layers(code, self.decoder_w, self.decoder_b)
+    def lifted(self, code: Array) -> Array:
+        """What weights are linear in (C',): a code (C,), its hidden units, and 1."""
+        parts = [code, self.xp.full((1,), 1.0, code)]
+        if self.config.hidden:
+            parts.insert(1, (code @ self.lift_w + self.lift_b).clip(0.0))
+        return self.xp.concat(parts, 0)
+
+    def decoder(self, code: Array) -> Smooth | Norms:
+        """The decoder of a code (C,)."""
+        if not self.config.units:
+            return self._layers(code, self.decoder_w, self.decoder_b)
+        one, lines = self.lifted(code), self.lines
+        own = (one @ lines.reshape(len(lines), -1)).reshape(lines.shape[1:])
+        return norms(self.xp, own, one @ self.radius, RADIUS)
 
     def segment(self, code: Array) -> Smooth:
         """Layers of a code (C,) that answer for whole segments; empty where the network has none."""
-        return self._layers(code, self.segment_w, self.segment_b)
+        first = self.codes[: self.config.answered]
+        known = not len(first) or bool((first == code).all(1).any())
+        return self._layers(code, self.segment_w, self.segment_b) if known else Smooth()
 
     def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
-        one = self.xp.concat([code, self.xp.full((1,), 1.0, code)], 0)
+        one = self.lifted(code)
         return Smooth(
             (self.xp.packed((one @ w.reshape(len(w), -1)).reshape(w.shape[1:]).swapaxes(0, 1)), one @ b)
             for w, b in zip(weights, biases, strict=True)
@@ -178,17 +209,24 @@ class SolidNetwork:
         """Colour and medium (…, 4) of material codes (…, material_code)."""
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
-    def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
+    def field(self, q: Array, layers: Smooth | Norms, gradient: bool) -> Array:
         """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M); of rays
         (5, M), as `folded` tells them, and a segment's layers, their lengths (1, M).
         """
-        if not gradient:
+        if isinstance(layers, Smooth) and not gradient:
             return self.xp.smooth(q, layers)
-        parts = [q[:, i : i + SMOOTH_BLOCK] for i in range(0, q.shape[1], SMOOTH_BLOCK)]
-        return self.xp.concat([self._slopes(part, layers) for part in parts or [q]], 1)
+        parts = [q[:, i : i + SMOOTH_BLOCK] for i in range(0, q.shape[1], SMOOTH_BLOCK)] or [q]
+        if isinstance(layers, Norms):
+            results = [answers(self.xp, part, layers, gradient) for part in parts]
+        else:
+            results = [self._slopes(part, layers) for part in parts]
+        return results[0] if len(results) == 1 else self.xp.concat(results, 1)
 
-    def box(self, layers: Smooth) -> np.ndarray:
+    def box(self, layers: Smooth | Norms) -> np.ndarray:
         """The least and the greatest leaf coordinates (2, 3) of what a decoder shows."""
+        if isinstance(layers, Norms):
+            held = [np.asarray(self.xp.to_numpy(part), np.float32) for part in layers[:3]]
+            return norms_box(b"".join(part.tobytes() for part in held), held[0].shape, *layers[3:])
         parts = [np.asarray(self.xp.to_numpy(part)) for layer in layers for part in layer]
         return decoder_box(tuple(part.shape for part in parts), b"".join(part.tobytes() for part in parts))
 
@@ -258,18 +296,20 @@ class SolidArrays(SolidNetwork):
 
 def solid_shapes(c: SolidConfig, geometries: int, materials: int) -> dict[str, tuple[int, ...]]:
     """Shapes of a network's parameters in a file, by name."""
-    rows = 1 + c.paint_lines + c.kind_lines
+    rows, code = 1 + c.paint_lines + c.kind_lines, c.code + c.hidden
+    decoder = {"lines": (code + 1, LINES * (c.units + 1), FEATURES), "radius": (code + 1,)}
     return {
         "codes": (geometries, c.code),
         "material_codes": (materials, c.material_code),
         "albedo": (c.material_code + 1, 4),
-        **_layer_shapes("decoder", c.code, 3, c.width),
+        **({"lift_w": (c.code, c.hidden), "lift_b": (c.hidden,)} if c.hidden else {}),
+        **(decoder if c.units else _layer_shapes("decoder", code, 3, c.width)),
         "cell_lines": (TOKENS, 2, rows),
         "cell_gain": (TOKENS, rows),
         "cell_bias": (TOKENS, rows),
         "candidate": (TOKENS,),
         "bump": (TOKENS,),
-        **(_layer_shapes("segment", c.code, SEGMENT, c.segment) if c.segment else {}),
+        **(_layer_shapes("segment", code, SEGMENT, c.segment) if c.segment else {}),
     }
 
 

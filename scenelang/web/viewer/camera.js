@@ -40,8 +40,8 @@ export function panned(camera, right, up) {
 }
 
 /** A stage as another camera sees it. */
-export function seenBy(stage, camera) {
-  return { ...stage, ...camera, axes: axesOf(camera.eye, camera.target) };
+export function seenBy(stage, { eye, target, fov }) {
+  return { ...stage, camera: { eye, target, fov_rad: fov } };
 }
 
 /** The line of a scene that says where a camera is; its numbers are rounded to 1e-4, fov to 1e-3 degrees. */

@@ -68,7 +68,8 @@ function placed(parts, size) {
 /**
  * The elements of a view of solids.
  * @returns {{grids: object[], paints: object[], textures: object}} by numbers of shapes {side, first, box};
- *   by numbers of paints {kind: 1 picture, 2 colours, first, sides: as the shader takes them}; by samplers
+ *   by numbers of paints {kind: 1 picture, 2 colours, 3 linear, 4 radial, first, sides: as the shader takes
+ *   them}; by samplers
  */
 export function solidElements(gl, view) {
   const grids = [], paints = [], cubes = [];
@@ -79,7 +80,9 @@ export function solidElements(gl, view) {
   });
   const spaces = [], pictures = [];
   view.paints.forEach((paint, at) => {
-    if (paint.kind === "picture") pictures.push({ at, ...paint });
+    if (paint.kind === "linear") paints[at] = { kind: 3, first: 0, sides: [0, 0] };
+    else if (paint.kind === "radial") paints[at] = { kind: 4, first: 0, sides: [0, 0] };
+    else if (paint.kind === "picture") pictures.push({ at, ...paint });
     else spaces.push({ at, side: paint.sides.at(-1), data: spaceColours(paint, UNIT) });
   });
   const [solid, coloured, flat] = [placed(cubes, "side"), placed(spaces, "side"), placed(pictures, "high")];

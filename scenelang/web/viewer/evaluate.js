@@ -1,10 +1,10 @@
 // A scene's form, prepared once and run for any params and any frame. `scenelang/web/form.py` makes forms;
-// what a statement means is in `scenelang/evaluate/prepare`.
+// what a statement means is in `scenelang/language/statements.py`.
 
-import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
+import { Time, Angle, Vec, Wearing } from "./values.js";
 import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
 import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
-import { entering, prepared } from "./expressions.js";
+import { entering, looping, prepared } from "./expressions.js";
 import { MAPS } from "./maps.js";
 import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
@@ -21,7 +21,8 @@ const preparedForms = new WeakMap();
  * @param form - of a view
  * @param {{params?: Object, frame?: number}} inputs - values of params by name: numbers, radians, seconds,
  *   booleans, strings, arrays; those left out have their defaults
- * @returns {{rows: Object[], stage: ?Object, background: ?number[]}} as docs/architecture.md has them
+ * @returns {{rows: Object[], samples: number, stage: ?Object, background: ?number[]}} as docs/architecture.md
+ *   has them
  * @throws {NotLive} there is no picture of these; the message says why
  */
 export function evaluateForm(form, inputs = {}) {
@@ -51,7 +52,8 @@ class SceneRun {
     const out = new Block();
     for (const act of this.body) act(undefined, out);
     const rows = rowsOf(out.links, this.form);
-    const made = { rows, ...stageFrom(this.settings, this.form.dimension) };
+    const samples = samplesFrom(this.settings.samples);
+    const made = { rows, samples, ...stageFrom(this.settings, this.form) };
     if (made.stage !== null) checkEye(made, this.form);
     return made;
   }
@@ -75,6 +77,7 @@ class SceneRun {
     return (slots) => {
       const out = new Block();
       act(slots, out);
+      if (out.steps.filter((step) => step[0] === "opacity").length > 1) refuse("`opacity` is given twice");
       return out.steps;
     };
   }
@@ -155,13 +158,6 @@ function placeCalled(inside, own, out) {
   out.add({ ...node, steps: [...node.steps, ...steps], worn: node.worn ?? worn });
 }
 
-function itemsOf(value) {
-  if (value instanceof Vec) return value.items;
-  if (!(value instanceof Progression)) refuse(`expected a range or a vector, found ${kindOf(value)}`);
-  if (value.unit !== 0 && value.step === undefined) refuse("a range of angles or times without a step");
-  return value;
-}
-
 /** A param's value from outside as one of the language, of the kind of its default. */
 function fromOutside(given, like) {
   if (like instanceof Angle) return new Angle(given);
@@ -194,14 +190,18 @@ const INKS = {
   color: ([rgb]) => ["color", ...numbersOf(rgb, 3)],
   grayscale: ([amount]) => ["grayscale", bare(amount)],
   hue: ([angle]) => ["hue", radians(angle) / (2 * Math.PI)],
+  stop: ([offset, rgb]) => ["stop", bare(offset), ...numbersOf(rgb, 3)],
+  opacity: ([share]) => ["opacity", opacityFrom(bare(share))],
 };
 
-const settingOf = (name) => (args, run) => {
-  const parts = args.map((arg) => optionalValue(arg, run));
-  return (slots) => {
-    run.settings[name] = parts.map((part) => part(slots));
-  };
-};
+function opacityFrom(share) {
+  return share >= 0 && share <= 1 ? share : refuse(`an opacity of ${share} is outside 0..1`);
+}
+
+/** How many samples a pixel is the mean of. */
+function samplesFrom([count] = [4]) {
+  return [4, 16].includes(bare(count)) ? count : refuse(`${count} samples a pixel`);
+}
 
 const STATEMENTS_OF_FORMS = {
   no: ([why]) => () => refuse(why),
@@ -229,18 +229,8 @@ const STATEMENTS_OF_FORMS = {
     };
   },
   for: ([where, slot, expr, block], run) => {
-    const [get, act] = [prepared(expr, run), actionsOf(block, run)];
-    const weight = 1 + block.length;
-    return (slots, out) => {
-      const target = where === "g" ? run.globals : slots;
-      const items = itemsOf(get(slots));
-      const count = items instanceof Progression ? items.count() : items.length;
-      for (let at = 0; at < count; at += 1) {
-        target[slot] = items instanceof Progression ? items.item(at) : items[at];
-        run.spend(weight);
-        act(slots, out);
-      }
-    };
+    const [loop, act] = [looping([where, slot, expr], 1 + block.length, run), actionsOf(block, run)];
+    return (slots, out) => loop(slots, () => act(slots, out));
   },
   if: ([test, then, otherwise], run) => {
     const [decide, first, second] = [prepared(test, run), actionsOf(then, run), actionsOf(otherwise, run)];
@@ -324,10 +314,12 @@ const STATEMENTS_OF_FORMS = {
       run.animated = [run.frame / fps, u, run.frame, frames];
     };
   },
-  background: settingOf("background"),
-  camera: settingOf("camera"),
-  light: settingOf("light"),
-  ground: settingOf("ground"),
+  set: ([name, ...args], run) => {
+    const parts = args.map((arg) => optionalValue(arg, run));
+    return (slots) => {
+      run.settings[name] = parts.map((part) => part(slots));
+    };
+  },
 };
 
 /** The nearest whole number, of two the even one. */

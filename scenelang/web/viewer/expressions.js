@@ -97,9 +97,50 @@ function progression(exclusive, start, stop, step) {
   return new Progression(a, b, exclusive, size, sameUnit(b, unit, size, unitOf(step)));
 }
 
-function vectorOf(items) {
-  if (items.some((item) => item instanceof Progression)) refuse("a range inside a vector");
-  return new Vec(items);
+/** What a loop runs over: a range, or the items of a vector. */
+export function itemsOf(value) {
+  if (value instanceof Vec) return value.items;
+  if (!(value instanceof Progression)) refuse(`expected a range or a vector, found ${kindOf(value)}`);
+  if (value.unit !== 0 && value.step === undefined) refuse("a range of angles or times without a step");
+  return value;
+}
+
+/**
+ * The turns of a loop.
+ * @param {Array} head - "g" or "v" and the slot of its variable, and what it runs over
+ * @returns {(slots: Array, turn: () => void) => void}
+ */
+export function looping([where, slot, expr], weight, run) {
+  const get = prepared(expr, run);
+  return (slots, turn) => {
+    const target = where === "g" ? run.globals : slots;
+    const items = itemsOf(get(slots));
+    const count = items instanceof Progression ? items.count() : items.length;
+    for (let at = 0; at < count; at += 1) {
+      target[slot] = items instanceof Progression ? items.item(at) : items[at];
+      run.spend(weight);
+      turn();
+    }
+  };
+}
+
+/** How an item of a vector adds its values to those of the vector. */
+function filling(item, run) {
+  const word = Array.isArray(item) ? item[0] : "";
+  if (word !== "for" && word !== "if") {
+    const get = prepared(item, run);
+    return (slots, out) => {
+      const value = get(slots);
+      out.push(value instanceof Progression ? refuse("a range inside a vector") : value);
+    };
+  }
+  const fill = filling(item.at(-1), run);
+  if (word === "for") {
+    const loop = looping(item.slice(1, 4), 2, run);
+    return (slots, out) => loop(slots, () => fill(slots, out));
+  }
+  const test = prepared(item[1], run);
+  return (slots, out) => (truth(test(slots)) ? fill(slots, out) : null);
 }
 
 /** The slots of the call so many definitions further out. */
@@ -131,8 +172,12 @@ const WORDS_OF_VALUES = {
   "'": ([text]) => constantly(text),
   "#": (bytes) => constantly(new Vec(bytes.map((byte) => byte / 255))),
   "[": (items, run) => {
-    const parts = items.map((item) => prepared(item, run));
-    return (slots) => vectorOf(parts.map((part) => part(slots)));
+    const fills = items.map((item) => filling(item, run));
+    return (slots) => {
+      const values = [];
+      for (const fill of fills) fill(slots, values);
+      return new Vec(values);
+    };
   },
   "..": ([exclusive, ...ends], run) => {
     const parts = ends.map((end) => prepared(end, run));

@@ -70,7 +70,7 @@ export function checkEye({ rows, stage }, { geometries, media }) {
       open.push([here, operator, k]);
       [here, operator, k] = [NOTHING_THERE, 0, 0];
     }
-    here = foldedAt(here, operator, k, leafAt(row, DISTANCES[geometries[row.shape]], stage.eye));
+    here = foldedAt(here, operator, k, leafAt(row, DISTANCES[geometries[row.shape]], stage.camera.eye));
     for (let ends = row.token >> ENDS; ends > 0; ends -= 1) {
       const [outer, joint, width] = open.pop();
       here = foldedAt(outer, joint, width, here);

@@ -4,16 +4,18 @@
 const float INTO = 3e-5; // behind a surface where its material is asked for
 const float CLEAR = 2e-4; // before a surface where rays from the light end
 
-uniform vec3 eye, forward, right, up; // the camera; forward over the tangent of half the angle of view
-uniform vec3 lamp, power, horizon, zenith;
-uniform vec4 ground; // colour, height
-uniform bool grounded, transparent;
+uniform Stage stage; // as scenelang/compiler/spaces.py has it; `on` of a part that is there
+uniform vec3 forward, right, up; // the camera's; forward over the tangent of half the angle of view
 uniform vec3 canvas; // width, height, world units of a pixel at the focus
 uniform ivec4 grid; // pixels along a side, cells in a row; first of the light's, these along a side of a cube
 
+#define EYE stage.camera.eye
+#define LAMP stage.light.position
+#define POWER (stage.light.power * stage.light.rgb)
+
 // What of the light reaches a point: on a surface, or in a medium where something opaque may begin.
 float lit(vec3 p, bool edge) {
-  vec3 way = p - lamp, a;
+  vec3 way = p - LAMP, a;
   float r = length(way);
   way /= max(r, 1e-9);
   a = abs(way);
@@ -22,7 +24,7 @@ float lit(vec3 p, bool edge) {
   float side = float(grid.w);
   ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * side, 0.0, side - 1.0));
   int face = 2 * axis + (turned_.x > 0.0 ? 0 : 1);
-  march(cell(grid.z + (face * grid.w + at.y) * grid.w + at.x), lamp, way, r - (edge ? 0.0 : CLEAR));
+  march(cell(grid.z + (face * grid.w + at.y) * grid.w + at.x), LAMP, way, r - (edge ? 0.0 : CLEAR));
   return hit < NEVER ? 0.0 : exp(-EXTINCTION * fog);
 }
 
@@ -59,12 +61,12 @@ void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
     float taken = 1.0 - exp(-EXTINCTION / EVEN * size), left = 1.0 - NODES[node] * taken;
     float t = from - log(left) * (EVEN / EXTINCTION);
     float weight = WEIGHTS[node] * EVEN * taken * left * exp(-EXTINCTION * (before + from - begin));
-    vec3 p = eye + t * way;
+    vec3 p = EYE + t * way;
     look(list, p);
     vec3 own = seen, plain = even;
     woven = woven || worn;
-    float r = max(length(lamp - p), NEAREST), clear = lit(p, false);
-    vec3 light = weight * (AMBIENT_EVEN + power * (clear / (4.0 * r * r)));
+    float r = max(length(LAMP - p), NEAREST), clear = lit(p, false);
+    vec3 light = weight * (AMBIENT_EVEN + POWER * (clear / (4.0 * r * r)));
     total += own * light;
     evenTotal += plain * light;
     share += weight;
@@ -83,13 +85,13 @@ const float JUMP = 0.03; // of colours that differ
 float lasting(ivec2 list, vec3 way, float from, vec2 piece) {
   float size = (piece.y - piece.x) / 8.0, low = from + 0.02 * size, high = NEVER;
   vec3 first, last;
-  look(list, eye + low * way);
+  look(list, EYE + low * way);
   first = even;
   for (int i = zero; i < 16; i++) {
     bool halving = high < NEVER;
     float t = halving ? 0.5 * (low + high) : min(low + size, piece.y - 0.02 * size);
     if (t <= low) return halving ? low : piece.y;
-    look(list, eye + t * way);
+    look(list, EYE + t * way);
     if (halving ? dot(abs(even - first), vec3(1.0)) < dot(abs(even - last), vec3(1.0))
       : dot(abs(even - first), vec3(1.0)) <= JUMP) {
       low = t;
@@ -106,14 +108,14 @@ float lasting(ivec2 list, vec3 way, float from, vec2 piece) {
 
 // What a ray from the eye sees, premultiplied, and the same with plain colours.
 void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
-  vec3 sky = mix(horizon, zenith, clamp(2.0 * way.y, 0.0, 1.0));
-  light = transparent ? vec4(0.0) : vec4(sky, 1.0);
-  float limit = grounded && eye.y > ground.w && way.y < 0.0 ? (ground.w - eye.y) / way.y : NEVER;
+  vec3 sky = mix(stage.horizon, stage.zenith, clamp(2.0 * way.y, 0.0, 1.0));
+  light = stage.transparent ? vec4(0.0) : vec4(sky, 1.0);
+  float limit = stage.ground.on && EYE.y > stage.ground.y && way.y < 0.0 ? (stage.ground.y - EYE.y) / way.y : NEVER;
 #ifdef MEDIA
   pieceCount = 0;
   seeing = true;
 #endif
-  march(list, eye, way, limit);
+  march(list, EYE, way, limit);
 #ifdef MEDIA
   seeing = false;
   float thick = fog;
@@ -128,7 +130,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
       for (int i = zero; i < 2; i++) {
         vec3 was = slope, wore = seen, plainly = even;
         float off = state;
-        look(list, eye + (t + INTO) * way);
+        look(list, EYE + (t + INTO) * way);
         if (i == 1 && dot(slope, slope) < 0.01) { // past an edge, where nothing is
           slope = was, seen = wore, even = plainly, state = off;
           t -= ahead;
@@ -145,7 +147,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
 #ifdef TEXTURES
       if (px > 0.0 && worn && !edge) { // the mean of what the pixel's samples see of the plane there
         colour = vec3(0.0);
-        vec3 ray = way * t, base = eye + way * (t + INTO);
+        vec3 ray = way * t, base = EYE + way * (t + INTO);
         float towards_ = dot(n, ray), wide = px * t * dot(way, forward) / dot(forward, forward);
         if (abs(towards_) < 1e-6) towards_ = -1e-6;
         for (int i = zero; i < 4; i++) {
@@ -159,24 +161,24 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
     } else {
       t = limit;
     }
-    vec3 p = eye + t * way;
+    vec3 p = EYE + t * way;
     if (!surface) {
       float kept = exp(-dot(p.xz, p.xz) / FADE);
-      colour = other = kept * ground.rgb;
-      haze = (1.0 - kept) * horizon;
+      colour = other = kept * stage.ground.rgb;
+      haze = (1.0 - kept) * stage.horizon;
     }
-    vec3 to = lamp - p;
+    vec3 to = LAMP - p;
     float r = max(length(to), NEAREST), facing = max(dot(n, to) / r, 0.0) / (r * r);
     vec3 all = vec3(AMBIENT_EVEN + AMBIENT_UP * n.y);
-    if (facing > 0.0 && power != vec3(0.0)) all += power * (facing * lit(p + LIFT * n, edge));
+    if (facing > 0.0 && POWER != vec3(0.0)) all += POWER * (facing * lit(p + LIFT * n, edge));
     light = vec4(colour * all + haze, 1.0);
     plain = vec4(other * all + haze, 1.0);
   }
 #ifdef MEDIA
   if (pieceCount > 0) {
     glow = evenGlow = vec3(0.0);
-    float before = 0.0, middle = dot(lamp - eye, way);
-    float aside = max(length(lamp - eye - middle * way), NEAREST);
+    float before = 0.0, middle = dot(LAMP - EYE, way);
+    float aside = max(length(LAMP - EYE - middle * way), NEAREST);
     for (int i = zero; i < pieceCount; i++) {
       vec2 piece = pieces[i];
       float from = piece.x;
@@ -185,7 +187,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
 #ifdef COLOURED
         if (j < 8) to = lasting(list, way, from, piece);
 #endif
-        vec3 a = lamp - eye - from * way, b = lamp - eye - to * way;
+        vec3 a = LAMP - EYE - from * way, b = LAMP - EYE - to * way;
         bool narrow = dot(a, b) > NARROW * length(a) * length(b);
         for (int k = zero; k < 9; k++) { // by the angle at the light, where that is wide
           float low = from, high = to;
@@ -222,7 +224,8 @@ void main() {
 layout(location = 0) out vec4 picture;
 #ifdef FOUR
 uniform sampler2D once, shown;
-const float CONTRAST = 0.04; // pixels that differ more from between their neighbours are sampled four times
+uniform int along; // samples along a side of a pixel
+const float CONTRAST = 0.04; // pixels that differ more from between their neighbours are sampled so often
 
 vec4 near(ivec2 at) {
   return texelFetch(shown, clamp(at, ivec2(0), ivec2(canvas.xy) - 1), 0);
@@ -251,14 +254,16 @@ void main() {
     abs(near(pixel + ivec2(0, 1)) + near(pixel - ivec2(0, 1)) - here));
   bool even_ = max(max(bend.x, bend.y), max(bend.z, bend.w)) <= CONTRAST;
   if (even_ && min(canvas.x, canvas.y) > 1.0) return; // a line of pixels shows too little of what changes
-  const int samples = 4;
+  const bool whole = false; // whether a sample stands for all of its pixel
 #else
-  const int samples = 1;
+  const int along = 1;
+  const bool whole = true;
 #endif
+  int samples = along * along;
   for (int i = zero; i < samples; i++) {
-    vec2 off = samples == 1 ? vec2(0.0) : vec2(i & 1, i >> 1) * 0.5 - 0.25;
+    vec2 off = (vec2(i % along, i / along) + 0.5) / float(along) - 0.5;
     vec2 at = (gl_FragCoord.xy + off - 0.5 * canvas.xy) * canvas.z;
-    shade(normalize(forward + at.x * right + at.y * up), list, samples == 1 ? canvas.z : 0.0, one, plain);
+    shade(normalize(forward + at.x * right + at.y * up), list, whole ? canvas.z : 0.0, one, plain);
     light += one / float(samples);
   }
 #ifndef FOUR

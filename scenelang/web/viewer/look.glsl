@@ -27,11 +27,28 @@ vec3 texel(ivec3 at) {
   return vec3(texelFetch(colours, at, 0).rgb) / 65535.0;
 }
 
-// The colour that a row's texture has at a point of the leaf.
+// The colour of a gradient between stops at (u, v).
+vec3 graded(vec2 spot, int row, int count, bool straight) {
+  float s = straight ? 0.5 * spot.x + 0.5 : length(spot);
+  vec4 before = part(row, 0);
+  vec3 rgb = before.yzw;
+  for (int i = 1; i < count; i++) {
+    vec4 next = part(row, i);
+    float over = next.x - before.x;
+    rgb = mix(rgb, next.yzw, over > HARD ? clamp((s - before.x) / over, 0.0, 1.0) : step(next.x, s));
+    before = next;
+  }
+  return rgb;
+}
+
+// The colour that a row's texture or gradient has at a point of the leaf.
 vec3 textured(int row, vec4 paint, vec3 q) {
   vec4 u = part(row, PLACE), v = part(row, PLACE + 1), size = part(row, GRID);
   vec3 rgb;
-  if (paint.x < 1.5) {
+  if (paint.x > 2.5) {
+    vec2 spot = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
+    rgb = graded(spot, int(paint.y), int(v.w), paint.x < 3.5);
+  } else if (paint.x < 1.5) {
     vec2 sides = size.zw, place = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
     place = fract(place) * sides - 0.5;
     vec2 cell = floor(place), share = place - cell;
@@ -50,7 +67,7 @@ vec3 textured(int row, vec4 paint, vec3 q) {
     }
   }
   for (int i = zero; i < int(paint.z); i++) {
-    vec4 op = part(int(paint.y), i);
+    vec4 op = part(int(paint.y), int(v.w) + i);
     if (op.x < 0.5) rgb *= op.yzw;
     else if (op.x < 1.5) rgb = mix(rgb, vec3(dot(rgb, vec3(0.2126, 0.7152, 0.0722))), op.y);
     else rgb = hued(rgb, op.y);

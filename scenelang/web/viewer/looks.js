@@ -58,12 +58,22 @@ function fewerInks(steps) {
 
 /**
  * What a row says of a material.
- * @param {Wearing} worn - its `ops` are maps {rows} and colour steps
+ * @param {Wearing} worn - its `ops` are maps {rows}, colour steps and opacities, of which the last one counts
  */
 export function lookOf(worn, form) {
   let moved = IDENTITY;
-  const steps = [];
+  const steps = [], stops = [];
+  let opacity = 1;
   for (const op of worn.ops) {
+    if (op[0] === "stop") {
+      const rgb = op.slice(2).map(shareOf);
+      stops.push([op[1], ...(form.dimension === 3 ? linearColour(rgb) : rgb)]);
+      continue;
+    }
+    if (op[0] === "opacity") {
+      opacity = op[1];
+      continue;
+    }
     if (Array.isArray(op)) {
       steps.push(form.dimension === 3 && op[0] === "color" ? ["color", ...linearColour(op.slice(1))] : op);
       continue;
@@ -75,10 +85,19 @@ export function lookOf(worn, form) {
     if (rows !== null) moved = composedMap(rows, moved);
   }
   if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
-  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1] };
+  checkStops(stops, worn.paint >= 0 && form.graded[worn.paint]);
+  if (opacity !== 1 && form.dimension === 3) refuse("in space nothing but mist is translucent");
+  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity };
   if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
   const paintSteps = fewerInks(steps);
   if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");
   const [a, b, , x, c, d, , y] = invertedMap(moved);
-  return { ...look, place: [a, b, x, c, d, y], paintSteps };
+  return { ...look, place: [a, b, x, c, d, y], paintSteps, stops: stops.length ? stops : undefined };
+}
+
+function checkStops(stops, graded) {
+  if (!graded && stops.length) refuse("stops in what is not a gradient");
+  if (graded && !(stops.length >= 2 && stops.length <= 8)) refuse("a gradient has 2 to 8 stops");
+  const rising = stops.every(([offset], at) => offset >= (at ? stops[at - 1][0] : 0) && offset <= 1);
+  if (!rising) refuse("offsets of stops rise from 0 to 1");
 }

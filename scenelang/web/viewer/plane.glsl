@@ -1,5 +1,5 @@
 // The framed network at points of the plane, as scenelang/drawing/neural/device.py computes it, and the pixels that
-// take four samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
+// take 4 or 16 samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
 // decoders.
 
 uniform sampler2D rows; // of each object: some texels, its steps, the place and the steps of its picture; of groups
@@ -12,7 +12,8 @@ uniform vec2 size; // of the frame, pixels
 uniform float px; // side of a pixel, world units; 0: single points
 uniform float empty; // the state before the first object
 uniform float widest; // of the blends, world units
-uniform int most; // times that a pixel asks, 5; a number here would have some compilers write the loop out
+uniform int most; // times that a pixel asks, 5 or 17; a number here would have compilers write the loop out
+uniform float corner; // pixels from the centre to a sample, a little rounded up
 uniform int tile; // side of a tile, pixels
 uniform int across; // tiles in a row
 #ifdef POINTS
@@ -27,8 +28,12 @@ float spent = 0.0; // multiply-adds
 out vec4 shown;
 
 const float FAR = 1e15; // leaf units: float32 holds its square
-const float CORNER = 0.36; // pixels from the centre to a sample, a little rounded up
-const float NEAR = 0.85; // pixels: farther from an outline a pixel has one colour
+#define NEAR (corner + 0.49) // pixels: farther from an outline a pixel has one colour
+#ifdef CLEAR
+#define INK vec4 // premultiplied, with the coverage
+#else
+#define INK vec3
+#endif
 const float NARROW = 1.0 / 16.0; // of a pixel by a blend's width: above it colours change across the pixel
 const float LEAST = 1e-4; // of a colour, that counts as part of what a point shows
 const int BLENDS = 8, EVERYWHERE = 16, HIDES = 32; // flags of rows, over kinds of joins; as in plane.js
@@ -38,8 +43,12 @@ const int BODY = 5; // texels of a row before its steps, the last for its skin
 const int BODY = 4;
 #endif
 const int END = 1 << 24; // behind all texels
-const vec2 OFFSETS[5] =
-    vec2[](vec2(0), vec2(-0.25, -0.25), vec2(0.25, -0.25), vec2(-0.25, 0.25), vec2(0.25, 0.25));
+
+/** The place of a pixel's middle, 0, or of its samples from 1 on, pixels from the middle. */
+vec2 place(int k) {
+  int side = most > 5 ? 4 : 2;
+  return k == 0 ? vec2(0) : (vec2((k - 1) % side, (k - 1) / side) + 0.5) / float(side) - 0.5;
+}
 
 float learned(int shape, vec2 q);
 
@@ -113,10 +122,24 @@ vec3 turned(vec3 rgb, float turns) {
   return value - chroma + chroma * clamp(shares, 0.0, 1.0);
 }
 
-/** The colour of a picture, which repeats, at leaf coordinates. */
-vec3 painted(vec2 q, int at) {
-  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
-  vec2 spot = fract(vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z)) * about.xy - 0.5;
+/** The colour of a gradient between stops at (u, v). */
+vec3 graded(vec2 spot, int at, int count, bool straight) {
+  float s = straight ? 0.5 * spot.x + 0.5 : length(spot);
+  vec4 before = texel(rows, at);
+  vec3 rgb = before.yzw;
+  for (int i = 1; i < count; i++) {
+    vec4 next = texel(rows, at + i);
+    float over = next.x - before.x;
+    rgb = mix(rgb, next.yzw, over > HARD ? clamp((s - before.x) / over, 0.0, 1.0) : step(next.x, s));
+    before = next;
+  }
+  SPEND(8 * count);
+  return rgb;
+}
+
+/** The colour of a picture, which repeats, at coordinates in it. */
+vec3 pictured(vec2 spot, vec4 about) {
+  spot = fract(spot) * about.xy - 0.5;
   ivec2 corner = ivec2(floor(spot)), sides = ivec2(about.xy);
   vec2 share = spot - vec2(corner);
   int first = int(about.z);
@@ -124,10 +147,19 @@ vec3 painted(vec2 q, int at) {
                    dot_of_picture(first, corner + ivec2(1, 0), sides), share.x);
   vec3 below = mix(dot_of_picture(first, corner + ivec2(0, 1), sides),
                    dot_of_picture(first, corner + ivec2(1, 1), sides), share.x);
-  vec3 rgb = mix(above, below, share.y);
   SPEND(20);
+  return mix(above, below, share.y);
+}
+
+/** The colour of a picture or a gradient at leaf coordinates. */
+vec3 painted(vec2 q, int at) {
+  vec4 a = texel(rows, at), b = texel(rows, at + 1), about = texel(rows, at + 2);
+  vec2 spot = vec2(dot(a.xy, q) + a.z, dot(b.xy, q) + b.z);
+  bool picture = about.x > 0.0;
+  vec3 rgb = picture ? pictured(spot, about) : graded(spot, at + 3, int(about.y), about.x > -1.5);
+  at += picture ? 3 : 3 + int(about.y);
   for (int i = 0; i < int(about.w); i++) {
-    vec4 op = texel(rows, at + 3 + i);
+    vec4 op = texel(rows, at + i);
     if (op.x == COLOR) rgb *= op.yzw;
     else if (op.x == GRAYSCALE) rgb += op.y * (dot(LUMA, rgb) - rgb);
     else rgb = turned(rgb, op.y);
@@ -155,7 +187,7 @@ bool idle(int gate, float narrow, float distance, float state) {
 
 // What a point that has met some objects shows.
 float state;
-vec3 rgb;
+INK ink;
 // How near to an outline a pixel around the point has more than one colour, world units, 0 for one of its
 // samples; whether it has; whether colours change across it where nothing is seen, and whether a blend shows that.
 float gap;
@@ -176,25 +208,32 @@ void notice(int kind, float narrow, float distance, float paint, float room) {
     doubtful = doubtful || (tied && paint > LEAST && paint < 1.0 - LEAST);
 #ifdef PICTURES
     float width = BLEND / narrow;
-    doubtful = doubtful || (px > NARROW * width && margin < width + CORNER * (px + room / NEAR));
+    doubtful = doubtful || (px > NARROW * width && margin < width + corner * (px + room / NEAR));
 #endif
   } else if (kind == UNION) {
-    tied = tied || margin < 2.0 * CORNER * px;
+    tied = tied || margin < 2.0 * corner * px;
+#ifdef CLEAR
+    near = near || (paint > 0.0 && abs(state) < gap * UNIT);
+#endif
   }
 }
 
-void join(int gate, float narrow, float distance, float paint, vec3 own) {
+void join(int gate, float narrow, float distance, float paint, INK own) {
+#ifdef CLEAR
+  if (gate == UNION) own += clamp(0.5 - state * SLOPE, 0.0, 1.0) * (1.0 - own.a) * ink;
+#endif
   float take = clamp(level(cell[gate], narrow, distance, state), 0.0, 1.0);
   vec2 ends = cell[gate + LINES + 1].xy;
   state += take * (ends.x * distance - state) - take * (1.0 - take) * ends.y / narrow;
-  rgb += paint * (own - rgb);
+  ink += paint * (own - ink);
   SPEND(3 * (LINES + 1) + 11);
 }
 
 // ------------------------------------------------------------ groups
 
 #ifdef DEPTH
-vec4 below[DEPTH]; // colours and states that open groups will join
+INK below[DEPTH]; // colours and states that open groups will join
+float under[DEPTH];
 int depth = 0, open = 0; // how many are open, and the texel of the innermost: kind, narrow, last row, around it
 
 /** End groups that an object, or the end, stands behind. */
@@ -204,10 +243,9 @@ void leave(int at) {
     if (float(at) <= group.z) break;
     int kind = int(group.x), gate = kind * (LINES + 2);
     float distance = state / UNIT;
-    vec4 outer = below[--depth];
-    vec3 own = rgb;
-    state = outer.a;
-    rgb = outer.rgb;
+    INK own = ink;
+    ink = below[--depth];
+    state = under[depth];
     open = int(group.w);
     float paint = paints(gate, group.y, distance);
     if (gap > 0.0) notice(kind, group.y, distance, paint, gap);
@@ -220,9 +258,10 @@ void enter(int group) {
   int more = 0;
   for (int g = group; g != open; g = int(texel(rows, g).w)) more++;
   for (; more > 0; more--) {
-    below[depth++] = vec4(rgb, state);
+    under[depth] = state;
+    below[depth++] = ink;
     state = empty;
-    rgb = vec3(0.0);
+    ink = INK(0.0);
   }
   open = group;
 }
@@ -238,7 +277,7 @@ int first = 0; // the last object that hides all before it
 /** Let a point meet its objects; where `near` comes true the answer is of no use. */
 void meet(vec2 p, ivec2 span) {
   state = empty;
-  rgb = vec3(0.0);
+  ink = INK(0.0);
   bool middle = gap > 0.0;
   near = tied = doubtful = false;
   for (int i = first; i < span.y; i++) {
@@ -309,14 +348,19 @@ void meet(vec2 p, ivec2 span) {
     if (c.z > 0.0 && paint > LEAST) {
       // over a pixel, colours of pictures are a mean as they are of four samples
       own.rgb = vec3(0.0);
-      int count = middle ? 4 : 1;
+      int count = middle ? most - 1 : 1;
       for (int k = 0; k < count; k++) {
-        vec2 spot = middle ? p + px * OFFSETS[k + 1] : p;
+        vec2 spot = middle ? p + px * place(k + 1) : p;
         own.rgb += painted(local(spot, at + BODY, steps, room), at + int(c.z)) / float(count);
       }
     }
 #endif
+#ifdef CLEAR
+    float opacity = 1.0 - 2.0 * fract(a.w); // behind the number of steps
+    join(gate, narrow, distance, paint, opacity * vec4(own.rgb, 1.0));
+#else
     join(gate, narrow, distance, paint, own.rgb);
+#endif
   }
 #ifdef DEPTH
   leave(END);
@@ -329,18 +373,22 @@ void main() {
   int number = int(gl_FragCoord.x) + 1024 * int(gl_FragCoord.y);
   gap = 0.0;
   meet(texel(points, number).xy, ivec2(texel(lists, 0).xy));
-  shown = vec4(state / UNIT, rgb);
+  shown = vec4(state / UNIT, ink.rgb);
 #else
   ivec2 at = ivec2(gl_FragCoord.xy) / tile, span = ivec2(texel(lists, at.y * across + at.x).xy);
   vec2 middle = (gl_FragCoord.xy - 0.5 * size) * px;
   vec4 sum = vec4(0.0);
   for (int k = 0; k < most; k++) {
     gap = k == 0 ? NEAR * px : 0.0;
-    meet(middle + px * OFFSETS[k], span);
+    meet(middle + px * place(k), span);
     float alpha = clamp(0.5 - state * SLOPE, 0.0, 1.0);
-    vec4 picture = vec4(rgb * alpha, alpha);
+#ifdef CLEAR
+    vec4 picture = ink * alpha;
+#else
+    vec4 picture = vec4(ink * alpha, alpha);
+#endif
     if (k > 0) {
-      sum += 0.25 * picture;
+      sum += picture / float(most - 1);
     } else if (!near) {
       sum = picture;
       break;

@@ -83,7 +83,7 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
-    numbers.push(scale, narrow(joins[i]), flagsOf(joins[i]), steps.length);
+    numbers.push(scale, narrow(joins[i]), flagsOf(joins[i], row), steps.length + (1 - row.opacity) / 2);
     const more = skinned ? skinReach(row) / Math.min(far, 1) : 0;
     numbers.push(...bounds.map((bound) => bound + more), Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : head + moves, 0);
@@ -92,10 +92,16 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     for (const step of steps) numbers.push(...texelsOf(step));
     if (paint < 0) return;
     const [a, b, u, c, d, v] = row.place; // to shares of the picture's sides, from its upper left corner
-    numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
-    numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
-    const picture = pictures[paint];
-    numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    if (row.stops) {
+      numbers.push(a, b, u, 0, c, d, v, 0);
+      numbers.push(pictures[paint].kind === "linear" ? -1 : -2, row.stops.length, 0, row.paintSteps.length);
+      numbers.push(...row.stops.flat());
+    } else {
+      numbers.push(a / 2, b / 2, (u + 1) / 2 - Math.floor((u + 1) / 2), 0);
+      numbers.push(-c / 2, -d / 2, (1 - v) / 2 - Math.floor((1 - v) / 2), 0);
+      const picture = pictures[paint];
+      numbers.push(picture.wide, picture.high, picture.first, row.paintSteps.length);
+    }
     for (const [name, ...amounts] of row.paintSteps) {
       numbers.push(network.paintSteps.indexOf(name), ...amounts, ...Array(3 - amounts.length).fill(0));
     }
@@ -110,13 +116,15 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
 }
 
 /** How a row joins, as plane.glsl has it. */
-function flagsOf(join) {
+function flagsOf(join, row) {
   const far = join.always || (join.seen.hidden && join.operator < 2);
-  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join);
+  return join.kind + 8 * join.seen.blends + 16 * far + 32 * hides(join, row);
 }
 
 /** Whether nothing is seen of what was before, where a row is solid. */
-const hides = ({ operator, around, seen }) => operator === 0 && around === null && !seen.blends;
+const hides = ({ operator, around, seen }, { opacity }) => (
+  operator === 0 && around === null && !seen.blends && opacity === 1
+);
 
 /** Radius of a disc within an object whose leaf has one of a radius, 0 where none is known. */
 const filled = (inner, { skin = [0, 0, 0] }) => (skin[1] > 0 || !inner ? 0 : Math.max(inner + skin[0] + skin[2], 0));
@@ -150,12 +158,13 @@ export function planeDrawer(gl, view) {
   const shapes = new Set(); // seen so far
   let depth = 0; // of groups, likewise
   let skinned = false; // whether a leaf has had a skin
+  let clear = false; // whether something was not opaque
   const textures = ["rows", "lists", "nodes", "texels", "points"];
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
   const grids = view.shapes.slice(network.decoders.length);
   const [nodes, ofGrid] = joined(grids.map(distances), Float32Array);
-  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels), Uint8Array);
+  const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
     ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
     ...grids.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest, first: ofGrid[i] })),
@@ -174,8 +183,10 @@ export function planeDrawer(gl, view) {
     for (const { shape } of program.rows) shapes.add(shape);
     skinned ||= program.rows.some((row) => row.skin?.some(Boolean));
     depth = Math.max(depth, groupsOf(joins).depth);
+    clear ||= program.rows.some(({ opacity }) => opacity < 1);
     const used = [...shapes].sort((a, b) => a - b);
-    const defines = [...kinds, ...(skinned ? ["SKINS"] : []), ...(depth ? [`DEPTH ${depth}`] : []), ...(define ? [define] : [])];
+    const defines = [...kinds, ...(depth ? [`DEPTH ${depth}`] : [])];
+    defines.push(...(skinned ? ["SKINS"] : []), ...(clear ? ["CLEAR"] : []), ...(define ? [define] : []));
     const key = [...defines, ...used].join();
     if (!programs.has(key)) {
       const found = linked(gl, fragmentText(view, used, defines));
@@ -193,7 +204,7 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const reach = reaches(program.rows, joins, network);
     const widest = program.rows.reduce((most, { blend }) => Math.max(most, blend), network.blend);
-    const inner = program.rows.map((row, i) => (hides(joins[i]) ? filled(leaves[row.shape].inner, row) : 0));
+    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? filled(leaves[row.shape].inner, row) : 0));
     const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach, skinned);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
@@ -212,7 +223,8 @@ export function planeDrawer(gl, view) {
     gl.uniform1f(place("px"), define === "POINTS" ? 0 : px);
     gl.uniform1f(place("empty"), (network.empty * widest) / network.blend);
     gl.uniform1f(place("widest"), widest);
-    gl.uniform1i(place("most"), 5);
+    gl.uniform1i(place("most"), 1 + program.samples);
+    gl.uniform1f(place("corner"), program.samples > 4 ? 0.54 : 0.36);
     gl.uniform1i(place("tile"), lists.tile);
     gl.uniform1i(place("across"), lists.across);
     gl.viewport(0, 0, width, height);

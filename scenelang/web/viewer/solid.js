@@ -4,6 +4,7 @@ import { checkedProgram, floats, linking, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
+import { axesOf } from "./stage.js";
 
 const ROW_TEXELS = 14; // as the shader has it
 const LIST_WIDTH = 1024;
@@ -44,6 +45,7 @@ function tableOf(view, rows, joins, balls, elements) {
       : [...(kind === "turn" ? [1, n[0], n[1], 0] : [2, n[0], 0, 0]), ...new Array(12).fill(0)]));
     const paint = row.paint < 0 ? null : elements.paints[row.paint];
     const ops = (paint ? row.paintSteps : []).map(([kind, a, b = 0, c = 0]) => [COLOUR_STEPS[kind], a, b, c]);
+    const stops = row.stops ?? [];
     const [a, b, u, c, d, v] = row.place ?? [0, 0, 0, 0, 0, 0], grid = elements.grids[row.shape];
     const turn = (x) => x - Math.floor(x);
     blocks[i].set([
@@ -54,10 +56,11 @@ function tableOf(view, rows, joins, balls, elements) {
       ...box[0], ball * ball,
       ...box[1], rate,
       ...plainColour(view, row), material.medium,
-      paint ? paint.kind : 0, ops.length ? more(ops) : 0, ops.length, places.get(joins[i].around),
-      // to shares of the picture's sides, from its upper left corner
-      a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0,
-      -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      paint ? paint.kind : 0, more([...stops, ...ops]), ops.length, places.get(joins[i].around),
+      // to (u, v), or to shares of the picture's sides, from its upper left corner
+      ...(row.stops ? [a, b, u, 0, c, d, v, stops.length] : [
+        a / 2, b / 2, turn((u + 1) / 2), paint ? paint.first : 0, -c / 2, -d / 2, turn((1 - v) / 2), 0,
+      ]),
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
       ...(row.skin ?? [0, 0, 0, 0]),
     ]);
@@ -124,6 +127,17 @@ function dropScreens(gl, { framebuffer, textures }) {
   for (const texture of textures) gl.deleteTexture(texture);
 }
 
+/** Sets a uniform to a number, a boolean, three numbers or a struct, whose `on` says whether there is one. */
+function setUniforms(gl, at, name, value) {
+  if (typeof value === "number") gl.uniform1f(at(name), value);
+  else if (typeof value === "boolean") gl.uniform1i(at(name), Number(value));
+  else if (Array.isArray(value)) gl.uniform3fv(at(name), value);
+  else {
+    const parts = Object.entries({ ...value, on: value !== null });
+    for (const [key, part] of parts) setUniforms(gl, at, `${name}.${key}`, part);
+  }
+}
+
 /** Draws a view of solids; docs/architecture.md has what drawers do. */
 export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
@@ -163,25 +177,26 @@ export function solidDrawer(gl, view) {
   const prepare = (program, width, height) => {
     if (ready.program === program && ready.width === width && ready.height === height) return;
     const { rows, stage } = program, joins = joinsOf(rows), balls = solidBalls(rows, joins, network, boxOf);
-    const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.fov / 2);
+    const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.camera.fov_rad / 2);
     const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE));
     const scale = near / pixel / TILE_SIDE;
-    const seen = cellsOf(stage.eye, stage.axes, [scale, scale],
+    const axes = axesOf(stage.camera.eye, stage.camera.target);
+    const seen = cellsOf(stage.camera.eye, axes, [scale, scale],
       [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
-    const { data, longest } = listsOf(joins, balls, [seen, ...cubeOf(stage.light, CUBE_SIDE)]);
+    const { data, longest } = listsOf(joins, balls, [seen, ...cubeOf(stage.light.position, CUBE_SIDE)]);
     wholes(gl, data, lists);
     floats(gl, tableOf(view, rows, joins, balls, elements), 1024, table);
     for (const name of featuresOf(view, rows, joins, balls)) features.add(name);
     depth = Math.max(depth, groupsOf(joins).depth);
     while (slots < Math.min(MOST_SLOTS, longest)) slots *= 2;
     ready = {
-      program, width, height, pixel, near, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],
+      program, width, height, pixel, near, axes, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],
     };
   };
 
   /** Begin to draw by a shader. */
   const use = (names, textures = {}) => {
-    const { stage } = ready.program, at = begin(shaderOf(names));
+    const { axes } = ready, at = begin(shaderOf(names));
     Object.entries({ table, lists, ...elements.textures, ...textures }).forEach(([name, texture], unit) => {
       const space = name === "grids" || name === "colours";
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -189,16 +204,13 @@ export function solidDrawer(gl, view) {
       gl.uniform1i(at(name), unit);
     });
     gl.uniform1i(at("zero"), 0);
+    gl.uniform1i(at("along"), Math.sqrt(ready.program.samples));
     const vectors = {
-      eye: stage.eye, forward: stage.axes[0].map((v) => v * ready.near),
-      right: stage.axes[1], up: stage.axes[2],
-      lamp: stage.light, power: stage.lightRgb.map((v) => v * stage.power),
-      horizon: stage.horizon, zenith: stage.zenith, canvas: [ready.width, ready.height, ready.pixel],
+      forward: axes[0].map((v) => v * ready.near), right: axes[1], up: axes[2],
+      canvas: [ready.width, ready.height, ready.pixel],
     };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
-    gl.uniform4fv(at("ground"), stage.ground ? [...stage.ground.rgb, stage.ground.y] : [0, 0, 0, 0]);
-    gl.uniform1i(at("grounded"), Number(stage.ground !== null));
-    gl.uniform1i(at("transparent"), Number(stage.transparent));
+    setUniforms(gl, at, "stage", ready.program.stage);
     gl.uniform4iv(at("grid"), ready.cells);
     gl.uniform4fv(at("cells"), network.cells);
   };
@@ -218,7 +230,7 @@ export function solidDrawer(gl, view) {
     }
   }
 
-  /** One sample of each pixel, then four where these differ. */
+  /** One sample of each pixel, then all where these differ. */
   function* render(into, format, names) {
     const { width, height } = ready;
     if (!first || first.width !== width || first.height !== height || first.format !== format) {

@@ -3,54 +3,44 @@
 import { bare, numbersOf, radians, refuse } from "./values.js";
 import { linearColour } from "./looks.js";
 
-const MOST_OF_STAGE = 1e12; // of a stage's numbers
-const USUAL_SKY = { horizon: [0.8, 0.86, 0.92], zenith: [0.3, 0.5, 0.85] };
-const USUAL_GROUND = [0.5, 0.48, 0.45]; // linear
+const MOST_OF_STAGE = 1e12; // narrower views are none
+
+/** Readers of arguments, by their kinds. */
+const KINDS_OF_STAGE = {
+  number: bare, angle: radians, point: (value) => numbersOf(value, 3),
+  opaque: (value) => linearColour(shares(value)),
+};
 
 /**
  * What `evaluateForm` says besides rows.
- * @param settings - values of the arguments of `background`, `camera`, `light` and `ground`, where given
+ * @param settings - values of the arguments of `background` and of words of the stage, where given
+ * @param form - its `stage` has the usual one, and of each word's arguments the field, kind and range
  */
-export function stageFrom({ background, camera = [], light = [], ground = [] }, dimension) {
+export function stageFrom({ background, ...given }, { dimension, stage: known }) {
   const sky = background === undefined ? undefined : background[0] === null ? null : shares(background[0]);
   const behind = sky === undefined ? [1, 1, 1] : sky;
   if (dimension === 2) return { stage: null, background: behind };
-  const [eye, target, fov] = camera;
-  const at = pointFrom(eye, [0, 1.2, 6]);
-  const to = pointFrom(target, [0, 0, 0]);
-  const view = fov === undefined ? 2 * Math.atan(1 / 3) : radians(fov);
-  if (at.every((number, axis) => number === to[axis])) refuse("the eye is the target");
+  const stage = { ...known.usual, transparent: sky === null };
+  for (const [word, values] of Object.entries(given)) stage[word] = partFrom(word, values, known);
+  if (sky) stage.horizon = stage.zenith = linearColour(sky);
+  const { eye, target, fov_rad: view } = stage.camera;
+  if (eye.every((number, axis) => number === target[axis])) refuse("the eye is the target");
   if (!(view > 1 / MOST_OF_STAGE && view < Math.PI)) refuse("a field of view not between 0° and 180°");
-  const [position, power, rgb] = light;
-  const strength = power === undefined ? 28 : bounded(bare(power));
-  if (strength < 0) refuse(`a power of ${strength} is negative`);
-  const stage = {
-    eye: at,
-    axes: axesOf(at, to),
-    target: to,
-    fov: view,
-    light: pointFrom(position, [2.5, 4, 3]),
-    power: strength,
-    lightRgb: rgb === undefined ? [1, 1, 1] : linearColour(shares(rgb)),
-    ground: groundFrom(ground),
-    ...(sky ? { horizon: linearColour(sky), zenith: linearColour(sky) } : USUAL_SKY),
-    transparent: sky === null,
-  };
   return { stage, background: behind };
 }
 
-function groundFrom([y, rgb]) {
-  if (y === null) return rgb === undefined ? null : refuse("`ground(none)` has no colour");
-  const height = y === undefined ? -1 : bounded(bare(y));
-  return { y: height, rgb: rgb === undefined ? USUAL_GROUND : linearColour(shares(rgb)) };
-}
-
-function bounded(number) {
-  return Math.abs(number) <= MOST_OF_STAGE ? number : refuse("a number of the stage is too large");
-}
-
-function pointFrom(value, otherwise) {
-  return value === undefined ? otherwise : numbersOf(value, 3).map(bounded);
+function partFrom(word, [...values], { usual, fields }) {
+  if (word === "ground" && values[0] === null) {
+    return values[1] === undefined ? null : refuse("`ground(none)` has no colour");
+  }
+  const part = { ...usual[word] };
+  fields[word].forEach(([name, kind, low, high], at) => {
+    if (values[at] === undefined) return;
+    part[name] = KINDS_OF_STAGE[kind](values[at]);
+    const numbers = [part[name]].flat();
+    if (!numbers.every((number) => number >= low && number <= high)) refuse(`\`${name}\` is out of range`);
+  });
+  return part;
 }
 
 function shares(value) {

@@ -148,8 +148,8 @@ export class Viewer {
 
   /** {eye, target, fov}: the user's camera or the scene's; null in the plane. */
   get camera() {
-    const stage = this.#camera ?? this.program.stage;
-    return stage ? { eye: [...stage.eye], target: [...stage.target], fov: stage.fov } : null;
+    const { eye, target, fov_rad: fov } = this.program.stage?.camera ?? {};
+    return eye ? { eye: [...eye], target: [...target], fov } : null;
   }
 
   /** Null gives the scene its own again. */

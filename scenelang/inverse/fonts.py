@@ -1,0 +1,330 @@
+"""Fonts of strangers as outlines and tables, read by HarfBuzz in the sandbox.
+
+Contours may overlap or run either way round. What is kept are the parts of curves that have the inside on one
+side alone, turned so that it lies on their left: the outline of their union, by the rule of nonzero winding.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+from unicodedata import category
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.element import GRAIN, MOST_CURVES
+from scenelang.assets.font import MOST_CLASSES, MOST_LETTERS, TENSORS, UNIT, Font
+from scenelang.assets.tensors import TensorError
+from scenelang.drawing.exact.mesh import FitError, needed
+from scenelang.drawing.exact.outline import winding
+from scenelang.drawing.neural.outlines import MEET
+from scenelang.language.diagnostics import plural
+
+MOST_OF_FONT: Final = dict.fromkeys((".ttf", ".otf", ".ttc"), 32 << 20)  # bytes of a file
+_CUBIC: Final = 2e-5  # em: how far quadratic curves may be off a cubic one
+_MOST_CURVES: Final = 1_000_000  # of all letters
+_KERNED: Final = 3000  # letters whose pairs are asked
+_ALPHABETS: Final = 0x2E80  # where those end that fonts kern
+_SAMPLES: Final = 8, 64  # edges of a curve, to see where it runs, and to see where that changes
+_BESIDE: Final = 1e-4  # of a radius: from a curve to where its sides are asked
+_ASKED: Final = 400  # points at which a finished letter is compared with its contours
+_LEAST: Final = 1e-6  # em: the least radius of what shows
+Curves = npt.NDArray[np.float64]  # (n, 3, 2) start, control point, end
+
+
+class Read(NamedTuple):
+    """A font that was read."""
+
+    font: Font
+    notes: tuple[str, ...]
+
+
+def read_font(
+    data: bytes,
+    about: dict[str, str | float],
+    letters: str | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Read:
+    """Read the letters of a font that lie in ranges, by default all; raises `FitError`.
+
+    ``say`` is called when the file is known to be a font, before its letters are read.
+    """
+    with needed("uharfbuzz"):
+        import uharfbuzz
+    if data[:4] in (b"wOF2", b"wOFF"):
+        raise FitError("a packed font for the web: unpack it to .ttf or .otf first")
+    face = uharfbuzz.Face(uharfbuzz.Blob(data))
+    if not face.glyph_count or not 16 <= face.upem <= 1 << 14:
+        raise FitError("damaged or not a TrueType or OpenType font")
+    font = uharfbuzz.Font(face)
+    held = {int(code): font.get_nominal_glyph(code) for code in face.unicodes}
+    held = {code: glyph for code, glyph in held.items() if glyph and _is_letter(code)}
+    if letters is not None:
+        ranges = ranges_of(letters)
+        held = {code: glyph for code, glyph in held.items() if any(code in some for some in ranges)}
+    if not 0 < len(held) <= MOST_LETTERS:
+        raise FitError(f"{len(held):,} letters, where 1 to {MOST_LETTERS:,} are allowed")
+    say(plural(len(held), "letter"))
+    pen = _Pen(uharfbuzz)
+    codes, numbers, ends, left_out = list[int](), list[float](), list[int](), list[str]()
+    parts, count = list[bytes](), 0
+    for code, glyph in sorted(held.items()):
+        advance = font.get_glyph_h_advance(glyph) / face.upem
+        curves = pen.curves(font, glyph) / face.upem
+        disc, outline = _outline(curves)
+        if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _sound(outline, curves, disc):
+            left_out.append(f"U+{code:04X}")
+            continue
+        count += len(outline)
+        if count > _MOST_CURVES:
+            raise FitError(f"letters of more than {_MOST_CURVES:,} curves")
+        parts.append(outline.tobytes())
+        codes.append(code)
+        numbers += (advance, *disc)
+        ends.append(count)
+    glyphs = [held[code] for code in codes]
+    classes, kerning, columns = _kerning(uharfbuzz, font, codes, glyphs, face.upem)
+    values: list[Any] = [codes, numbers, ends, classes, kerning, b"".join(parts)]
+    tables = {
+        name: array(kind, value) for (name, (_, kind)), value in zip(TENSORS.items(), values, strict=True)
+    }
+    try:
+        result = Font(tables, columns, about)
+    except TensorError as error:
+        raise FitError(str(error)) from None
+    notes = [plural(len(codes), "letter"), plural(count, "curve"), f"{len(kerning):,} pairs of classes"]
+    notes += [f"left out, as they are damaged: {', '.join(left_out[:20])}"] if left_out else []
+    return Read(result, tuple(notes))
+
+
+def ranges_of(text: str) -> list[range]:
+    """Code points of ranges as style sheets have them: ``U+20-7E, U+2190-2193``; raises `ValueError`."""
+    result = []
+    for part in text.replace(" ", "").split(","):
+        match = re.fullmatch(r"[Uu]\+([0-9A-Fa-f]{1,6})(?:-([0-9A-Fa-f]{1,6}))?", part)
+        if match is None:
+            raise ValueError(f"`{part[:40]}` is not a range of letters such as U+20-7E")
+        result.append(range(int(match[1], 16), int(match[2] or match[1], 16) + 1))
+    return result
+
+
+def _is_letter(code: int) -> bool:
+    return code >= 0x20 and not 0x7F <= code < 0xA0 and not 0xD800 <= code < 0xE000 and code < 0x110000
+
+
+class _Pen:
+    """Curves of glyphs, in font units; cubic ones as quadratic ones that are near enough."""
+
+    def __init__(self, uharfbuzz: Any) -> None:
+        self._found: list[Any] = []
+        self._begin = self._at = (0.0, 0.0)
+        self._near = 0.0
+        self._funcs = uharfbuzz.DrawFuncs()
+        self._funcs.set_move_to_func(lambda x, y, _: self._move((x, y)))
+        self._funcs.set_line_to_func(lambda x, y, _: self._line((x, y)))
+        self._funcs.set_quadratic_to_func(lambda a, b, x, y, _: self._quadratic((a, b), (x, y)))
+        self._funcs.set_cubic_to_func(lambda a, b, c, d, x, y, _: self._cubic((a, b), (c, d), (x, y)))
+        self._funcs.set_close_path_func(lambda _: self._line(self._begin))
+
+    def curves(self, font: Any, glyph: int) -> Curves:
+        """Closed contours of a glyph."""
+        self._found = []
+        self._begin = self._at = (0.0, 0.0)
+        self._near = _CUBIC * font.face.upem
+        font.draw_glyph(glyph, self._funcs, None)
+        self._line(self._begin)
+        return np.array(self._found, float).reshape(-1, 3, 2)
+
+    def _move(self, to: tuple[float, float]) -> None:
+        self._line(self._begin)
+        self._begin = self._at = to
+
+    def _line(self, to: tuple[float, float]) -> None:
+        if to != self._at:
+            self._quadratic(((self._at[0] + to[0]) / 2, (self._at[1] + to[1]) / 2), to)
+
+    def _quadratic(self, by: tuple[float, float], to: tuple[float, float]) -> None:
+        self._found.append((self._at, by, to))
+        self._at = to
+        if len(self._found) > 4 * MOST_CURVES:
+            raise FitError(f"a letter of more than {4 * MOST_CURVES:,} curves")
+
+    def _cubic(self, b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]) -> None:
+        p = np.array([self._at, b, c, d], float)
+        off = np.hypot(*(p[3] - 3 * p[2] + 3 * p[1] - p[0])) * 3**0.5 / 36
+        n = int(np.clip(np.ceil((off / self._near) ** (1 / 3)), 1, 32))
+        w = p[0], 3 * (p[1] - p[0]), 3 * (p[2] - 2 * p[1] + p[0]), p[3] - 3 * p[2] + 3 * p[1] - p[0]
+        for k in range(n):
+            s, e = k / n, (k + 1) / n
+            start, end = (w[0] + t * (w[1] + t * (w[2] + t * w[3])) for t in (s, e))
+            go, come = (w[1] + t * (2 * w[2] + 3 * t * w[3]) for t in (s, e))
+            by = (start + end) / 2 + (go - come) * (e - s) / 4
+            self._quadratic(tuple(by.tolist()), d if k == n - 1 else tuple(end.tolist()))
+
+
+def _edges(curves: Curves, count: int) -> Curves:
+    """Edges (n, count, 2, 2) along curves."""
+    t = np.linspace(0, 1, count + 1)[:, None]
+    a, b, c = (curves[:, k, None] for k in range(3))
+    points = (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t**2 * c
+    return np.stack([points[:, :-1], points[:, 1:]], 2)
+
+
+def _part(curve: Curves, s: float, e: float) -> Curves:
+    """A curve (3, 2) from a parameter to another."""
+    a, u, w = curve[0], 2 * (curve[1] - curve[0]), curve[0] - 2 * curve[1] + curve[2]
+    return np.stack([a + s * (u + s * w), a + u * (s + e) / 2 + w * s * e, a + e * (u + e * w)])
+
+
+def _outline(curves: Curves) -> tuple[tuple[float, float, float], npt.NDArray[np.int16]]:
+    """The disc of contours, and the outline of what they cover in it (n, 3, 2), in steps of `GRAIN`."""
+    nothing = (0.0, 0.0, 0.0), np.zeros((0, 3, 2), np.int16)
+    if not len(curves) or not abs(curves).max() < 50:
+        return nothing
+    kept = _boundary(curves)
+    if not len(kept):
+        return nothing
+    points = _edges(kept, _SAMPLES[1]).reshape(-1, 2)
+    middle = (points.min(0) + points.max(0)) / 2
+    radius = float(np.hypot(*(points - middle).T).max())
+    if radius < _LEAST:
+        return nothing
+    steps = np.rint((kept - middle) / radius * (GRAIN - 1)).clip(-GRAIN, GRAIN).astype("<i2")
+    steps = steps[(steps != steps[:, :1]).any((1, 2))]
+    return (float(middle[0]), float(middle[1]), radius * GRAIN / (GRAIN - 1)), steps
+
+
+def _boundary(curves: Curves) -> Curves:
+    """Parts of closed contours that have the inside on one side alone, turned to have it on their left."""
+    size = abs(curves - curves.mean((0, 1))).max()
+    few, many = (_edges(curves, n) for n in _SAMPLES)
+    side = _sides(few, winding(few.reshape(-1, 2, 2), odd=False), size)
+    if (side == 1).all() or (side == -1).all():
+        return curves if side[0, 0] == 1 else curves[::-1, ::-1]
+    fine = winding(many.reshape(-1, 2, 2), odd=False)
+    side = _sides(many, fine, size)
+    parts, crossings = list[list[Any]](), list[tuple[list[Any], int]]()
+    for curve, own in zip(curves, side, strict=True):
+        turns = (np.flatnonzero(own[1:] != own[:-1]) + 1).tolist()
+        cuts = [0.0, *(_change(curve, at, own, fine, size) for at in turns), 1.0]
+        for s, e, kind in zip(cuts, cuts[1:], own[[0, *turns]].tolist(), strict=False):
+            if kind:
+                parts.append([curve, s, e, kind])
+                crossings += [(parts[-1], at) for at, t in ((1, s), (2, e)) if 0 < t < 1]
+    _cross(crossings, size)
+    pieces = np.array([_part(curve, s, e)[::kind] for curve, s, e, kind in parts if e > s]).reshape(-1, 3, 2)
+    if not len(pieces):
+        return pieces
+    starts, ends = pieces[:, 0], pieces[:, 2]
+    loose = [_gaps(a, b) > 1e-6 * size for a, b in ((starts, ends), (ends, starts))]
+    bridges = []
+    for end in ends[loose[1]] if loose[0].any() else ():  # what is left of contours that touch
+        start = min(starts[loose[0]], key=lambda at, end=end: float(np.hypot(*(at - end))))
+        bridges.append((end, (end + start) / 2, start))
+    return np.concatenate([pieces, np.array(bridges).reshape(-1, 3, 2)])
+
+
+def _gaps(points: Curves, others: Curves) -> Curves:
+    """Distances (n,) of points from the nearest of others."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(others).query(points)[0])
+
+
+def _cross(crossings: list[tuple[list[Any], int]], size: float) -> None:
+    """Move ends of parts, each (curve, from, to, …), to where their curves cross, by Newton's method."""
+    points = np.array([_part(part[0], part[at], part[at])[0] for part, at in crossings]).reshape(-1, 2)
+    for (part, at), point in zip(crossings, points, strict=True):
+        others = np.array([other[0] is not part[0] for other, _ in crossings])
+        gaps = np.where(others, np.hypot(*(points - point).T), np.inf)
+        if not gaps.min(initial=np.inf) < 0.05 * size:
+            continue
+        other, its = crossings[int(gaps.argmin())]
+        t = np.array([part[at], other[its]])
+        for _ in range(6):
+            (p, u), (q, v) = (_moving(curve, x) for curve, x in zip((part[0], other[0]), t, strict=True))
+            t = t - np.linalg.lstsq(np.stack([u, -v], 1), p - q, rcond=None)[0]
+        if abs(t[0] - part[at]) < 0.1 and 0 <= t[0] <= 1:
+            part[at] = float(t[0])
+
+
+def _moving(curve: Curves, t: float) -> tuple[Curves, Curves]:
+    """Point and derivative of a curve (3, 2)."""
+    u, w = 2 * (curve[1] - curve[0]), curve[0] - 2 * curve[1] + curve[2]
+    return curve[0] + t * (u + t * w), u + 2 * t * w
+
+
+def _sides(edges: Curves, inside: Any, size: float) -> npt.NDArray[np.int8]:
+    """1 for edges (…, 2, 2) with the inside on the left alone, -1 on the right alone, else 0."""
+    flat = edges.reshape(-1, 2, 2)
+    way, middle = flat[:, 1] - flat[:, 0], flat.mean(1)
+    beside = np.stack([-way[:, 1], way[:, 0]], 1) / np.maximum(np.hypot(*way.T), 1e-12)[:, None]
+    beside *= _BESIDE * size
+    left, right = inside(middle + beside).astype(np.int8), inside(middle - beside).astype(np.int8)
+    return np.asarray((left - right).reshape(edges.shape[:-2]))
+
+
+def _change(curve: Curves, at: int, own: Any, inside: Any, size: float) -> float:
+    """The parameter between two edges of a curve where what lies beside it changes."""
+    count = len(own)
+    low, high, first = (at - 0.5) / count, (at + 0.5) / count, own[at - 1]
+    for _ in range(14):
+        half = (low + high) / 2
+        edge = _part(curve, half - 1e-4, half + 1e-4)[None, ::2]
+        same = _sides(edge, inside, size)[0] == first
+        low, high = (half, high) if same else (low, half)
+    return (low + high) / 2
+
+
+def _sound(outline: npt.NDArray[np.int16], curves: Curves, disc: tuple[float, float, float]) -> bool:
+    """True where an outline is closed and covers what its contours do at almost all of some points."""
+    if not len(outline):
+        return True
+    starts, ends = outline[:, 0].astype(float), outline[:, 2].astype(float)
+    gaps = _gaps(ends, starts)
+    p = np.random.default_rng(1).uniform(-1, 1, (_ASKED, 2))
+    before = winding(_edges(curves, _SAMPLES[1]).reshape(-1, 2, 2), odd=False)(
+        p * disc[2] + np.array(disc[:2])
+    )
+    after = winding(_edges(outline / GRAIN, _SAMPLES[1]).reshape(-1, 2, 2), odd=False)(p)
+    return bool(gaps.max() <= MEET * GRAIN and (before != after).sum() <= _ASKED // 100)
+
+
+def _kerning(
+    uharfbuzz: Any, font: Any, codes: list[int], glyphs: list[int], upem: int
+) -> tuple[list[int], list[int], int]:
+    """Classes of letters on the left and on the right of pairs, the table of these, and its columns."""
+    asked = [at for at, code in enumerate(codes) if code < _ALPHABETS and category(chr(code))[0] != "M"]
+    del asked[_KERNED:]
+    advances = np.array([font.get_glyph_h_advance(glyphs[at]) for at in asked], np.int64)
+    wanted = [glyphs[at] for at in asked]
+    rows: dict[bytes, int] = {np.zeros(len(asked), np.int16).tobytes(): 0}
+    classes = np.zeros((2, len(codes)), np.int64)
+    plain = dict.fromkeys(("liga", "clig", "calt", "rlig", "dlig"), False) | {"kern": True}
+    for at, advance in zip(asked, advances.tolist(), strict=True):
+        buffer = uharfbuzz.Buffer()  # the letter before each of all others
+        buffer.add_codepoints([code for other in asked for code in (codes[at], codes[other])])
+        buffer.guess_segment_properties()
+        buffer.direction = "ltr"
+        uharfbuzz.shape(font, buffer, plain)
+        own = np.zeros(len(asked), np.int64)
+        infos = [(info.cluster, info.codepoint) for info in buffer.glyph_infos]
+        for (first, left), (second, right), place in zip(
+            infos, infos[1:], buffer.glyph_positions, strict=False
+        ):
+            k, odd = divmod(first, 2)
+            if not odd and second == first + 1 and (left, right) == (glyphs[at], wanted[k]):
+                own[k] = place.x_advance - advance  # others join, or become other glyphs
+        row = np.rint(own * (UNIT / upem)).clip(-32767, 32767).astype(np.int16)
+        if (len(rows) + 1) * len(asked) > MOST_CLASSES:
+            break
+        classes[0, at] = rows.setdefault(row.tobytes(), len(rows))
+    table = np.array([np.frombuffer(row, np.int16) for row in rows])
+    columns: dict[bytes, int] = {np.zeros(len(table), np.int16).tobytes(): 0}
+    for at, column in zip(asked, table.T, strict=True):
+        classes[1, at] = columns.setdefault(np.ascontiguousarray(column).tobytes(), len(columns))
+    table = np.array([np.frombuffer(column, np.int16) for column in columns]).T
+    return classes.reshape(-1).tolist(), table.reshape(-1).tolist(), len(columns)

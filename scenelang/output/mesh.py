@@ -1,0 +1,438 @@
+"""Solids as closed triangle meshes: the learned field's surface, with its edges and its colours.
+
+Cells of an octree that the surface may touch are cut to the resolution. In each, every sheet of the surface
+gets one vertex, where the planes at the crossings with the cell's edges meet best; an edge that the surface
+crosses joins those of the four cells around it. Sheets are told apart alike from both sides of a face.
+
+Sources: T. Ju, F. Losasso, S. Schaefer, J. Warren, Dual contouring of Hermite data, SIGGRAPH 2002;
+S. Schaefer, T. Ju, J. Warren, Manifold dual contouring, TVCG 13(3), 2007.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.assets.files import write_output
+from scenelang.compiler.program import Program
+from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.image import decoded, encoded
+from scenelang.drawing.solid.field import Meeting, SolidField
+from scenelang.drawing.solid.network import EMPTY, Wanted
+
+Floats = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+MOST_CELLS: Final = 1 << 22
+POINTS: Final = 1 << 15  # that the field is asked for at once
+COARSE: Final = 8  # cells along the longest side to begin with, about
+STEEP: Final = 1.1  # how much faster than exact ones learned distances change at most
+HALVINGS, STEPS = 14, 3  # that find a crossing, where a medium may begin and elsewhere
+TINY: Final = 1e-9  # world units: of nodes that are taken out of the solid
+FLAT: Final = 0.05  # of the largest: a smaller spread of normals says nothing of where their planes meet
+SKEW: Final = 1e-3  # of a cell: how far off a plane the corners of a quad may be that is cut either way
+PROBES: Final = 20_000  # cells that are searched for what is thinner than they
+
+_BITS: Final = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])  # of a cell's corners, x first
+_ENDS: Final = np.array([(i, i | 1 << a) for a in range(3) for i in range(8) if not i >> a & 1])
+"""Corners at the ends of the edges: four along x, then along y and z."""
+
+
+class TriangleMesh(NamedTuple):
+    """A closed surface.
+
+    Args:
+        vertices: float64 (V, 3), world units.
+        triangles: int64 (T, 3), counter-clockwise from outside.
+        colours: float64 (V, 3), sRGB in [0, 1], of the surface before light.
+    """
+
+    vertices: Floats
+    triangles: Index
+    colours: Floats
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file, whole or not at all: .stl (without colours), .ply, .obj or .glb.
+
+        Raises `ValueError` for another suffix, OSError where it cannot be written.
+        """
+        write = WRITERS.get(Path(path).suffix.lower())
+        if write is None:
+            raise ValueError(f"not one of {', '.join(WRITERS)}")
+        write_output(path, write(self))
+
+
+class Sampler:
+    """The field of a Program of solids, asked at points."""
+
+    def __init__(self, program: Program, exact: bool = False) -> None:
+        from scenelang.drawing.closed import field_of
+
+        network, elements = field_of(program, exact), program.brought()
+        self.field = SolidField(network, program.vectors, program.tokens, elements, program.paints())  # type: ignore[arg-type]
+        self.solids, self.field.far = self.field.solids, True
+        drawn = [solid for solid in self.solids if solid.draws]
+        self._stretch = [float(np.linalg.norm(solid.frame.outer.linear, 2)) for solid in self.solids]
+        rates = [s.rate * stretch for s, stretch in zip(self.solids, self._stretch, strict=True)]
+        self.steep = STEEP * max([1.0, *rates])
+        ends = [np.asarray(s.centre, np.float64) + side * s.extent for s in drawn for side in (-1, 1)]
+        self.low, self.high = (np.array(ends or [[0.0] * 3]).min(0), np.array(ends or [[0.0] * 3]).max(0))
+        self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
+
+    def widen(self, by: float) -> None:
+        """Let objects take part up to some way outside of their balls, world units."""
+        self.field.solids = [
+            replace(solid, ball=solid.ball + by * stretch, extent=solid.extent + by)
+            for solid, stretch in zip(self.solids, self._stretch, strict=True)
+        ]
+
+    def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
+        """As `SolidField.meet`, at points (M, 3) but for those that meet nothing: these are far outside."""
+        each = range(0, max(len(p), 1), POINTS)
+        parts = [self._meet(p[i : i + POINTS], wanted, gradient, owners)[:5] for i in each]
+        joined = [None if x[0] is None else np.concatenate(x, -1) for x in zip(*parts, strict=True)]
+        return Meeting(*joined)
+
+    def _meet(self, p: Floats, wanted: Wanted, gradient: bool, owners: bool) -> Meeting:
+        field, points = self.field, np.reshape(p, (-1, 3)).T.astype(np.float32)
+        way = points - self._origin[:, None]
+        t = np.sqrt((way * way).sum(0)).clip(1e-9)
+        with field.xp.inference():
+            some, passes = field.passes(self._origin, way / t, t, tight=False)
+            met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
+        count = len(p)
+        distance, register = np.full(count, EMPTY), np.zeros((len(met.register), count))
+        distance[some], register[:, some] = met.distance, met.register
+        slope = np.zeros((3, count)) if gradient else None
+        owner = np.zeros(count) if owners else None
+        if slope is not None:
+            slope[:, some] = met.gradient
+        if owner is not None:
+            owner[some] = met.owner
+        return Meeting(distance, register, slope, None, owner)
+
+    def at(self, p: Floats) -> Floats:
+        """Distances (M,) at points (M, 3), negative in what is opaque alone."""
+        if not len(p):
+            return np.zeros(0)
+        met = self.meet(p, Wanted.KIND if self.field.media else Wanted.DISTANCE)
+        if not self.field.media:
+            return met.distance
+        return np.where((met.distance < 0) & (met.register[-1] > 0.5), TINY - met.distance, met.distance)
+
+
+class Sheets(NamedTuple):
+    """Sheets of the surface in a cell, by its corners that are inside, as bits."""
+
+    crossed: npt.NDArray[np.bool_]  # (256, 12) edges that it crosses
+    sheet: Index  # (256, 12) of each
+    count: Index  # (256,)
+    pinched: npt.NDArray[np.bool_]  # (256, 6) faces that one sheet crosses twice: low x, high x, low y, …
+
+
+@cache
+def sheets() -> Sheets:
+    """The table; on a face that is crossed four times corners that are inside are apart."""
+    edge = {frozenset(ends): number for number, ends in enumerate(_ENDS.tolist())}
+    faces = []
+    for axis in range(3):
+        u, v = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
+        faces += [[base, base | u, base | u | v, base | v] for base in (0, 1 << axis)]
+    none = np.zeros((256, 12), bool)
+    table = Sheets(none, np.zeros((256, 12), int), np.zeros(256, int), np.zeros((256, 6), bool))
+    for case in range(256):
+        owner, twice = list(range(12)), []
+        for face in faces:
+            inside = [case >> corner & 1 for corner in face]
+            sides = [edge[frozenset((face[i], face[(i + 1) % 4]))] for i in range(4)]
+            crossed = [sides[i] for i in range(4) if inside[i] != inside[(i + 1) % 4]]
+            if len(crossed) == 4:  # the sides before and behind each corner that is inside
+                first = inside.index(1)
+                crossed = [sides[first - 1], sides[first], sides[first + 1], sides[(first + 2) % 4]]
+            twice.append(crossed)
+            for a, b in zip(crossed[::2], crossed[1::2], strict=True):
+                old, new = owner[a], owner[b]
+                owner = [new if one == old else one for one in owner]
+        cut = [e for e, (a, b) in enumerate(_ENDS.tolist()) if (case >> a ^ case >> b) & 1]
+        table.crossed[case, cut] = True
+        number = {one: at for at, one in enumerate(dict.fromkeys(owner[e] for e in cut))}
+        table.sheet[case, cut], table.count[case] = [number[owner[e]] for e in cut], len(number)
+        table.pinched[case] = [len(face) == 4 and owner[face[0]] == owner[face[2]] for face in twice]
+    return table
+
+
+def _others(numbers: Index, known: Index) -> Index:
+    """The different numbers that are not among known ones, both in order; four times as fast as numpy's."""
+    numbers = np.sort(numbers)
+    fresh = np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]
+    if len(known):
+        fresh &= known[np.searchsorted(known, numbers).clip(0, len(known) - 1)] != numbers
+    return numbers[fresh]
+
+
+class Grid:
+    """Cells of one size, by numbers, with the field's values at their corners."""
+
+    def __init__(self, sampler: Sampler, resolution: int) -> None:
+        self.sampler = sampler
+        levels = max(0, int(np.log2(resolution / COARSE)))
+        self.side = float((sampler.high - sampler.low).max()) / resolution
+        self.first = sampler.low - 1.37 * self.side  # so that no plane of symmetry is one of the grid
+        counts = np.ceil((sampler.high - self.first) / self.side / 2**levels).astype(np.intp) + 1
+        self.shape = (counts << levels) + 1  # of nodes
+        cells = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
+        for level in range(levels, 0, -1):
+            reach = 3**0.5 / 2 * self.side * 2**level
+            sampler.widen(reach)
+            middle = self.first + (cells + 0.5) * (self.side * 2**level)
+            cells = cells[abs(sampler.at(middle)) <= sampler.steep * reach]
+            cells = (2 * cells[:, None] + _BITS).reshape(-1, 3)
+            if len(cells) > MOST_CELLS:
+                raise RenderError(f"more than {MOST_CELLS:,} cells at a resolution of {resolution}")
+        sampler.widen(2 * self.side)
+        self.bits, self.cells = self.number(_BITS), self.number(cells)
+        self.nodes, self.values = np.zeros(0, np.intp), np.zeros(0)
+        while True:  # the field may be steeper than it should be
+            fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
+            nodes = np.concatenate([self.nodes, fresh])
+            order = np.argsort(nodes)
+            self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
+            self.nodes = nodes[order]
+            left = _others(self._around(), np.sort(self.cells))
+            if not len(left):
+                break
+            self.cells = np.concatenate([self.cells, left])
+        self._unpinch()
+
+    def number(self, place: Index) -> Index:
+        """Numbers of nodes, or of cells by their first nodes, at places (…, 3)."""
+        return np.asarray((place[..., 2] * self.shape[1] + place[..., 1]) * self.shape[0] + place[..., 0])
+
+    def points(self, number: Index) -> Floats:
+        """Points (…, 3) of nodes."""
+        rest, x = np.divmod(number, self.shape[0])
+        z, y = np.divmod(rest, self.shape[1])
+        return np.asarray(self.first + np.stack([x, y, z], -1) * self.side)
+
+    def cases(self) -> Index:
+        """Corners of the cells that are inside, as bits (K,)."""
+        inside = self.values[np.searchsorted(self.nodes, self.cells[:, None] + self.bits)] < 0
+        return np.asarray(inside @ (1 << np.arange(8)))
+
+    def _around(self) -> Index:
+        """Numbers of the cells around edges that the surface crosses, also more than once."""
+        cases, found = self.cases(), [self.cells[:0]]
+        for number, (a, b) in enumerate(_ENDS.tolist()):
+            some = self.cells[((cases >> a ^ cases >> b) & 1) > 0] + self.bits[a]
+            others = [i for i in range(8) if not i >> number // 4 & 1]
+            found += [some - self.bits[i] for i in others]
+        return np.concatenate(found)
+
+    def _unpinch(self) -> None:
+        """Take nodes out of the solid until no sheets of two neighbours cross the face between them twice."""
+        pinched, self.cells = sheets().pinched, np.sort(self.cells)
+        while True:
+            cases, taken = self.cases(), [self.cells[:0]]
+            for axis in range(3):
+                low = np.flatnonzero(pinched[cases, 2 * axis])
+                before = self.cells[low] - self.bits[1 << axis]
+                there = np.searchsorted(self.cells, before)
+                both = low[(self.cells[there] == before) & pinched[cases[there], 2 * axis + 1]]
+                corner = np.flatnonzero(_BITS[:, axis] == 0)
+                inside = cases[both, None] >> corner & 1
+                taken.append(self.cells[both] + self.bits[corner[inside.argmax(1)]])
+            some = np.concatenate(taken)
+            if not len(some):
+                return
+            self.values[np.searchsorted(self.nodes, some)] = TINY
+
+
+def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMesh, dict[str, str]]:
+    """The surface of what is opaque in a Program of solids, and warnings by code.
+
+    Raises `RenderError` for too many cells.
+    """
+    sampler = Sampler(program, how.backend == "exact")
+    said = {"W0551": "a mesh has no media: what is volumetric is left out"} if sampler.field.media else {}
+    empty = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.intp), np.zeros((0, 3)))
+    if not (sampler.high > sampler.low).all():
+        return empty, said
+    grid = Grid(sampler, resolution)
+    cases, table, side = grid.cases(), sheets(), grid.side
+    thin = _thin(grid, cases)
+    active = np.flatnonzero((cases > 0) & (cases < 255))
+    if not len(active):
+        return empty, said
+    cases, cells = cases[active], grid.cells[active]
+    first = np.concatenate([[0], np.cumsum(table.count[cases])])
+    at, edge = np.nonzero(table.crossed[cases])  # cells, and edges of them that are crossed
+    vertex = first[at] + table.sheet[cases[at], edge]
+    a, b = (cells[at] + grid.bits[_ENDS[edge, end]] for end in (0, 1))
+    # of each edge the four cells around it, in the order of its place in them
+    order = np.lexsort((edge, a, edge // 4))
+    turns = edge[order].reshape(-1, 4)[:, 0] // 4
+    quad = vertex[order].reshape(-1, 4)[:, [0, 1, 3, 2]]
+    a, b = (ends[order].reshape(-1, 4)[:, 0] for ends in (a, b))
+    p, n = _crossings(grid, a, b)
+    places = _places(quad, p, n, first[-1], side)
+    box = grid.points(np.repeat(cells, table.count[cases]))
+    places = np.clip(places, box, box + side)
+    rising = grid.values[np.searchsorted(grid.nodes, a)] < 0  # from inside to outside
+    back = rising == (turns == 1)
+    quad[back] = quad[back][:, ::-1]
+    triangles = _cut(sampler, quad, places, side)
+    met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), Wanted.ALL)
+    if thin:
+        said["W0552"] = f"parts thinner than a cell of {side:.2g} are missing or have holes"
+    return TriangleMesh(places, triangles, encoded(met.register[:3].T)), said
+
+
+def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
+    """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
+    sampler = grid.sampler
+    low, high = grid.points(a), grid.points(b)
+    f, g = (grid.values[np.searchsorted(grid.nodes, ends)] for ends in (a, b))
+    mixed = sampler.field.mixed  # a value jumps where a medium begins
+    for _ in range(HALVINGS if mixed else STEPS):
+        share = 0.5 if mixed else (f / (f - g))[:, None].clip(0.01, 0.99)
+        middle = low + share * (high - low)
+        value = sampler.at(middle)
+        same = (value < 0) == (f < 0)
+        f, g = np.where(same, value, f / 2), np.where(same, g / 2, value)  # of Illinois
+        low, high = np.where(same[:, None], middle, low), np.where(same[:, None], high, middle)
+    p = (low + high) / 2 if mixed else low + (f / (f - g))[:, None] * (high - low)
+    met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
+    n = np.asarray(met.gradient, np.float64).T
+    if mixed:  # what ends where a medium begins ends as the medium's own distance says
+        some = np.flatnonzero(met.distance < -0.05 * grid.side)
+        outside = np.where((f < 0)[:, None], high, low)[some]
+        owner = np.asarray(sampler.meet(outside, Wanted.KIND, owners=True).owner, np.intp) - 1
+        kept = owner >= 0
+        n[some[kept]] = -sampler.field.normals(owner[kept], outside[kept].T.astype(np.float32)).T
+    return p, n / np.linalg.norm(n, axis=1).clip(1e-12)[:, None]
+
+
+def _summed(quad: Index, values: Floats, count: int) -> Floats:
+    """Sums (V, …) at vertices of the values (E, …) of quads around them."""
+    flat = values.reshape(len(values), -1)
+    rows = [np.bincount(quad.ravel(), np.repeat(column, 4), count) for column in flat.T]
+    return np.stack(rows, 1).reshape(count, *values.shape[1:])
+
+
+def _normals(quad: Index, n: Floats, count: int) -> Floats:
+    result = _summed(quad, n, count)
+    return np.asarray(result / np.linalg.norm(result, axis=1).clip(1e-12)[:, None])
+
+
+def _places(quad: Index, p: Floats, n: Floats, count: int, side: float) -> Floats:
+    """Vertices (V, 3) where planes at points (E, 3) with normals meet best, nearest to the middle."""
+    middle = _summed(quad, p, count) / np.bincount(quad.ravel(), minlength=count)[:, None]
+    spread = _summed(quad, n[:, :, None] * n[:, None], count)
+    rest = _summed(quad, n * (n * p).sum(1)[:, None], count) - (spread @ middle[..., None])[..., 0]
+    size, axes = np.linalg.eigh(spread)
+    along = (axes.swapaxes(1, 2) @ rest[..., None])[..., 0]
+    along = np.where(size > FLAT * size[:, 2:], along / np.maximum(size, 1e-12), 0.0)
+    return np.asarray(middle + (axes @ along[..., None])[..., 0])
+
+
+def _cut(sampler: Sampler, quad: Index, places: Floats, side: float) -> Index:
+    """Triangles (2 E, 3) of quads, each cut along the diagonal that lies nearer to the surface."""
+    a, b, c, d = (places[quad[:, i]] for i in range(4))
+    skew = abs((np.cross(b - a, d - a) * (c - a)).sum(1)) > SKEW * side**3
+    one, other = (abs(sampler.at((x + y)[skew] / 2)) for x, y in ((a, c), (b, d)))
+    turned = np.flatnonzero(skew)[other < one]
+    quad[turned] = np.roll(quad[turned], 1, 1)
+    return np.concatenate([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]])
+
+
+def _thin(grid: Grid, cases: Index) -> bool:
+    """True where something lies inside cells whose corners are all outside."""
+    sampler, empty = grid.sampler, grid.cells[cases == 0]
+    some = empty[np.linspace(0, len(empty) - 1, min(PROBES, len(empty))).astype(np.intp)]
+    p = grid.points(some) + grid.side / 2
+    if not len(p):
+        return False
+    met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
+    p -= np.asarray((met.distance + 0.02 * grid.side) * met.gradient).T
+    within = (abs(p - grid.points(some) - grid.side / 2) < grid.side / 2).all(1)
+    hit = np.flatnonzero(within)[sampler.at(p[within]) < 0]
+    beside = some[hit, None] + np.concatenate([grid.bits[[1, 2, 4]], -grid.bits[[1, 2, 4]]])
+    active = grid.cells[(cases > 0) & (cases < 255)]
+    return bool((~np.isin(beside, active)).all(1).any())
+
+
+def _stl(mesh: TriangleMesh) -> bytes:
+    corner = mesh.vertices[mesh.triangles].astype("<f4")
+    rows = np.zeros(len(corner), [("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("more", "<u2")])
+    rows["corner"], normal = corner, np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    rows["normal"] = normal / np.linalg.norm(normal, axis=1).clip(1e-30)[:, None]
+    return bytes(80) + struct.pack("<I", len(rows)) + rows.tobytes()
+
+
+def _ply(mesh: TriangleMesh) -> bytes:
+    points = np.zeros(len(mesh.vertices), [("place", "<f4", 3), ("colour", "u1", 3)])
+    points["place"], points["colour"] = mesh.vertices, np.floor(255 * mesh.colours + 0.5)
+    faces = np.zeros(len(mesh.triangles), [("count", "u1"), ("corner", "<i4", 3)])
+    faces["count"], faces["corner"] = 3, mesh.triangles
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    lines += [f"property float {name}" for name in "xyz"]
+    lines += [f"property uchar {name}" for name in ("red", "green", "blue")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    return "\n".join(lines).encode() + points.tobytes() + faces.tobytes()
+
+
+def _obj(mesh: TriangleMesh) -> bytes:
+    rows = np.concatenate([mesh.vertices, mesh.colours], 1).tolist()
+    lines = ["v {:.6g} {:.6g} {:.6g} {:.4g} {:.4g} {:.4g}".format(*row) for row in rows]
+    lines += ["f {} {} {}".format(*corners) for corners in (mesh.triangles + 1).tolist()]
+    return "\n".join([*lines, ""]).encode()
+
+
+def _glb(mesh: TriangleMesh) -> bytes:
+    """Khronos Group, glTF 2.0 Specification, 2021; its colours are linear."""
+    parts = [mesh.vertices.astype("<f4"), decoded(mesh.colours).astype("<f4"), mesh.triangles.astype("<u4")]
+    starts = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
+    views = [
+        {"buffer": 0, "byteOffset": at, "byteLength": p.nbytes} for at, p in zip(starts, parts, strict=False)
+    ]
+    kinds = (5126, "VEC3"), (5126, "VEC3"), (5125, "SCALAR")
+    accessors = [
+        {
+            "bufferView": i,
+            "componentType": kind,
+            "type": form,
+            "count": part.size // (3 if form == "VEC3" else 1),
+        }
+        for i, (part, (kind, form)) in enumerate(zip(parts, kinds, strict=True))
+    ]
+    accessors[0] |= {"min": parts[0].min(0).tolist(), "max": parts[0].max(0).tolist()}
+    surface = {"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}
+    text = json.dumps(
+        {
+            "asset": {"version": "2.0", "generator": "scenelang"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [surface]}],
+            "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}}],
+            "accessors": accessors,
+            "bufferViews": views,
+            "buffers": [{"byteLength": starts[-1]}],
+        },
+        separators=(",", ":"),
+    ).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + starts[-1])
+    body = struct.pack("<I4s", starts[-1], b"BIN\0") + b"".join(part.tobytes() for part in parts)
+    return head + struct.pack("<I4s", len(text), b"JSON") + text + body
+
+
+WRITERS: Final = {".stl": _stl, ".ply": _ply, ".obj": _obj, ".glb": _glb}

@@ -1,0 +1,164 @@
+"""Outlines and surfaces of scenes in one call: `scenelang.to_svg`, `scenelang.to_mesh`."""
+
+from __future__ import annotations
+
+import os
+from typing import Final
+
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.compiler.weights import ModelError
+from scenelang.drawing.how import Backend, How, RenderError, keep_memory
+from scenelang.drawing.render import given
+from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.evaluation import opened
+from scenelang.language.reports import SceneError
+from scenelang.language.scene import Scene
+from scenelang.output.mesh import TriangleMesh, surface_of
+from scenelang.output.svg import svg_of
+
+RESOLUTION: Final = 128
+FINEST: Final = 512
+UNSEEN: Final = ("drop_unseen",)  # passes that are left out where the camera has no say
+
+
+def to_svg(
+    program_or_scene: Program | Scene | str | os.PathLike[str],
+    *,
+    size: tuple[int, int] | None = None,
+    backend: Backend = "neural",
+    diagnostics: Diagnostics | None = None,
+) -> str:
+    """Draw a flat scene as SVG: curves along the outlines of all that is seen, within 0.1 pixels.
+
+    Args:
+        program_or_scene: what to draw, or its file, as for `render`.
+        size: canvas in pixels instead of the Scene's.
+        backend: ``"neural"`` or ``"exact"``, whose outlines they are.
+        diagnostics: collects warnings, such as W0550, that colours of a blend became the nearer object's.
+
+    Returns:
+        The text of the file.
+
+    Raises:
+        SceneError: the Scene cannot be compiled or is one of solids, or the file holds an animation.
+        RenderError: the model has no outlines, its weights are missing, or the backend is the reference.
+        ProgramError, OSError, ValueError, TypeError: as for `render`.
+    """
+    result, how = diagnostics if diagnostics is not None else Diagnostics(), _checked(backend)
+    return svg_text(_program(program_or_scene, size, result), how, result)
+
+
+def to_mesh(
+    program_or_scene: Program | Scene | str | os.PathLike[str],
+    *,
+    resolution: int = RESOLUTION,
+    backend: Backend = "neural",
+    diagnostics: Diagnostics | None = None,
+) -> TriangleMesh:
+    """Make the solids of a scene one closed mesh, wherever the camera looks; ground and media are left out.
+
+    Args:
+        program_or_scene: what to mesh, or its file, as for `render`. A Program has what the camera sees.
+        resolution: cells along the longest side, 8 to 512.
+        backend: ``"neural"`` or ``"exact"``, whose surface it is.
+        diagnostics: collects warnings: W0551 for media, W0552 for what is thinner than a cell.
+
+    Returns:
+        Vertices, triangles and colours; ``save`` writes .stl, .ply, .obj or .glb.
+
+    Raises:
+        SceneError: the Scene cannot be compiled, is flat or has no surface, or the file holds an animation.
+        RenderError: too many cells, or as for `to_svg`.
+        ProgramError, OSError, ValueError, TypeError: as for `render`.
+    """
+    result, how = diagnostics if diagnostics is not None else Diagnostics(), _checked(backend)
+    if not 8 <= resolution <= FINEST:
+        raise ValueError(f"a resolution of {resolution}, where 8 to {FINEST} are allowed")
+    return solid_mesh(_program(program_or_scene, None, result, UNSEEN), resolution, how, result)
+
+
+def svg_text(program: Program, how: How, diagnostics: Diagnostics) -> str:
+    """The SVG of a Program; raises as `to_svg`."""
+    _check(program, flat=True, diagnostics=diagnostics)
+    try:
+        text, blended = svg_of(program, how)
+    except (ModelError, ProgramError) as error:
+        raise RenderError(str(error)) from None
+    if blended:
+        fact = "colours that `smooth` mixes become those of the nearer object"
+        diagnostics.add("W0550", fact, None, help="an SVG has no such gradients; a picture has")
+    return text
+
+
+def solid_mesh(program: Program, resolution: int, how: How, diagnostics: Diagnostics) -> TriangleMesh:
+    """The mesh of a Program; raises as `to_mesh`."""
+    _check(program, flat=False, diagnostics=diagnostics)
+    try:
+        mesh, warnings = surface_of(program, resolution, how)
+    except (ModelError, ProgramError) as error:
+        raise RenderError(str(error)) from None
+    if not len(mesh.triangles):
+        diagnostics.add(
+            "E0552", "nothing is left for a mesh", None, help="a mesh has what is opaque and solid"
+        )
+        raise SceneError(diagnostics)
+    for code, fact in warnings.items():
+        finer = (
+            None if code == "W0551" else f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
+        )
+        diagnostics.add(code, fact, None, help=finer)
+    return mesh
+
+
+def _program(
+    program_or_scene: Program | Scene | str | os.PathLike[str],
+    size: tuple[int, int] | None,
+    diagnostics: Diagnostics,
+    without: tuple[str, ...] = (),
+) -> Program:
+    held = program_or_scene
+    if isinstance(held, Program) or (
+        not isinstance(held, Scene) and os.fspath(held).endswith(".safetensors")
+    ):
+        program = given(held, size, "neural")[0]
+        assert isinstance(program, Program)
+        return program
+    scene, spans = opened(held, diagnostics, size)
+    if scene.animation is not None and not isinstance(held, Scene):
+        refuse_animation(os.fspath(held), diagnostics)
+        raise SceneError(diagnostics)
+    try:
+        return compile_scene(scene, spans=spans, diagnostics=diagnostics, without=without)
+    except FileNotFoundError as error:
+        raise RenderError(f"a model has no weights here: {error.filename}") from None
+
+
+def refuse_animation(name: str, diagnostics: Diagnostics) -> None:
+    """Report that a file would have to hold an animation."""
+    help = "one frame of it can be written: --frame 0, or scenelang.load(path, frame=0)"
+    diagnostics.add("E0550", f"`{name}` is an animation, and the file holds one frame", None, help=help)
+
+
+def _checked(backend: Backend) -> How:
+    if backend == "reference":
+        raise RenderError(
+            "outlines and surfaces are those of the model's field; the reference has pictures alone"
+        )
+    return How(backend).checked()
+
+
+def _check(program: Program, *, flat: bool, diagnostics: Diagnostics) -> None:
+    if (program.stage is None) != flat:
+        fact = "an SVG of solids" if flat else "a mesh of a flat scene"
+        other = "write a mesh, such as .glb, or a picture" if flat else "write an .svg or a picture"
+        diagnostics.add("E0551", fact, None, help=other)
+        raise SceneError(diagnostics)
+    try:
+        manifest = load_manifest(program.model)
+    except KeyError:
+        raise RenderError(f"unknown model `{program.model}`") from None
+    if manifest.renderer not in ("framed", "solid") or manifest.lifting != "exact":
+        raise RenderError(f"model `{program.model}` draws pictures alone")
+    keep_memory()

@@ -1,0 +1,122 @@
+"""Solids as meshes: closed, of the right volume and colours, wherever the camera looks."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner
+
+import scenelang
+from scenelang.cli.main import cli
+from scenelang.output.mesh import _ENDS as ENDS
+from scenelang.output.mesh import TriangleMesh, sheets
+
+RED = "material diffuse { color(#d33); }"
+
+
+def meshed(text: str, resolution: int = 48) -> tuple[TriangleMesh, list[str]]:
+    """A mesh whose every edge has two sides, and codes of warnings."""
+    found = scenelang.Diagnostics()
+    mesh = scenelang.to_mesh(scenelang.loads(text), resolution=resolution, diagnostics=found)
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ways, count = np.unique(sides, axis=0, return_counts=True)
+    assert (count == 1).all()  # each way once, and the other way too
+    assert np.array_equal(np.unique(ways[:, ::-1], axis=0), ways)
+    return mesh, [d.code for d in found]
+
+
+def volume(mesh: TriangleMesh) -> float:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        ("sphere { scale(0.8); translate(9, 0, 0); }", 4 / 3 * np.pi * 0.8**3),  # out of sight
+        ("torus { scale(1, 2, 1); rotate(30deg, axis = X); }", 2 * np.pi**2 * 0.7 * 0.09 * 2),
+        ("chain { sphere {} subtract sphere { scale(0.5); } }", 4 / 3 * np.pi * 0.875),
+        ("chain { sphere {} intersect sphere { translate(1, 0, 0); } }", np.pi * 5 / 12),
+    ],
+)
+def test_volumes_are_those_of_closed_forms(text: str, exact: float) -> None:
+    assert volume(meshed(text)[0]) == pytest.approx(exact, rel=0.01)
+
+
+def test_an_edge_between_two_spheres_is_kept() -> None:
+    mesh, _ = meshed("chain { sphere {} intersect sphere { translate(1, 0, 0); } }")
+    on = np.abs(np.stack([np.linalg.norm(mesh.vertices - [x, 0, 0], axis=1) for x in (0, 1)]) - 1)
+    assert on.min(0).max() < 0.01
+    assert (on.max(0) < 0.004).sum() > 60  # the circle where both meet
+
+
+def test_thin_walls_touching_solids_and_noise_are_closed() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(4):
+        parts = [
+            f"{word} sphere {{ scale({s:.3f}); translate({x:.3f}, {y:.3f}, {z:.3f}); }}"
+            for word, s, (x, y, z) in zip(
+                ["", *rng.choice(["union", "subtract", "smooth"], 7)],
+                rng.uniform(0.1, 0.6, 8),
+                rng.normal(0, 0.3, (8, 3)),
+                strict=True,
+            )
+        ]
+        meshed(f"chain {{ sphere {{ scale(0.7); }} union {' '.join(parts)} }}", 20)
+
+
+def test_sheets_are_cycles_over_the_faces() -> None:
+    table = sheets()
+    for case in range(256):
+        cut = {e for e, (a, b) in enumerate(ENDS) if (case >> a ^ case >> b) & 1}
+        assert set(np.flatnonzero(table.crossed[case])) == cut
+        assert table.count[case] <= len(cut) / 3
+    assert table.count[0b01101001] == 4  # four corners apart
+    assert table.count[0b10000001] == 2
+
+
+def test_colours_and_files(tmp_path: Path) -> None:
+    mesh, _ = meshed(f"sphere {{ scale(0.5); {RED} }} sphere {{ scale(0.5); translate(2, 0, 0); }}", 32)
+    left = mesh.vertices[:, 0] < 1
+    assert abs(mesh.colours[left] - [0xDD / 255, 0.2, 0.2]).max() < 0.01
+    assert mesh.colours[~left].min() > 0.99
+    for suffix in (".ply", ".obj", ".glb", ".stl"):
+        mesh.save(tmp_path / f"a{suffix}")
+        data = io.BytesIO((tmp_path / f"a{suffix}").read_bytes())
+        read = trimesh.load(data, file_type=suffix[1:], process=False, force="mesh")
+        assert len(read.faces) == len(mesh.triangles)
+        assert read.volume == pytest.approx(volume(mesh), rel=1e-4)
+        if suffix in (".ply", ".obj"):
+            assert abs(read.visual.vertex_colors[:, :3] / 255 - mesh.colours).max() < 0.005
+    with pytest.raises(ValueError, match=r"not one of \.stl"):
+        mesh.save(tmp_path / "a.fbx")
+
+
+def test_media_end_where_solids_begin() -> None:
+    text = "chain { sphere {} union sphere { scale(0.5); translate(1, 0, 0); material volumetric; } }"
+    mesh, codes = meshed(text)
+    assert codes == ["W0551"]
+    exact, _ = meshed("chain { sphere {} subtract sphere { scale(0.5); translate(1, 0, 0); } }")
+    assert volume(mesh) == pytest.approx(volume(exact), rel=0.01)
+
+
+def test_the_command_writes_a_file_or_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a.nsg").write_text("sphere { scale(0.5); }")
+    call = ["render", str(tmp_path / "a.nsg"), "-o"]
+    result = CliRunner().invoke(cli, [*call, str(tmp_path / "a.stl"), "--resolution", "16", "-v"])
+    assert result.exit_code == 0
+    assert "triangles" in result.output
+    for out, options, said in (
+        ("a.svg", [], "E0551"),
+        ("b.stl", ["--size", "64x64"], "--size is of pictures"),
+        ("b.png", ["--resolution", "16"], "--resolution is of meshes"),
+        ("no/b.stl", [], "there is no folder"),
+    ):
+        result = CliRunner().invoke(cli, [*call, str(tmp_path / out), *options])
+        assert result.exit_code in (1, 2)
+        assert said in result.output
+        assert not (tmp_path / out).exists()
