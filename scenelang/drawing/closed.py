@@ -117,7 +117,7 @@ class ClosedSolids(SolidArrays):
     """`SolidArrays` by formulas: distances, their gradients, looks and the fold."""
 
     def __init__(self, model: str) -> None:
-        self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": []})
+        self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": [], "segment_b": []})
         manifest = load_manifest(model)
         self.geometries = manifest.geometries
         self.media = np.array([material == "volumetric" for material in manifest.materials], np.float32)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from scenelang.assets.gradient import STOPS
+from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
 from scenelang.language import advice, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
@@ -24,7 +24,7 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
+from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env, Session
@@ -446,7 +446,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
 
 def _check_stops(material: Material, where: Written, session: Session) -> None:
     """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
-    fault = paint_fault(material)
+    fault = material_fault(material.name, material.ops)
     if fault is None:
         return
     stop, message = fault
