@@ -136,7 +136,7 @@ def _joined(elements: tuple[Element, ...]) -> tuple[npt.NDArray[np.generic], ...
 @lru_cache
 def true_slopes() -> Slopes:
     """What bounds true distances, which change by no more than a point moves."""
-    return Slopes(np.zeros((len(RADII), CELLS, CELLS)), 0.0)
+    return Slopes(np.zeros((len(RADII), CELLS, CELLS)), 1e-9)  # 0 times infinity would be no number
 
 
 class OutlineShapes:
