@@ -294,9 +294,9 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
     sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
-    ends, values = (grid.points(a).T, grid.points(b).T), [grid.value(end) for end in (a, b)]
+    low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
-    zero, _, beyond = zeros(lambda p: sampler.at(p.T), *ends, *values, steps, mixed)
+    zero, _, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
     p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
