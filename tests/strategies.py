@@ -40,6 +40,8 @@ transforms = st.one_of(
     st.builds(nsg.Bend, k=numbers),
     st.builds(nsg.Twist, k=numbers),
     st.builds(nsg.Displace, amount=numbers, frequency=numbers),
+    st.builds(nsg.Grow, r=st.floats(-0.5, 1)),
+    st.builds(nsg.Shell, w=st.floats(0.001, 1)),
     st.tuples(numbers, numbers, numbers).map(
         lambda t: nsg.Matrix(rows=((2, 0, 0.5, t[0]), (0, -1, 0, t[1]), (0, 0, 3, t[2]), (0, 0, 0, 1)))
     ),

@@ -111,12 +111,19 @@ class Font:
                 shown = f"`{character}` ({code})" if character.isprintable() else code
                 raise FontError(f"the font has no {shown}", place)
             if last >= 0:
-                pen += self._kerning[self._left[last] * self.columns + self._right[at]] / UNIT
+                pen += self._kern(last, at)
             letter, last = self.metrics[at], at
             if letter.radius > _SMALL:
                 placed.append(Placed(name_of(character), pen + letter.x, letter.y, letter.radius))
             pen += letter.advance
         return placed, pen
+
+    def kerning(self, left: str, right: str) -> float:
+        """By how much a letter goes farther from another than that advances, em."""
+        return self._kern(self.letters[left], self.letters[right])
+
+    def _kern(self, left: int, right: int) -> float:
+        return float(self._kerning[self._left[left] * self.columns + self._right[right]]) / UNIT
 
 
 def name_of(character: str) -> str:

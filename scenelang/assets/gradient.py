@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from itertools import pairwise
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from scenelang.assets.records import Record
 
+NAMES: Final = "linear", "radial"
 STOPS: Final = range(2, 9)  # how many a gradient may have
 HARD: Final = 1e-6  # of an offset: stops that are no farther apart are a hard edge
 
@@ -49,6 +51,15 @@ class Gradient(Record):
             if b[0] - a[0] > HARD
         ]
         return max(rates, default=0.0) / (2 if self.name == "linear" else 1)
+
+
+def material_fault(name: str, ops: Iterable[Any]) -> tuple[Any, str] | None:
+    """The stop that is wrong among the operations of a material, None where some lack, and why, if one is."""
+    stops = [op for op in ops if op.kind == "stop"]
+    if name not in NAMES:
+        return (stops[0], f"a stop in `{name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
 
 
 def stops_fault(offsets: list[float]) -> tuple[int, str] | None:

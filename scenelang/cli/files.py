@@ -96,12 +96,12 @@ def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
 
 
 def _check_format(path: Path, suffix: str) -> None:
-    """Raise `ValueError` where a file is not called like a page, a picture or a shape."""
-    if suffix != PAGE and path.suffix.lower() not in SHAPES:
+    """Raise `ValueError` where a file is not called like a page or a picture."""
+    if suffix != PAGE:
         from scenelang.drawing.image import image_format
 
         image_format(path)
-    elif suffix == PAGE and path.suffix.lower() not in (PAGE, ".htm"):
+    elif path.suffix.lower() not in (PAGE, ".htm"):
         raise ValueError(f"a page's file ends in {PAGE}")
 
 

@@ -58,11 +58,11 @@ class Parts(NamedTuple):
     width: Array  # of the blend by which it joins
     texture: Array
     rgb: Array
-    clear: Array  # (…,) 1 - opacity
     material: Array
-    grow: Array  # this and what follows as in `Skin`
-    shell: Array
-    order: Array
+    clear: Array = 0.0  # (…,) 1 - opacity
+    grow: Array = 0.0  # this and what follows as in `Skin`
+    shell: Array = 0.0
+    order: Array = 0.0
 
 
 class Layout:

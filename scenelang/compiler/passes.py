@@ -179,8 +179,12 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
     outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
+    letters = {name for name, element in graph.elements.items() if element.form == "outline"}
     for _, leaf, _, _, _, cuts in rows:
+        exact = leaf.geometry in letters  # computed at any scale
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
+            if exact and quantity in ("scale", "thin"):
+                continue
             if quantity in trained and not (quantity == "thickness" and cuts):
                 low, high = trained[quantity]
                 above = value - high if quantity != "thickness" else 0.0  # of which more does no harm
@@ -204,8 +208,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         _warn(context, "smooth", fact, smooth[-1])
     if smooth and "blend" in trained:
         _check_blends(rows, measures, context)
-    if "objects" in trained and len(rows) > trained["objects"][1]:
-        fact = f"{len(rows):,} objects are outside the measured range {{}}"
+    count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
+    if "objects" in trained and count > trained["objects"][1]:
+        fact = f"{count:,} objects are outside the measured range {{}}"
         _warn(context, "objects", fact, rows[-1].leaf)
     return graph
 

@@ -88,6 +88,7 @@ class ClosedPlane(FramedArrays):
         shapes = [(ExactSectors if name in SECTORS else ExactShape)(name) for name in names]
         self.config = FramedConfig(self.config.code, self.config.material_code)
         self.slopes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
+        self.levels = dict  # nothing is to be corrected
         self.read_slope = np.float32(math.log(4 * SHARP))
         # a gate is a clamped line: 0.5 where both sides are equal, and open after 1 / (2 slope) world units
         s, k = SHARP, 0.5 / BLEND

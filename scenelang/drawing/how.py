@@ -9,7 +9,8 @@ from typing import Final, Literal, NamedTuple, TypedDict, TypeVar, cast, get_arg
 
 Backend = Literal["neural", "exact", "reference"]
 Device = Literal["auto", "cpu", "cuda"]
-Samples = Literal["adaptive", "four", "quick", "one", "draft", "4", "16"]
+Sampling = Literal["adaptive", "four", "quick", "one", "draft"]
+Samples = Literal[Sampling, 4, 16]
 T = TypeVar("T")
 
 
@@ -20,12 +21,13 @@ class RenderError(Exception):
 class Care(TypedDict, total=False):
     """Fields of `How` that renderers take by these names, whichever library they use."""
 
-    samples: Samples
+    samples: Sampling
 
 
-class Options(Care, total=False):
+class Options(TypedDict, total=False):
     """Fields of `How`, as calls take them by name."""
 
+    samples: Samples
     backend: Backend
     device: Device
     threads: int | None
@@ -46,8 +48,8 @@ class How(NamedTuple):
             elsewhere (on CUDA four in the plane), which looks the same, ``"one"``, which is faster and has
             hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
             with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
-            and ``"draft"`` may. Of a scene with ``samples(16)`` four are sixteen; ``"4"`` and ``"16"``, also
-            as numbers, are ``"adaptive"`` with so many, whatever the scene says.
+            and ``"draft"`` may. Of a scene with ``samples(16)`` four are sixteen; 4 and 16 are
+            ``"adaptive"`` with so many, whatever the scene says.
     """
 
     backend: Backend = "neural"
@@ -57,10 +59,8 @@ class How(NamedTuple):
 
     def checked(self) -> How:
         """The same. Raises `ValueError` for other values, `RenderError` where two exclude each other."""
-        if type(self.samples) is int:
-            return self._replace(samples=cast("Samples", str(self.samples))).checked()
         for name, known in CHOICES.items():
-            if (value := getattr(self, name)) not in known:
+            if str(value := getattr(self, name)) not in known:
                 ways = ", ".join(f"`{way}`" for way in known)
                 raise ValueError(f"unknown {name} `{value}`; there are {ways}")
         if self.threads is not None and self.threads < 1:
@@ -74,25 +74,29 @@ class How(NamedTuple):
     @property
     def care(self) -> Care:
         """The fields that renderers take."""
-        given = self if self.count is None else self._replace(samples="adaptive")
+        given = self if self.number is None else self._replace(samples="adaptive")
         return cast("Care", {name: getattr(given, name) for name in Care.__annotations__})
 
     @property
-    def count(self) -> int | None:
+    def number(self) -> int | None:
         """Number of a pixel's samples that overrides a scene's, if one does."""
-        return int(self.samples) if self.samples in ("4", "16") else None
+        return int(self.samples) if str(self.samples).isdigit() else None
 
     def sampled(self, drawn: T) -> T:
         """A Scene, a Graph or a Program with the number of samples that overrides its own."""
-        if self.count is None:
+        if self.number is None:
             return drawn
         if hasattr(drawn, "model_copy"):
-            return cast("T", drawn.model_copy(update={"samples": self.count}))
-        return replace(drawn, samples=self.count)  # type: ignore[type-var]
+            return cast("T", drawn.model_copy(update={"samples": self.number}))
+        return replace(drawn, samples=self.number)  # type: ignore[type-var]
 
 
 DEFAULT: Final = How()
-CHOICES: Final = {"backend": get_args(Backend), "device": get_args(Device), "samples": get_args(Samples)}
+CHOICES: Final = {
+    "backend": get_args(Backend),
+    "device": get_args(Device),
+    "samples": tuple(map(str, get_args(Samples))),
+}
 HELP: Final = {
     "backend": "Draw with the trained network, with formulas of the shapes in its place (exact), or by the "
     "exact definition, which is slow (reference).",

@@ -112,8 +112,8 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
                 drawing.image.credit = credit_of(program.elements)
                 return drawing
             if samples != "adaptive" or program.samples != 4:
-                samples = samples if program.samples == 4 else str(program.samples)
-                raise RenderError(f"model `{name}` samples pixels in one way only, not `{samples}`")
+                way = samples if program.samples == 4 else program.samples
+                raise RenderError(f"model `{name}` samples pixels in one way only, not `{way}`")
             torch.set_num_threads(run["threads"] or 1)
             return draw_whole(network, program, progress=progress)
         except ProgramError as error:

@@ -532,8 +532,12 @@ class _Maker:
         zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
         for name, group in zoo.groups.items() if zoo is not None and not worn else ():
             yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
+        statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
+        if zoo is not None and zoo.font is not None and not worn:
+            name = "text" if statement else "width"
+            yield from _calls({name: words.LETTERS[name]}, "a", Kind.Module if statement else Kind.Function)
         for element in zoo.elements if zoo is not None else ():
-            if element.material == worn:
+            if element.material == worn and element.form != "outline":
                 name, about = element.name, element.told()
                 yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
             if element.size is not None and not worn:
@@ -541,7 +545,6 @@ class _Maker:
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
-        statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
         for known in library.names.exported():
             if not statement or known.kind in ("module", "let"):
                 yield self._symbol(known, statement=statement)

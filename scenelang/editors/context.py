@@ -15,7 +15,7 @@ from scenelang.language.definitions import Symbol
 from scenelang.language.lexer import Tokens
 from scenelang.language.tables import tables
 from scenelang.language.tree import children
-from scenelang.language.words import COMBINE, NODES, Word, word_for_call
+from scenelang.language.words import COMBINE, LETTERS, NODES, Word, word_for_call
 
 
 def path_to(file: tree.File, offset: int) -> list[Any]:
@@ -212,6 +212,11 @@ def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | N
     if call is None:
         return None
     result = find_symbol(docs, document, call.name, call.start)
+    alias, _, rest = call.name.partition(".")
+    outer = document.names.scope_at(call.start).find(alias) if rest in LETTERS else None
+    if outer is not None and isinstance(outer.node, tree.Import):
+        zoo = docs.zoo(document, outer.node)
+        return LETTERS[rest] if zoo is not None and zoo.font is not None else None
     return word_of(result) if result else word_for_call(call.name, cursor.block.kind == "material")
 
 
@@ -221,7 +226,7 @@ def find_symbol(docs: Workspace, document: Document, name: str, offset: int) -> 
     symbol = document.names_at(offset).scope_at(offset).find(alias)
     if rest and symbol is not None and isinstance(symbol.node, tree.Import):
         library = docs.imported(document, symbol.node.path.value)
-        symbol = library.names.top.symbols.get(rest) if library is not None else None
+        symbol = library.names.top.names.get(rest) if library is not None else None
         if symbol is None or not symbol.is_exported:
             return None
     return symbol if symbol is not None and symbol.kind in ("fn", "module") else None

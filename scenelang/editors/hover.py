@@ -104,6 +104,10 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
     zoo, name = docs.zoo(document, symbol.node), use.text.partition(".")[0]
     if zoo is None:
         return ""
+    if zoo.font is not None and name in words.LETTERS and not worn:
+        about = (f"{key}: {value}" for key, value in zoo.font.about.items())
+        letters = "\n".join([f"a font of {len(zoo.font.letters):,} letters", *about]).replace("`", "'")
+        return f"{_word(words.LETTERS[name])}\n\n```text\n{letters}\n```"
     names = (name, name.removesuffix("_size"))  # what an element says has its size
     result = [element for element in zoo.elements if element.name in names and element.material == worn]
     parts = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]

@@ -129,7 +129,7 @@ def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
     for inner in scope.outwards():
-        if (taken := inner.symbols.get(new)) is not None:
+        if (taken := inner.names.get(new)) is not None:
             line = taken.span.locate()[0][0]
             raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
         if inner is symbol.scope:

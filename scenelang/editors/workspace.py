@@ -327,22 +327,19 @@ class Document:
             self.__dict__.pop(name, None)
 
     def _left(self, edit: Edit, source: SourceFile) -> list[tree.Kept]:
-        """The sound statements that an edit leaves as they are: none that shares the line of its end."""
+        """The sound statements that an edit does not touch, at their places after it."""
         known: Sequence[tree.Stmt] = self._known
         if "_parsed" in self.__dict__:
             bad = [d.span for d in self.syntax if d.span is not None and d.code not in _WHOLE]
             sound = len(bad) == len(self.syntax) <= _MOST_MISTAKES
             known = self.__dict__.get("file", self._parsed[0]).statements if sound else ()
             known = [s for s in known if all(b.start > s.span.end or b.end < s.span.start for b in bad)]
-        newline, result = source.text.find("\n", edit.new_end), []
+        result = []
         for stmt in known:
-            start, end = stmt.span.start, stmt.span.end
-            if start > edit.old_end and start + edit.delta > newline >= 0:
-                start, end = start + edit.delta, end + edit.delta
-            elif end >= edit.start:
-                continue
-            span = Span(source, start, end)
-            result.append(tree.Kept(span, stmt.stmt if isinstance(stmt, tree.Kept) else stmt))
+            if stmt.span.end < edit.start or stmt.span.start > edit.old_end:
+                delta = edit.delta if stmt.span.start > edit.old_end else 0
+                span = Span(source, stmt.span.start + delta, stmt.span.end + delta)
+                result.append(tree.Kept(span, stmt.stmt if isinstance(stmt, tree.Kept) else stmt))
         return result
 
     def before(self, offset: int) -> int | None:
@@ -477,7 +474,7 @@ class Workspace:
         library = self.imported(document, stmt.path.value) if isinstance(stmt, tree.Import) else None
         if library is None:
             return None
-        result = library.names.top.symbols.get(use.text.partition(".")[0])
+        result = library.names.top.names.get(use.text.partition(".")[0])
         return (library, result) if result is not None and result.is_exported else None
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
-from scenelang.language import foreign, library, tree
+from scenelang.language import foreign, library, scopes, tree
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Edit, Fix, Label, SourceFile, Span, did_you_mean, listing
 from scenelang.language.reporter import Advice, Reporter
@@ -113,7 +113,6 @@ def drawn(place: Place) -> str:
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"
 
 
-VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of bindings that are values."""
 
 
@@ -187,8 +186,8 @@ def _last(name: tree.Name) -> Span:
 
 def report_early(name: tree.Name, place: Place) -> bool:
     """Report a name that a later line defines, if one does."""
-    scopes = place.scope.outwards()
-    later = next((scope.later[name.text] for scope in scopes if name.text in scope.later), None)
+    around = place.scope.outwards()
+    later = next((scope.later[name.text] for scope in around if name.text in scope.later), None)
     if later is not None:
         message, labels = f"`{name.text}` is used before its line", (Label(later, "defined here"),)
         help = f"move the definition of `{name.text}` above this line"
@@ -230,7 +229,7 @@ def _advice(name: tree.Name, place: Place, call: tree.CallExpr | None) -> Advice
     if text in ("x", "y", "z") and before.replace(" ", "").endswith("axis="):
         return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))
     own = {*FUNCTIONS} if call else {*CONSTANTS, *ANIMATED, "true", "false"}
-    kinds = ("fn",) if call else (*VALUES, "import")
+    kinds = ("fn",) if call else (*scopes.VALUES, "import")
     if not call and lower in foreign.VALUES:
         return foreign.VALUES[lower], None
     here = None if call else foreign.NAMES.get(lower)

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
-from scenelang.language.advice import VALUES
 from scenelang.language.builder import Action, Builder, ChainBuilder, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span, did_you_mean, listing
 from scenelang.language.expressions import (
@@ -26,9 +25,10 @@ from scenelang.language.library import SpanMap, Written
 from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
 from scenelang.language.nodes import blend_width
 from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Material, Object, objects_of
+from scenelang.language.scopes import VALUES, head_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
 from scenelang.language.values import MAX_VECTOR, POISON, Problem, RangeValue, Vec, number, show, unexpected
-from scenelang.language.words import KEYWORDS, LANGUAGE, NEWER, SETTINGS
+from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
 
 
 class Body(NamedTuple):
@@ -544,8 +544,8 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
     child, makes = stmt.child, isinstance(stmt.child, tree.Node)
     if isinstance(child, tree.Call):
         binding = lookup(child.name, place)
-        moves = child.name.text in LANGUAGE or (child.name.text in NEWER and binding is None)
-        makes = not moves and (binding is None or binding.kind not in VALUES)
+        head = head_of(child, binding, place.kind)
+        makes = head == "leaf" or (head == "own" and binding is not None and binding.kind not in VALUES)
     if not makes:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)

@@ -8,9 +8,9 @@ from dataclasses import field
 from typing import Any, Final, Literal
 
 from scenelang.assets.records import Record
-from scenelang.language import tree
+from scenelang.language import scopes, tree
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, SourceFile, Span, removal
-from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, NEWER, OPERATIONS, SETTINGS, TRANSFORMS
+from scenelang.language.words import ANIMATED, CONSTANTS, FUNCTIONS, LANGUAGE, OPERATIONS, TRANSFORMS
 
 Kind = Literal["let", "param", "fn", "module", "import", "argument", "loop"]
 Role = Literal[
@@ -41,7 +41,7 @@ class Symbol(Record, frozen=False):
     name: str
     kind: Kind
     span: Span
-    node: tree.Stmt | tree.Parameter
+    node: tree.Stmt | tree.Parameter | tree.ForItem
     scope: Scope
     since: int  # the offset from which on it is in sight
     owner: Symbol | None = None  # the fn or module that it is a parameter of
@@ -59,18 +59,9 @@ class Scope(Record, frozen=False):
     start: int
     end: int
     parent: Scope | None = None
-    symbols: dict[str, Symbol] = field(default_factory=dict)
+    names: dict[str, Symbol] = field(default_factory=dict)
 
-    def outwards(self) -> Iterator[Scope]:
-        """This scope, and those around it."""
-        scope: Scope | None = self
-        while scope is not None:
-            yield scope
-            scope = scope.parent
-
-    def find(self, name: str) -> Symbol | None:
-        """Definition that a name stands for here."""
-        return next((scope.symbols[name] for scope in self.outwards() if name in scope.symbols), None)
+    outwards, find = scopes.outwards, scopes.find
 
 
 class Use(Record, frozen=False):
@@ -126,27 +117,27 @@ class Names:
         """The definitions in sight of an offset, inner ones first, hidden ones left out."""
         seen: set[str] = set()
         for scope in self.scope_at(offset).outwards():
-            for name, symbol in scope.symbols.items():
+            for name, symbol in scope.names.items():
                 if name not in seen and symbol.since <= offset:
                     seen.add(name)
                     yield symbol
 
     def exported(self) -> list[Symbol]:
         """Definitions that files that import this one see."""
-        return [symbol for symbol in self.top.symbols.values() if symbol.is_exported]
+        return [symbol for symbol in self.top.names.values() if symbol.is_exported]
 
     def _define(
         self,
         name: tree.Name,
         kind: Kind,
-        node: tree.Stmt | tree.Parameter,
+        node: tree.Stmt | tree.Parameter | tree.ForItem,
         scope: Scope,
         since: int,
         owner: Symbol | None = None,
     ) -> Symbol:
         symbol = Symbol(name.text, kind, name.span, node, scope, since, owner)
         self.symbols.append(symbol)
-        scope.symbols.setdefault(symbol.name, symbol)
+        scope.names.setdefault(symbol.name, symbol)
         self._add(name.span, name.text, "name", symbol).defines = True
         return symbol
 
@@ -257,17 +248,14 @@ class Names:
 
     def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
         name = stmt.name.text
-        role: Role | None = None
-        own = scope.find(name) if name in NEWER and kind != "material" else None
-        hidden = own is not None and (own.kind == "module" or stmt.args is None)
-        if hidden:
-            role = None
-        elif name in SETTINGS:
-            role = "setting"
-        elif name in OPERATIONS and (kind == "material" or name not in TRANSFORMS):
-            role = "operation"
-        elif name in TRANSFORMS:
-            role = "transform"
+        own = None if name in LANGUAGE else scope.find(name)
+        meaning = scopes.head_of(stmt, own, kind)
+        role: Role | None = "setting" if meaning == "setting" else None
+        if meaning == "move":
+            moves = name in TRANSFORMS and (kind != "material" or name not in OPERATIONS)
+            role = "transform" if moves else "operation"
+        elif meaning == "leaf" and own is not None:
+            role = "geometry"
         span = stmt.name.span
         head = self._add(span, name, role) if role else self._reference(stmt.name, scope, "geometry")
         self._arguments(stmt.args or (), scope, head)

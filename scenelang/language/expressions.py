@@ -9,12 +9,13 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from scenelang.language import foreign, limits, tree, values, words
-from scenelang.language.advice import VALUES, member_advice, report_problem, unknown, unknown_member
+from scenelang.language.advice import member_advice, report_problem, unknown, unknown_member
 from scenelang.language.builder import FileContext, Place
 from scenelang.language.diagnostics import Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
 from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX_DEPTH, MAX_NESTING
 from scenelang.language.reporter import Reporter
+from scenelang.language.scopes import VALUES
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs
 from scenelang.language.values import (
     COMPONENTS,

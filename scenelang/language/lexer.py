@@ -183,31 +183,18 @@ def _master() -> tuple[re.Pattern[str], list[int], list[str]]:
     return re.compile(pattern), kinds, ["", *groups]
 
 
-@cache
-def blank() -> re.Pattern[str]:
-    """White space and comments."""
-    return re.compile(_SKIP)
-
-
 def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
     """All tokens of a text, or those before an offset between tokens; slips go to ``report``."""
-    tokens, end = Tokens(source), len(source.text) if stop is None else stop
-    scan_part(tokens, report, 0, end)
-    tokens.append(END, end, end)
-    return tokens
-
-
-def scan_part(tokens: Tokens, report: Report, begin: int, stop: int) -> None:
-    """Append the tokens of a part of the text that begins and ends between tokens."""
     pattern, group_kinds, names = _master()
     literals = tables().literals
     name_group, sign_group = names.index("NAME"), names.index("sign")
     name_kind = group_kinds[name_group]
+    tokens, text = Tokens(source), source.text
     kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
-    text = tokens.source.text
+    stop = len(text) if stop is None else stop
     keyword = literals.get
     slips = _Slips(tokens, report)
-    for match in pattern.finditer(text, begin, stop):
+    for match in pattern.finditer(text, 0, stop):
         group = match.lastindex
         if group is None:
             break
@@ -226,6 +213,8 @@ def scan_part(tokens: Tokens, report: Report, begin: int, stop: int) -> None:
         kinds.append(kind)
         starts.append(start)
         ends.append(end)
+    tokens.append(END, stop, stop)
+    return tokens
 
 
 class _Slips:

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Edit, Fix, SourceFile, Span
+from scenelang.language.scopes import outwards
 
 SHAPES: Final = "std/shapes"
 MESHES: Final = "std/meshes"
@@ -72,14 +73,11 @@ class Calls(NamedTuple):
     """The module and function calls that led somewhere, innermost first."""
 
     span: Span
-    outer: Calls | None
+    parent: Calls | None
 
     def outwards(self) -> Iterator[Span]:
         """The places of the calls."""
-        calls: Calls | None = self
-        while calls is not None:
-            yield calls.span
-            calls = calls.outer
+        return (call.span for call in outwards(self))
 
     def outside(self) -> Span | None:
         """The innermost call that is not written in the library."""

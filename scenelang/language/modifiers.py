@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from scenelang.assets.gradient import STOPS
+from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
-from scenelang.language import advice, nodes, tree, words
+from scenelang.language import advice, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
@@ -24,7 +24,7 @@ from scenelang.language.expressions import (
 )
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, paint_fault, singular
+from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, singular
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env, Session
@@ -446,7 +446,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Cal
 
 def _check_stops(material: Material, where: Written, session: Session) -> None:
     """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
-    fault = paint_fault(material)
+    fault = material_fault(material.name, material.ops)
     if fault is None:
         return
     stop, message = fault
@@ -486,7 +486,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
         advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
         wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
-    elif own is not None and own.kind in advice.VALUES:
+    elif own is not None and own.kind in scopes.VALUES:
         _is_value(name, place)
     elif own is not None:
         wrong_kind(name, own, place, "a material")
@@ -500,6 +500,12 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     word, name = written.shading, written.name
     if word is None:
         return None
+    if word.text in words.PAINTS and name.text in words.MATERIALS:
+        turned = f"{name.text} {word.text}"
+        edit = Edit(Span(word.span.source, word.span.start, name.span.end), turned)
+        fact, fix = f"`{word.text}` before the way it is lit", Fix(f"write `{turned}`", (edit,))
+        place.report.error("E0213", fact, word.span, help=f"write material {turned}", fix=fix)
+        return ""
     if word.text not in words.MATERIALS:
         _unknown(word, place, {*words.MATERIALS})
         return ""

@@ -29,9 +29,9 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from scenelang.assets.gradient import stops_fault
+from scenelang.assets.gradient import material_fault
 from scenelang.language.diagnostics import plural
-from scenelang.language.words import BLEND, GRADIENTS, RESERVED, Combine
+from scenelang.language.words import BLEND, RESERVED, Combine
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
@@ -638,19 +638,8 @@ class Material(Frozen):
 
     @model_validator(mode="after")
     def _has_stops(self) -> Self:
-        fault = paint_fault(self)
-        if fault is not None:
-            raise ValueError(fault[1])
-        return self
-
-
-def paint_fault(material: Material) -> tuple[Stop | None, str] | None:
-    """What is wrong with the stops of a material, if anything, and the stop it is wrong with."""
-    stops = [op for op in material.ops if op.kind == "stop"]
-    if material.name not in GRADIENTS:
-        return (stops[0], f"a stop in `{material.name}`, which is not a gradient") if stops else None
-    fault = stops_fault([stop.offset for stop in stops])
-    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
+        fault = material_fault(self.name, self.ops)
+        return _checked(self, fault is not None, fault[1] if fault else "")  # type: ignore[no-any-return]
 
 
 class Object(Frozen):

@@ -6,6 +6,7 @@ one becomes a `BadExpr`, a statement without its name a `BadStmt`.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -15,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
-from scenelang.language.lexer import Report, Tokens, blank, run, scan, scan_part
-from scenelang.language.tables import END, tables
+from scenelang.language.lexer import Report, Tokens, run, scan
+from scenelang.language.tables import tables
 from scenelang.language.words import RESERVED
 
 if TYPE_CHECKING:
@@ -307,27 +308,25 @@ _REACH: Final = 240
 """Tokens past a mistake that recovery may look at, with room."""
 
 
-def scan_around(source: SourceFile, report: Report, known: Sequence[tree.Kept]) -> Tokens:
-    """Tokens of a text in which known statements are one each, but for those that recovery may look at."""
-    tokens, bad, stop = Tokens(source), tables().kind("BAD_STATEMENT"), len(source.text)
-    places = [(stmt.span.start, stmt.span.end) for stmt in known]
-    gaps = zip([0, *(end for _, end in places)], [*(start for start, _ in places), stop], strict=True)
-    touched = [blank().fullmatch(source.text, *gap) is None for gap in gaps]
-    begin, seen = 0, _REACH  # tokens since something that is not known
-    for at, (start, end) in enumerate(places):
-        count, seen = len(tokens.kinds), 0 if touched[at] else seen
-        if seen >= _REACH and not touched[at + 1]:
-            scan_part(tokens, report, begin, start)
-            tokens.append(bad, start, end)
-        elif seen < _REACH:
-            scan_part(tokens, report, begin, end)
-            seen += len(tokens.kinds) - count
-        else:
-            continue
-        begin = end
-    scan_part(tokens, report, begin, stop)
-    tokens.append(END, stop, stop)
-    return tokens
+def fold(tokens: Tokens, known: Sequence[tree.Kept]) -> None:
+    """Let one token stand for each known statement, but for those that recovery may look at."""
+    columns, spans = (tokens.kinds, tokens.starts, tokens.ends), [stmt.span for stmt in known]
+    places = [(bisect_left(tokens.starts, span.start), span) for span in spans]
+    found = [(at, bisect_left(tokens.starts, s.end), s) for at, s in places if tokens.starts[at] == s.start]
+    nexts = [*(first for first, _, _ in found[1:]), len(tokens.kinds) - 1]
+    new: tuple[list[int], ...] = ([], [], [])
+    copied = end = 0
+    seen = _REACH  # tokens since something that is not known
+    for (first, stop, span), following in zip(found, nexts, strict=True):
+        seen = seen if first == end else 0
+        if seen >= _REACH and following == stop:
+            token = (tables().kind("BAD_STATEMENT"), span.start, span.end)
+            for target, column, value in zip(new, columns, token, strict=True):
+                target += [*column[copied:first], value]
+            copied = stop
+        seen, end = seen + stop - first, stop
+    for target, column in zip(new, columns, strict=True):
+        column[:copied] = target
 
 
 def parse(source: SourceFile, diagnostics: Diagnostics, known: Sequence[tree.Kept] = ()) -> tree.File:
@@ -337,11 +336,13 @@ def parse(source: SourceFile, diagnostics: Diagnostics, known: Sequence[tree.Kep
         known: sound statements at top level that an edit left as they were, in order; most stand in the tree.
     """
     report = Report(source)
-    tokens = scan_around(source, report, known) if known else scan(source, report)
+    tokens = scan(source, report)
+    if known:
+        fold(tokens, known)
     steps = {tables().literals["{"]: 1, tables().literals["}"]: -1}
     depths = [0, *accumulate(steps[kind] for kind in tokens.kinds if kind in steps)]
     odd = depths[-1] or min(depths) < 0  # some brace has no counterpart
-    if known and (odd or tokens.cut):
+    if known and odd:
         return parse(source, diagnostics)
     if odd:
         # What only mistakes need is loaded at the first one: most runs start and end without any.

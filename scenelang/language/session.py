@@ -15,7 +15,7 @@ from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
 from scenelang.assets.files import read_regular
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
-from scenelang.language import library, tree
+from scenelang.language import library, scopes, tree
 from scenelang.language.diagnostics import Diagnostics, Fix, Label, SourceFile, Span, listing, nearest
 from scenelang.language.library import SpanMap
 from scenelang.language.limits import MAX_BYTES, MAX_OBJECTS, MAX_PARTS, MAX_STEPS, Halt
@@ -92,6 +92,11 @@ class Binding(Record, frozen=False):
     known: bool = False  # whether ``value`` is that of a ``let``
     needs: Needs | None = None  # what the value of a ``let`` depends on
 
+    @property
+    def node(self) -> tree.Fn | tree.Module | None:
+        """The statement of a fn or module."""
+        return self.value.node if isinstance(self.value, Definition) else None
+
     def labels(self, words: str = "defined here") -> tuple[Label, ...]:
         """A label for its definition, if that has a place."""
         return () if self.span is None else (Label(self.span, words),)
@@ -105,14 +110,7 @@ class Scope(Record, frozen=False):
     names: dict[str, Binding] = field(default_factory=dict)
     later: dict[str, Span] = field(default_factory=dict)  # names that a later line of this block defines
 
-    def outwards(self) -> Iterator[Scope]:
-        scope: Scope | None = self
-        while scope is not None:
-            yield scope
-            scope = scope.parent
-
-    def find(self, name: str) -> Binding | None:
-        return next((scope.names[name] for scope in self.outwards() if name in scope.names), None)
+    outwards, find = scopes.outwards, scopes.find
 
     def visible(self) -> Iterator[tuple[str, Binding]]:
         """All names that can be used here, inner ones first."""

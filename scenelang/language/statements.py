@@ -17,6 +17,7 @@ from scenelang.language import (
     letters,
     library,
     modifiers,
+    scopes,
     tree,
     words,
 )
@@ -453,12 +454,12 @@ def _is_literal(expr: tree.Expr) -> bool:
 def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
     name = stmt.name.text
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
-    if name in words.SETTINGS and not hides(binding, stmt):
+    head = scopes.head_of(stmt, binding, place.kind)
+    if head == "setting":
         return prepare_setting(stmt, place)
-    moves = name in words.LANGUAGE or (name in words.NEWER and name not in words.SETTINGS)
-    if moves and (place.kind == "material" or not hides(binding, stmt)):
+    if head == "move":
         return prepare_move(stmt, place)
-    if binding is None:
+    if binding is None or head == "leaf":
         if name in words.GEOMETRIES:
             return blocks.prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
@@ -472,19 +473,12 @@ def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
         return letters.prepare_text(stmt, place, binding.value)
     if binding.kind == "element":
         return blocks.prepare_element(stmt, place, binding.value)
-    if binding.kind in advice.VALUES:
+    if binding.kind in scopes.VALUES:
         return prepare_value_use(stmt, binding, place)
     _skim(stmt, place)
     if binding.kind != "poison":
         wrong_kind(stmt.name, binding, place, "an object or a module")
     return None
-
-
-def hides(binding: Binding | None, stmt: tree.Call) -> bool:
-    """Test whether a scene's own name stands here for a setting: a module, or a material in use."""
-    return binding is not None and (
-        binding.kind in ("module", "poison") or (binding.kind in advice.VALUES and stmt.args is None)
-    )
 
 
 def _boolean(stmt: tree.Call) -> str | None:
@@ -591,7 +585,7 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
         return {*words.OPERATIONS}
     if kind == "object" and stmt.args is not None:
         return {*words.TRANSFORMS}
-    names = advice.visible(place, advice.VALUES if kind == "object" else ("module",))
+    names = advice.visible(place, scopes.VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
     known = {*words.GEOMETRIES, *names}

@@ -276,7 +276,7 @@ class Kept(Stmt):
             if cls is tuple:
                 return tuple([move(item) for item in value])
             if isinstance(value, Record) and (deep or cls is Name or value is self.stmt):
-                return cls(*[move(getattr(value, name)) for name in value.__match_args__])
+                return cls(*[move(getattr(value, name)) for name in cls.__match_args__])
             return value
 
         return cast(Stmt, move(self.stmt))

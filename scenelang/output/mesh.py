@@ -27,6 +27,7 @@ from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.image import decoded, encoded
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import EMPTY, Wanted
+from scenelang.output.roots import zeros
 
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -84,7 +85,8 @@ class Sampler:
         rates = [s.rate * stretch for s, stretch in zip(self.solids, self._stretch, strict=True)]
         self.steep = STEEP * max([1.0, *rates])
         ends = [np.asarray(s.centre, np.float64) + side * s.extent for s in drawn for side in (-1, 1)]
-        self.low, self.high = (np.array(ends or [[0.0] * 3]).min(0), np.array(ends or [[0.0] * 3]).max(0))
+        corners = np.array(ends).reshape(-1, 3) if ends else np.zeros((1, 3))
+        self.low, self.high = corners.min(0), corners.max(0)
         self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
 
     def widen(self, by: float) -> None:
@@ -95,38 +97,31 @@ class Sampler:
         ]
 
     def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
-        """As `SolidField.meet`, at points (M, 3) but for those that meet nothing: these are far outside."""
-        each = range(0, max(len(p), 1), POINTS)
-        parts = [self._meet(p[i : i + POINTS], wanted, gradient, owners)[:5] for i in each]
-        joined = [None if x[0] is None else np.concatenate(x, -1) for x in zip(*parts, strict=True)]
-        return Meeting(*joined)
-
-    def _meet(self, p: Floats, wanted: Wanted, gradient: bool, owners: bool) -> Meeting:
-        field, points = self.field, np.reshape(p, (-1, 3)).T.astype(np.float32)
-        way = points - self._origin[:, None]
-        t = np.sqrt((way * way).sum(0)).clip(1e-9)
-        with field.xp.inference():
-            some, passes = field.passes(self._origin, way / t, t, tight=False)
-            met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
-        count = len(p)
-        distance, register = np.full(count, EMPTY), np.zeros((len(met.register), count))
-        distance[some], register[:, some] = met.distance, met.register
-        slope = np.zeros((3, count)) if gradient else None
-        owner = np.zeros(count) if owners else None
-        if slope is not None:
-            slope[:, some] = met.gradient
-        if owner is not None:
-            owner[some] = met.owner
-        return Meeting(distance, register, slope, None, owner)
+        """As `SolidField.meet`, at points (M, 3); those that meet nothing are far outside."""
+        field, count = self.field, len(p)
+        register = np.zeros(((0, 1, len(field.looks))[wanted], count))
+        result = Meeting(np.full(count, EMPTY), register, np.zeros((3, count)), None, np.zeros(count))
+        for start in range(0, count, POINTS):
+            points = p[start : start + POINTS].T.astype(np.float32)
+            way = points - self._origin[:, None]
+            t = np.sqrt((way * way).sum(0)).clip(1e-9)
+            with field.xp.inference():
+                some, passes = field.passes(self._origin, way / t, t, tight=False)
+                met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
+            some = some + start
+            result.distance[some], result.register[:, some] = met.distance, met.register
+            if gradient:
+                result.gradient[:, some] = met.gradient
+            if owners:
+                result.owner[some] = met.owner
+        return result
 
     def at(self, p: Floats) -> Floats:
         """Distances (M,) at points (M, 3), negative in what is opaque alone."""
-        if not len(p):
-            return np.zeros(0)
-        met = self.meet(p, Wanted.KIND if self.field.media else Wanted.DISTANCE)
-        if not self.field.media:
-            return met.distance
-        return np.where((met.distance < 0) & (met.register[-1] > 0.5), TINY - met.distance, met.distance)
+        media = self.field.media
+        met = self.meet(p, Wanted.KIND if media else Wanted.DISTANCE)
+        inside = (met.distance < 0) & (met.register[-1] > 0.5) if media else False
+        return np.asarray(np.where(inside, TINY - met.distance, met.distance))
 
 
 class Sheets(NamedTuple):
@@ -134,7 +129,7 @@ class Sheets(NamedTuple):
 
     crossed: npt.NDArray[np.bool_]  # (256, 12) edges that it crosses
     sheet: Index  # (256, 12) of each
-    count: Index  # (256,)
+    number: Index  # (256,) of sheets
     pinched: npt.NDArray[np.bool_]  # (256, 6) faces that one sheet crosses twice: low x, high x, low y, …
 
 
@@ -164,7 +159,7 @@ def sheets() -> Sheets:
         cut = [e for e, (a, b) in enumerate(_ENDS.tolist()) if (case >> a ^ case >> b) & 1]
         table.crossed[case, cut] = True
         number = {one: at for at, one in enumerate(dict.fromkeys(owner[e] for e in cut))}
-        table.sheet[case, cut], table.count[case] = [number[owner[e]] for e in cut], len(number)
+        table.sheet[case, cut], table.number[case] = [number[owner[e]] for e in cut], len(number)
         table.pinched[case] = [len(face) == 4 and owner[face[0]] == owner[face[2]] for face in twice]
     return table
 
@@ -175,7 +170,7 @@ def _others(numbers: Index, known: Index) -> Index:
     fresh = np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]
     if len(known):
         fresh &= known[np.searchsorted(known, numbers).clip(0, len(known) - 1)] != numbers
-    return numbers[fresh]
+    return np.asarray(numbers[fresh])
 
 
 class Grid:
@@ -200,17 +195,19 @@ class Grid:
         sampler.widen(2 * self.side)
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values = np.zeros(0, np.intp), np.zeros(0)
-        while True:  # the field may be steeper than it should be
+        while True:
             fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
             order = np.argsort(nodes)
             self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
-            self.nodes = nodes[order]
-            left = _others(self._around(), np.sort(self.cells))
-            if not len(left):
+            self.nodes, self.cells = nodes[order], np.sort(self.cells)
+            left = _others(self._around(), self.cells)  # the field may be steeper than it should be
+            if len(left):
+                self.cells = np.concatenate([self.cells, left])
+            elif len(taken := self._pinched()):
+                self.values[np.searchsorted(self.nodes, taken)] = TINY
+            else:
                 break
-            self.cells = np.concatenate([self.cells, left])
-        self._unpinch()
 
     def number(self, place: Index) -> Index:
         """Numbers of nodes, or of cells by their first nodes, at places (…, 3)."""
@@ -222,10 +219,13 @@ class Grid:
         z, y = np.divmod(rest, self.shape[1])
         return np.asarray(self.first + np.stack([x, y, z], -1) * self.side)
 
+    def value(self, number: Index) -> Floats:
+        """Values at nodes."""
+        return self.values[np.searchsorted(self.nodes, number)]
+
     def cases(self) -> Index:
         """Corners of the cells that are inside, as bits (K,)."""
-        inside = self.values[np.searchsorted(self.nodes, self.cells[:, None] + self.bits)] < 0
-        return np.asarray(inside @ (1 << np.arange(8)))
+        return np.asarray((self.value(self.cells[:, None] + self.bits) < 0) @ (1 << np.arange(8)))
 
     def _around(self) -> Index:
         """Numbers of the cells around edges that the surface crosses, also more than once."""
@@ -236,23 +236,18 @@ class Grid:
             found += [some - self.bits[i] for i in others]
         return np.concatenate(found)
 
-    def _unpinch(self) -> None:
-        """Take nodes out of the solid until no sheets of two neighbours cross the face between them twice."""
-        pinched, self.cells = sheets().pinched, np.sort(self.cells)
-        while True:
-            cases, taken = self.cases(), [self.cells[:0]]
-            for axis in range(3):
-                low = np.flatnonzero(pinched[cases, 2 * axis])
-                before = self.cells[low] - self.bits[1 << axis]
-                there = np.searchsorted(self.cells, before)
-                both = low[(self.cells[there] == before) & pinched[cases[there], 2 * axis + 1]]
-                corner = np.flatnonzero(_BITS[:, axis] == 0)
-                inside = cases[both, None] >> corner & 1
-                taken.append(self.cells[both] + self.bits[corner[inside.argmax(1)]])
-            some = np.concatenate(taken)
-            if not len(some):
-                return
-            self.values[np.searchsorted(self.nodes, some)] = TINY
+    def _pinched(self) -> Index:
+        """Nodes inside to take out, so that no sheets of two neighbours cross the face between them twice."""
+        pinched, cases, taken = sheets().pinched, self.cases(), [self.cells[:0]]
+        for axis in range(3):
+            low = np.flatnonzero(pinched[cases, 2 * axis])
+            before = self.cells[low] - self.bits[1 << axis]
+            there = np.searchsorted(self.cells, before)
+            both = low[(self.cells[there] == before) & pinched[cases[there], 2 * axis + 1]]
+            corner = np.flatnonzero(_BITS[:, axis] == 0)
+            inside = cases[both, None] >> corner & 1
+            taken.append(self.cells[both] + self.bits[corner[inside.argmax(1)]])
+        return np.concatenate(taken)
 
 
 def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMesh, dict[str, str]]:
@@ -272,7 +267,7 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     if not len(active):
         return empty, said
     cases, cells = cases[active], grid.cells[active]
-    first = np.concatenate([[0], np.cumsum(table.count[cases])])
+    first = np.concatenate([[0], np.cumsum(table.number[cases])])
     at, edge = np.nonzero(table.crossed[cases])  # cells, and edges of them that are crossed
     vertex = first[at] + table.sheet[cases[at], edge]
     a, b = (cells[at] + grid.bits[_ENDS[edge, end]] for end in (0, 1))
@@ -283,9 +278,9 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     a, b = (ends[order].reshape(-1, 4)[:, 0] for ends in (a, b))
     p, n = _crossings(grid, a, b)
     places = _places(quad, p, n, first[-1], side)
-    box = grid.points(np.repeat(cells, table.count[cases]))
+    box = grid.points(np.repeat(cells, table.number[cases]))
     places = np.clip(places, box, box + side)
-    rising = grid.values[np.searchsorted(grid.nodes, a)] < 0  # from inside to outside
+    rising = grid.value(a) < 0  # from inside to outside
     back = rising == (turns == 1)
     quad[back] = quad[back][:, ::-1]
     triangles = _cut(sampler, quad, places, side)
@@ -297,23 +292,16 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
-    sampler = grid.sampler
-    low, high = grid.points(a), grid.points(b)
-    f, g = (grid.values[np.searchsorted(grid.nodes, ends)] for ends in (a, b))
-    mixed = sampler.field.mixed  # a value jumps where a medium begins
-    for _ in range(HALVINGS if mixed else STEPS):
-        share = 0.5 if mixed else (f / (f - g))[:, None].clip(0.01, 0.99)
-        middle = low + share * (high - low)
-        value = sampler.at(middle)
-        same = (value < 0) == (f < 0)
-        f, g = np.where(same, value, f / 2), np.where(same, g / 2, value)  # of Illinois
-        low, high = np.where(same[:, None], middle, low), np.where(same[:, None], high, middle)
-    p = (low + high) / 2 if mixed else low + (f / (f - g))[:, None] * (high - low)
+    sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
+    ends, values = (grid.points(a).T, grid.points(b).T), [grid.value(end) for end in (a, b)]
+    steps = HALVINGS if mixed else STEPS
+    zero, _, beyond = zeros(lambda p: sampler.at(p.T), *ends, *values, steps, mixed)
+    p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
     if mixed:  # what ends where a medium begins ends as the medium's own distance says
         some = np.flatnonzero(met.distance < -0.05 * grid.side)
-        outside = np.where((f < 0)[:, None], high, low)[some]
+        outside = beyond.T[some]
         owner = np.asarray(sampler.meet(outside, Wanted.KIND, owners=True).owner, np.intp) - 1
         kept = owner >= 0
         n[some[kept]] = -sampler.field.normals(owner[kept], outside[kept].T.astype(np.float32)).T
@@ -324,7 +312,7 @@ def _summed(quad: Index, values: Floats, count: int) -> Floats:
     """Sums (V, …) at vertices of the values (E, …) of quads around them."""
     flat = values.reshape(len(values), -1)
     rows = [np.bincount(quad.ravel(), np.repeat(column, 4), count) for column in flat.T]
-    return np.stack(rows, 1).reshape(count, *values.shape[1:])
+    return np.stack(rows, 1).reshape(count, *values.shape[1:]).astype(np.float64)
 
 
 def _normals(quad: Index, n: Floats, count: int) -> Floats:

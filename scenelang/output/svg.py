@@ -24,21 +24,22 @@ from scenelang.drawing.how import How
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
+from scenelang.output.roots import zeros
 
 Floats = npt.NDArray[np.float64]
 
-MOST_NODES: Final = 2048  # of the grid that finds outlines, along the longer side of the canvas
-FINEST: Final = 1 / 16  # pixels between nodes, for small layers
+UNITS: Final = 256, 1024  # least and most of the longer side of a canvas: pixels, where they are as many
+FINEST: Final = 1 / 16  # units between nodes of the grid that finds outlines, for small layers; else a half
 BLOCK: Final = 8  # nodes along a side of blocks that are looked at first
 STEEP: Final = 1.1  # how much faster than exact ones learned distances change at most
-HALVINGS: Final = 14  # of the way between two nodes, to find an outline on it
+STEPS: Final = 5  # that find an outline between two nodes
 SHARP_DEG: Final = 25.0  # between normals of neighbours on an outline: a corner
-NEAR: Final = 0.05  # pixels that curves may lie off outlines, of a canvas of up to 1024 pixels
+NEAR: Final = 0.05  # units that curves may lie off outlines
 ROUND: Final = 2.0  # times as much: circles
-BEVEL: Final = 0.3  # pixels: shorter pieces between two corners are left out
-SMALL: Final = 0.1  # square pixels: smaller specks are left out
-BORDER: Final = 2.0  # pixels around the canvas where layers end
-FINER: Final = 2.0  # texels of a picture for a pixel
+BEVEL: Final = 0.3  # units: shorter pieces between two corners are left out
+SMALL: Final = 0.3  # square units: smaller specks are left out
+BORDER: Final = 2.0  # units around the canvas where layers end
+FINER: Final = 2.0  # texels of a picture for a unit
 MOST_TEXELS: Final = 1 << 22
 
 
@@ -110,14 +111,15 @@ def _seen(fold: Sequence[Operand]) -> Iterator[Layer]:
 
 
 class Shapes:
-    """Distances of folds of a Program, by its network or by formulas in its place, in pixels."""
+    """Distances of folds of a Program, by its network or by formulas, in units of the drawing."""
 
     def __init__(self, program: Program, exact: bool = False) -> None:
         from scenelang.drawing.closed import field_of
 
         self.program, self.network = program, field_of(program, exact)
-        width, height = program.canvas
-        self.unit, self.half = min(width, height) / 2, np.array([width / 2, height / 2])[:, None, None]
+        longer = max(program.canvas)
+        self.size = np.array(program.canvas) * (min(max(longer, UNITS[0]), UNITS[1]) / longer)
+        self.unit, self.half = float(self.size.min()) / 2, self.size[:, None, None] / 2
         self.brought, self.paints = program.brought(), program.paints()
         self.whole = self.field(range(len(program)), program.tokens)
 
@@ -137,7 +139,7 @@ class Shapes:
         return self.field(rows, np.concatenate(tokens))
 
     def ask(self, field: Field, p: Floats, half_px: float = 0.0) -> Floats:
-        """Distances (G, B) of a field at points (2, G, B), pixels; right within half a side around them."""
+        """Distances (G, B) of a field at points (2, G, B); right within half a side around them."""
         world = (p - self.half) / self.unit * [[[1.0]], [[-1.0]]]
         every = np.isinf(field.reach)
         low, high = field.frames.boxes(np.where(every, 0.0, field.reach))
@@ -153,7 +155,7 @@ class Shapes:
                 q = field.frames.local(xp, objects, points)
                 memory = field.fold(meetings, field.features(objects, q, np.ones(len(objects), bool)))
             result[:, meetings.columns] = memory[:, 0]
-        return result * (self.unit / field.unit)
+        return np.asarray(result * (self.unit / field.unit))
 
 
 class Region:
@@ -165,14 +167,17 @@ class Region:
         self.wins = [(shapes.fold(one), shapes.fold(other), floor) for one, other, floor in layer.wins]
         fields = [self.bound, *(field for one, other, _ in self.wins for field in (one, other))]
         self.steep = STEEP * max(float(field.frames.stretch.max()) for field in fields)
-        low, high = np.inf, -np.inf
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for operand in layer.shape:
             if operand.operator < SUBTRACT or operand is layer.shape[0]:
                 box = shapes.program.bounds[operand.rows.start : operand.rows.stop].astype(np.float64)
                 low, high = np.minimum(low, box[:, :2].min(0)), np.maximum(high, box[:, 2:].max(0))
-        half, size = shapes.half[:, 0, 0], np.array(shapes.program.canvas)
+        half = shapes.half[:, 0, 0]
         corners = np.array([[low[0], -high[1]], [high[0], -low[1]]]) * shapes.unit + half
-        self.low, self.high = corners.clip(-2 * BORDER, size + 2 * BORDER)
+        self.low, self.high = corners.clip(-2 * BORDER, shapes.size + 2 * BORDER)
+        shell = np.asarray(getattr(self.bound.parts, "shell", 0.0))  # how thick leaves are, 0 for whole ones
+        fine = np.where(shell > 0, np.minimum(shell / 2, 1 / 8), 1 / 8) * self.bound.frames.scale
+        self.step = float(np.clip(fine.min() * shapes.unit, FINEST, 0.5))
 
     def at(self, p: Floats, half_px: float = 0.0) -> Floats:
         """Values (G, B) at points (2, G, B)."""
@@ -182,12 +187,11 @@ class Region:
         for one, other, floor in self.wins:
             rest = shapes.ask(other, p, half_px)
             result = np.maximum(result, shapes.ask(one, p, half_px) - (rest.clip(0.0) if floor else rest))
-        return result
+        return np.asarray(result)
 
     def grid(self) -> tuple[Floats, Floats, float]:
         """Values (rows, columns) at nodes, the first of these (2,), and the way between two."""
-        size, most = self.high - self.low, max(self.shapes.program.canvas) / MOST_NODES
-        step = max(most, min(0.5, max(FINEST, float(size.max()) / 64)))
+        size, step = self.high - self.low, self.step
         columns, rows = (int(n) for n in np.ceil(size.clip(0.0) / (BLOCK * step)) + 1)
         first = self.low - step / 2
         place = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), 0).reshape(2, 1, -1) * BLOCK
@@ -216,11 +220,9 @@ class Region:
         ends = np.concatenate(loops)  # (n, 2): nodes inside and outside
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
         a, b = (first[:, None] + node * step for node in (inside, outside))
-        for _ in range(HALVINGS):
-            middle = (a + b) / 2
-            within = self._parts(middle[:, None])[0] < 0
-            a, b = np.where(within, middle, a), np.where(within, b, middle)
-        points, off = (a + b) / 2, 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
+        f, g = (grid[node[1], node[0]] for node in (inside, outside))
+        points, *_ = zeros(lambda p: self._parts(p[:, None])[0], a, b, f, g, STEPS)
+        off = 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
         around = self._parts(points[:, None] + off)
         normals = np.stack([around[0] - around[1], around[2] - around[3]])
         normals /= np.hypot(*normals).clip(1e-9)
@@ -239,9 +241,9 @@ _WAYS: Final = {
 def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
     """Closed outlines on a grid whose border is outside, as pairs of neighbours inside and outside (n, 2)."""
     rows, columns = inside.shape
-    flat, number = inside.ravel(), np.arange(rows * columns).reshape(rows, columns)
+    flat, number = inside.ravel().astype(np.intp), np.arange(rows * columns).reshape(rows, columns)
     corner = [number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]]
-    kind = sum(flat[nodes].astype(np.intp) << bit for bit, nodes in enumerate(corner))
+    kind = np.sum([flat[nodes] << bit for bit, nodes in enumerate(corner)], 0)
     # sides by their first node, those that go right before those that go down
     side = [corner[0], corner[1] + rows * columns, corner[3], corner[0] + rows * columns]
     after: dict[int, int] = {}
@@ -259,7 +261,7 @@ def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
         node = np.array(loop)
         down, node = np.divmod(node, rows * columns)
         ends = np.stack([node, node + np.where(down > 0, columns, 1)], 1)
-        result.append(np.where(flat[ends[:, :1]], ends, ends[:, ::-1]))
+        result.append(np.where(flat[ends[:, :1]] > 0, ends, ends[:, ::-1]))
     return result
 
 
@@ -284,7 +286,7 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
     sharp = np.flatnonzero((along * then).sum(1) < np.cos(np.radians(SHARP_DEG)))
     if not len(sharp):
         cuts = [len(p) * i // 4 for i in range(5)]
-        smooth = sum(np.roll(along, i, 0) for i in (-2, -1, 0, 1, 2))
+        smooth = np.sum([np.roll(along, i, 0) for i in (-2, -1, 0, 1, 2)], 0)
         parts = [np.arange(a, b + 1) % len(p) for a, b in pairwise(cuts)]
         return [(p[part], smooth[part] / np.hypot(*smooth[part].T)[:, None]) for part in parts]
     places = _meet(p[sharp], along[sharp], ahead[sharp], then[sharp], most)
@@ -307,7 +309,7 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
     return result
 
 
-def fitted(p: Floats, along: Floats, near: float) -> list[Floats]:
+def fitted(p: Floats, along: Floats) -> list[Floats]:
     """Lines (1, 2) and cubics (3, 2), each by the points behind its first, that pass points (n, 2).
 
     The directions (n, 2) at the ends of curves are kept.
@@ -315,7 +317,7 @@ def fitted(p: Floats, along: Floats, near: float) -> list[Floats]:
     chord = p[-1] - p[0]
     length = float(np.hypot(*chord))
     off = abs(chord[0] * (p - p[0])[:, 1] - chord[1] * (p - p[0])[:, 0])
-    if len(p) == 2 or (length > 0 and off.max() < near * length):
+    if len(p) == 2 or (length > 0 and off.max() < NEAR * length):
         return [p[-1:]]
     start, end = along[0], -along[-1]
     step = np.hypot(*np.diff(p, axis=0).T)
@@ -334,9 +336,9 @@ def fitted(p: Floats, along: Floats, near: float) -> list[Floats]:
         q = np.stack([p[0], p[0] + sizes[0] * start, p[-1] + sizes[1] * end, p[-1]])
         there = b.T @ q
         error = np.hypot(*(there - p).T)
-        if error.max() < near:
+        if error.max() < NEAR:
             return [q[1:]]
-        if turn == 4 or error.max() > 40 * near:
+        if turn == 4 or error.max() > 40 * NEAR:
             break
         d1, d2 = 3 * np.diff(q, axis=0), 6 * np.diff(q, 2, axis=0)
         slope = np.stack([v**2, 2 * u * v, u**2]).T @ d1
@@ -347,7 +349,7 @@ def fitted(p: Floats, along: Floats, near: float) -> list[Floats]:
     middle = along[max(1, cut - 2) : min(len(p) - 1, cut + 3)].sum(0)
     along = along.copy()
     along[cut] = middle / max(float(np.hypot(*middle)), 1e-9)
-    return fitted(p[: cut + 1], along[: cut + 1], near) + fitted(p[cut:], along[cut:], near)
+    return fitted(p[: cut + 1], along[: cut + 1]) + fitted(p[cut:], along[cut:])
 
 
 def _number(value: float) -> str:
@@ -364,19 +366,19 @@ def _joined(numbers: Sequence[float]) -> str:
     return result
 
 
-def path_of(points: Floats, normals: Floats, near: float) -> str:
-    """A closed outline as path data: a circle, or lines and cubics, relative and in hundredths of pixels."""
+def path_of(points: Floats, normals: Floats) -> str:
+    """A closed outline as path data: a circle, or lines and cubics, relative and in hundredths of units."""
     p = points.T
     middle = p.mean(0)
     a = np.concatenate([2 * (p - middle), np.ones((len(p), 1))], 1)
     x, y, rest = np.linalg.lstsq(a, ((p - middle) ** 2).sum(1), rcond=None)[0]
     radius = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
-    if abs(np.hypot(*(p - middle - [x, y]).T) - radius).max() < ROUND * near:
+    if abs(np.hypot(*(p - middle - [x, y]).T) - radius).max() < ROUND * NEAR:
         r, d = _number(radius), _number(2 * radius)
         first = _joined([middle[0] + x - radius, middle[1] + y])
         way = int(((p - np.roll(p, 1, 0))[:, 0] * (p + np.roll(p, 1, 0))[:, 1]).sum() < 0)
         return f"M{first}a{r} {r} 0 1 {way} {d} 0a{r} {r} 0 1 {way}-{d} 0z"
-    parts = [curve for piece in _pieces(points, normals) for curve in fitted(*piece, near)]
+    parts = [curve for piece in _pieces(points, normals) for curve in fitted(*piece)]
     at = np.round(parts[-1][-1], 2)
     result, last = f"M{_joined(at)}", ""
     for number, curve in enumerate(parts):
@@ -431,7 +433,7 @@ class Inks:
         return f"url(#{name})"
 
     def _local(self, row: int, p: Floats) -> Floats:
-        """Leaf coordinates (2, M) of a row at points (2, M), pixels."""
+        """Leaf coordinates (2, M) of a row at points (2, M)."""
         shapes, field = self.shapes, self.shapes.whole
         world = (p[:, None] - shapes.half) / shapes.unit * [[[1.0]], [[-1.0]]]
         q = field.frames.local(field.xp, np.full(p.shape[1], row), world.astype(np.float32))
@@ -439,7 +441,7 @@ class Inks:
 
     def _gradient(self, row: int, name: str, stops: Sequence[tuple[float, ...]]) -> str | None:
         """A gradient; None where its lines are bent."""
-        size = np.array(self.shapes.program.canvas, np.float64)
+        size = self.shapes.size
         q = self._local(row, np.array([[0, 1, 0, 1, 0.5], [0, 0, 1, 1, 0.5]]) * size[:, None])
         if (
             abs(q[:, 1] + q[:, 2] - q[:, 0] - q[:, 3]).max() + abs(q[:, 0] + q[:, 3] - 2 * q[:, 4]).max()
@@ -458,14 +460,14 @@ class Inks:
         offsets = np.array([stop[0] for stop in stops])
         shown = np.array([stop[1:] for stop in stops], np.float32).T
         if any(step[0] == "hue" for step in texture.steps):  # which bends the way from colour to colour
-            more = np.linspace(0, 1, 65)
+            more = np.linspace(0, 1, 17)
             shown = np.concatenate([shown, [np.interp(more, offsets, channel) for channel in shown]], 1)
             offsets = np.concatenate([offsets, more])
             order = np.argsort(offsets, kind="stable")
             offsets, shown = offsets[order], shown[:, order].astype(np.float32)
         shown = stepped(self.shapes.whole.xp, shown, texture.steps)
         listed = "".join(
-            f'<stop offset="{_number(at)}" stop-color="{_hex(rgb)}"/>'
+            f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>'
             for at, rgb in zip(offsets, shown.T, strict=True)
         )
         ends = 'x1="-1" x2="1"' if name == "linear" else 'cx="0" cy="0" r="1"'
@@ -476,8 +478,8 @@ class Inks:
         """A pattern of one picture, which a texture shows within a region."""
         from PIL import Image
 
-        size = np.array(self.shapes.program.canvas)
-        low, high = np.floor(region.low).clip(0, size - 1), np.ceil(region.high).clip(1, size)
+        low = np.floor(region.low.clip(0, self.shapes.size - 1))
+        high = np.ceil(region.high.clip(low + 1, self.shapes.size))
         finer = min(FINER, max(1.0, (MOST_TEXELS / np.prod(high - low)) ** 0.5))
         wide, tall = np.maximum(1, np.rint((high - low) * finer)).astype(int).tolist()
         across = low[0] + (np.arange(wide) + 0.5) * (high - low)[0] / wide
@@ -499,12 +501,11 @@ def svg_of(program: Program, how: How) -> tuple[str, bool]:
     `RenderError` where there are no outlines.
     """
     shapes = Shapes(program, how.backend == "exact")
-    inks, (width, height) = Inks(shapes), program.canvas
-    near = NEAR * max(1.0, max(program.canvas) / (MOST_NODES / 2))
-    body = []
+    inks, (width, height), body = Inks(shapes), program.canvas, []
+    across, down = (f"{side:g}" for side in shapes.size)
     if program.background is not None:
         fill = _hex(program.background)
-        body.append(f'<rect width="{width}" height="{height}" fill="{fill}"/>')
+        body.append(f'<rect width="{across}" height="{down}" fill="{fill}"/>')
     layers = layers_of(operands(program.tokens), inks.looks)
     for layer in layers:
         region = Region(shapes, layer)
@@ -512,13 +513,13 @@ def svg_of(program: Program, how: How) -> tuple[str, bool]:
         for points, normals in region.outlines():
             x, y = points
             if abs((x * np.roll(y, 1) - y * np.roll(x, 1)).sum()) / 2 > SMALL:
-                data += path_of(points, normals, near)
+                data += path_of(points, normals)
         if data:
             body.append(f'<path d="{data}" {inks.of(region)}/>')
     if inks.defined:
         defined = "\n".join(made.replace("%s", name, 1) for made, name in inks.defined.items())
         body.insert(0, f"<defs>\n{defined}\n</defs>")
-    size = f'width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+    size = f'width="{width}" height="{height}" viewBox="0 0 {across} {down}"'
     linked = (
         ' xmlns:xlink="http://www.w3.org/1999/xlink"'
         if any("<image" in made for made in inks.defined)

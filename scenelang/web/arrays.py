@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.curves import curves_of
 from scenelang.assets.element import Element
 from scenelang.assets.gradient import Gradient
 from scenelang.assets.picture import texels
@@ -28,12 +29,13 @@ from scenelang.compiler.lifting import LAYOUTS, Layout
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.neural.frames import Frames, read_skins
+from scenelang.drawing.neural.outlines import table_of
 from scenelang.drawing.solid.passes import read_solid_frame
 
 MODULES: Final = (
     *("store", "gl", "grids", "groups", "ways", "plane"),
     *("values", "functions", "maps", "looks", "chain", "graph", "stage"),
-    *("eye", "expressions", "evaluate"),
+    *("eye", "letters", "expressions", "evaluate"),
     *("elements", "balls", "solid"),
     *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
 )
@@ -89,6 +91,9 @@ def packed(data: bytes) -> str:
     return base64.b64encode(zlib.compress(data, 9)).decode()
 
 
+OUTLINE_SIDES = 12, 24  # the last is `SIDE` in plane.glsl
+
+
 def shapes_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
     """Entries of a view's ``shapes`` for the geometries among elements; raises `ProgramError`."""
     shapes = (element for element in elements if isinstance(element, Element) and not element.material)
@@ -107,6 +112,17 @@ def paints_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict
 
 
 def _shape(element: Element, store: Store) -> dict[str, Any]:
+    if element.form == "outline":
+        table, curves = table_of(element, OUTLINE_SIDES), curves_of(element)
+        wide, high = (float(side) for side in abs(curves).max((0, 1)))
+        return {
+            "name": element.name,
+            "kind": "outline",
+            "dimension": 2,
+            "cells": store.add(np.concatenate([table.first, table.near]).astype(np.int32)),
+            "pieces": store.add(np.ascontiguousarray(table.pieces.T).reshape(-1)),
+            "bounds": (wide, high, 1.0),
+        }
     return {
         "name": element.name,
         "kind": "grid",

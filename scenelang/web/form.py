@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Final, TypeVar
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
+from scenelang.assets.font import name_of
 from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
@@ -27,6 +29,7 @@ from scenelang.language.evaluation import Evaluation
 from scenelang.language.expressions import prepare
 from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
+from scenelang.language.scopes import find, head_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
 from scenelang.language.words import (
@@ -34,7 +37,7 @@ from scenelang.language.words import (
     FUNCTIONS,
     GRADIENTS,
     LANGUAGE,
-    NEWER,
+    LETTERS,
     OPERATIONS,
     SETTINGS,
     SOLID_TRANSFORMS,
@@ -65,10 +68,7 @@ class Scope:
     def find(self, name: str) -> Bound | None:
         """The binding of a name, qualified or not."""
         alias, dot, rest = name.partition(".")
-        scope: Scope | None = self
-        while scope is not None and alias not in scope.names:
-            scope = scope.parent
-        result = None if scope is None else scope.names[alias]
+        result = find(self, alias)
         return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
@@ -105,9 +105,6 @@ def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[n
     return [bound.get(name) for name in params]
 
 
-_VALUES: Final = ("let", "param", "argument", "loop")
-
-
 class Lacking(Exception):
     """Raised where the page's model lacks a material or an element; the message names it."""
 
@@ -131,6 +128,9 @@ class Writer:
         self.textures = load_textures()
         self.shapes = [e for e in listed if isinstance(e, Element) and not e.material]
         self.paints: list[Element | Gradient] = [element for element in listed if element.material]
+        self.fonts: list[str] = []  # files whose letters are set
+        self.written = {chr(int(e.name[1:], 16)) for e in self.shapes if e.form == "outline"}
+        """Characters of all strings."""
 
     def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
         """A block in a scope of its own."""
@@ -155,12 +155,13 @@ class Writer:
                 if (imported_tree := context.loader.parsed.get(brought.path)) is not None:
                     lines += self.file(brought, imported_tree, inside, imported=True)
                     continue
+                known = context.session.elements[brought.path].name
                 for name, binding in brought.scope.names.items():
                     inside.names[name] = bound = Bound(binding.kind, inside, file=brought)
-                    if binding.kind == "element":
-                        bound.element = binding.value
-                    else:
+                    if binding.kind == "let":
                         bound.number = binding.value
+                    else:
+                        bound.element = binding.value if binding.kind == "element" else known
             elif isinstance(stmt, nodes.Let | nodes.Param):
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
@@ -265,6 +266,7 @@ class Writer:
             case nodes.Bool():
                 return expr.value
             case nodes.String():
+                self.written |= {*expr.value}
                 return ["'", expr.value]
             case nodes.Color():
                 return ["#", *(round(255 * part) for part in expr.rgb)]
@@ -298,6 +300,8 @@ class Writer:
                 return ["?", *self.given((expr.condition, expr.then, expr.otherwise), scope)]
             case nodes.CallExpr():
                 name, bound = expr.name.text, scope.find(expr.name.text)
+                if bound is not None and bound.kind == "width":
+                    return ["width", self._font(bound), *self._text("width", expr.args, scope)]
                 if bound is not None:
                     return ["call", *self.call(bound, expr.args, scope)]
                 word = FUNCTIONS[name]
@@ -390,24 +394,24 @@ class Writer:
     def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
         name = stmt.name.text
         bound = None if name in LANGUAGE else scope.find(name)
-        worn = bound is not None and bound.kind in _VALUES and stmt.args is None
-        hidden = worn or (bound is not None and bound.kind == "module")
-        if name in SETTINGS and not hidden:
+        head = head_of(stmt, bound, kind)
+        if head == "setting":
             args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
             if name in STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             word = (name,) if name == "animate" else ("set", name)
             return None if name == "canvas" else [*word, *args]
-        moves = name in LANGUAGE or (name in NEWER and name not in SETTINGS)
-        if moves and (kind == "material" or not hidden):
+        if head == "move":
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
-        if bound is None:
+        if bound is None or head == "leaf":
             if name not in self.manifest.geometries:
                 return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
             return ["object", self.manifest.geometries.index(name), body or []]
         if bound.kind == "module":
             return ["module", *self.call(bound, stmt.args or (), scope), body or []]
+        if bound.kind == "text":
+            return ["text", self._font(bound), self._text("text", stmt.args, scope), body or []]
         if bound.element:
             return self._brought(stmt, bound.element, body or [])
         ops = [] if stmt.body is None else self.block(stmt.body, scope, "material")
@@ -435,6 +439,34 @@ class Writer:
             return ["parts", [self._part(part) for part in objects_of(zoo, alias, name)], body]
         except Lacking as lacking:
             return ["no", str(lacking)]
+
+    def _font(self, bound: Bound) -> int:
+        """The index of a file among the fonts."""
+        if bound.element not in self.fonts:
+            self.fonts.append(bound.element)
+        return self.fonts.index(bound.element)
+
+    def _text(self, word: str, args: Sequence[nodes.Argument] | None, scope: Scope) -> list[Json]:
+        """Arguments of a line of letters."""
+        given = bind(LETTERS[word].params, args)
+        aligned = [one for one in given[2:] if isinstance(one, nodes.String)]  # which is no text
+        result = self.given(given[: 3 - len(aligned)], scope)
+        return [*result, *(["'", one.value] for one in aligned)]
+
+    def font(self, file: str) -> Json:
+        """Letters of a font that strings of the scene have, and their kerning."""
+        zoo = self.files[file]
+        assert zoo is not None
+        assert zoo.font is not None
+        font, letters, pairs = zoo.font, {}, {}
+        for letter in sorted(self.written & font.letters.keys()):
+            advance, x, y, radius = font.metrics[font.letters[letter]]
+            called = name_of(letter)
+            shape = self._shape(f"{file}.{called}") if called in font.glyphs else -1
+            letters[letter] = [shape, *map(plain, (advance, x, y, radius))]
+        for one in letters:
+            pairs |= {one + other: kern for other in letters if (kern := font.kerning(one, other))}
+        return {"letters": letters, "pairs": pairs}
 
     def _shape(self, called: str) -> int:
         element = self.brought.geometries[called]
@@ -496,6 +528,9 @@ def form_of(
         for word, uses in writer.lengths.items():
             reached = writer.reached(uses)
             reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
+    fonts: list[Json] = []
+    with suppress(Lacking):  # of a solid scene, which was refused
+        fonts += [writer.font(file) for file in writer.fonts]
     data = {
         "model": manifest.name,
         "dimension": manifest.dimension,
@@ -510,6 +545,7 @@ def form_of(
         "spatial": [int(paint.dimension == 3) for paint in writer.paints],
         "graded": [int(isinstance(paint, Gradient)) for paint in writer.paints],
         "blends": manifest.any_blend,
+        "fonts": fonts,
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
     shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]

@@ -128,6 +128,7 @@ def vector(o: Object, net: SolidNetwork) -> np.ndarray:
         width=o.k,
         texture=np.linalg.inv(np.vstack([rows, (0, 0, 1)]))[:2].ravel(),
         rgb=o.rgb,
+        clear=0.0,
         material=net.xp.to_numpy(net.material_codes)[MATERIALS.index(o.material)],
         grow=grow,
         shell=shell,

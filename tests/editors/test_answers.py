@@ -106,8 +106,8 @@ def test_completion_goes_by_the_block(client: Client, uri: str) -> None:
         ("group {\n  ", "square star ring lib translate let for", ""),
         ("\nsquare { ", "translate rotate twirl material", "square canvas color"),
         ("subtract ", "square ring group", "canvas"),
-        ("flat { ", "color hue grayscale flip", "twirl square"),
-        ("\nmod", "module canvas animate square", "translate"),
+        ("flat { ", "color hue grayscale flip opacity", "twirl square samples"),
+        ("\nmod", "module canvas animate samples square", "translate opacity"),
     ):
         found = set(labels(client, client.at(uri, before, len(before))))
         assert set(offered.split()) <= found, before
@@ -124,7 +124,8 @@ def test_completion_of_arguments_members_paths_models_and_units(client: Client, 
     assert not {"ring", "n ="} & set(found)
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
-    assert labels(client, client.at(uri, 'import "" as', 8)) == ["std/meshes", "std/shapes", "lib.nsg"]
+    files = ["std/letters", "std/meshes", "std/shapes", "lib.nsg"]
+    assert labels(client, client.at(uri, 'import "" as', 8)) == files
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
     client.replace(uri, 'model "shapes2d";\nsquare { material flat; }\n// squ\nlet \n/* sc */\n')
@@ -193,6 +194,10 @@ def test_hover_tells_words_models_and_the_stage_unless_a_module_hides_it(client:
         *[("smooth", 1, ["blend"]), ("k = 0.2", 0, ["width"])],
     ]
     says(client, uri, rows)
+    client.replace(uri, "samples(16);\nsquare { material flat { opacity(0.5); } }\n")
+    says(client, uri, [("samples", 1, ["4 or 16"]), ("opacity", 1, ["behind an object"])])
+    client.replace(uri, "module opacity(a) { square { scale(a); } }\nopacity(0.5);\n")
+    says(client, uri, [("opacity(0.5)", 1, ["module opacity(a)"])])
     client.replace(uri, "module light(power) { sphere; }\nlight(3);\n")
     says(client, uri, [("light(3)", 1, ["module light(power)"])])
 
@@ -261,6 +266,19 @@ def test_references_and_highlights_mean_the_same_name(client: Client, uri: str, 
     client.close(library)
     marks = client.request("textDocument/documentHighlight", client.at(uri, "(k)", 1))
     assert sorted(mark["kind"] for mark in marks) == [2, 2, 3]
+
+
+def test_a_font_brings_text_and_width(client: Client, folder: Path) -> None:
+    text = 'import "std/letters" as abc;\nlet w = abc.width("A");\nabc.text("A", size = w);\n'
+    text += "square { scale(abc.); }\nabc.;\n"
+    uri = client.open((folder / "letters.nsg").as_uri(), text)
+    assert labels(client, client.at(uri, "abc.);", 4)) == ["width"]
+    assert labels(client, client.at(uri, "abc.;", 4)) == ["text"]
+    says(client, uri, [("text", 1, ['text("Ag", size = 1, align = "left")', "letters", "Open Font License"])])
+    says(client, uri, [("width", 1, ['width("Ag", size = 1)', "in world units"])])
+    found = client.request("textDocument/signatureHelp", client.at(uri, "size = w", 7))
+    assert found["signatures"][0]["label"] == 'text("Ag", size = 1, align = "left")'
+    client.close(uri)
 
 
 def test_the_library_that_ships_is_read_and_never_changed(client: Client, folder: Path) -> None:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsprotocol import types
 
+import scenelang as nsg
 from scenelang.editors.context import cursor_at
 from scenelang.editors.workspace import Encoding, Lines, Workspace, difference
 from scenelang.language import expressions, tree
@@ -95,10 +96,25 @@ def test_a_text_that_is_typed_reads_as_if_it_were_new(edits: list[tuple[int, int
         diagnostics = Diagnostics()
         file = parse(document.source, diagnostics)
         assert document.syntax == tuple(diagnostics)
-        assert document.names_at(at).top.symbols.keys() == Names(file).top.symbols.keys()
+        assert document.names_at(at).top.names.keys() == Names(file).top.names.keys()
         seen, known = document.names_at(at).visible(at), Names(file).visible(at)
         assert [(s.name, s.span) for s in seen] == [(s.name, s.span) for s in known]
         assert document.file == file
+
+
+def test_inside_a_module_named_like_a_leaf_the_bare_name_is_the_leaf() -> None:
+    text = "module star(k) { star { scale(k); } if (k > 1) { star(1); } } star(2); star { }"
+    scene = nsg.loads(
+        "module star(k = 2) { star { scale(k); } if (k > 1) { star(1); } } star(3) { } star { }"
+    )
+    assert [[child.transforms[0].x for child in node.children] for node in scene.nodes] == [[3, 1], [2, 1]]
+    names = Names(parse(SourceFile("", text), Diagnostics()))
+    stars = [use for use in names.uses if use.text == "star"]
+    assert [use.role if use.symbol is None else "module" for use in stars] == [
+        "module",
+        "geometry",
+        *["module"] * 3,
+    ]
 
 
 BLOCKS = [

@@ -15,8 +15,10 @@ from scenelang.assets.font import Font, FontError
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.mesh import FitError
+from scenelang.drawing.exact.outline import drawn
 from scenelang.drawing.neural.outlines import OutlineShapes
 from scenelang.inverse.fonts import ranges_of, read_font
+from scenelang.language import library
 from tests.assets.shapes import ball, element
 
 pytest.importorskip("uharfbuzz")
@@ -194,3 +196,20 @@ def test_names_of_a_font_are_its_own(name: str) -> None:
     font = read_font(made(True), {}).font
     with pytest.raises(TensorError, match="beside a font"):
         read_zoo(element_file_bytes([element(ball, name, d=2, levels=2)], font=font))
+
+
+def test_texts_of_drawings_are_set_in_the_font_that_ships() -> None:
+    pytest.importorskip("svgelements")
+    text = """<svg xmlns="http://www.w3.org/2000/svg"><text x="50" y="20" font-size="10" text-anchor="middle"
+        font-family="Arial, sans-serif" transform="translate(5 0)">il</text>
+        <text font-family="Times">x</text><text>\u6f22</text></svg>"""
+    layers, notes = drawn(text.encode())
+    assert notes[1] == "text left out: `times` is not at hand"
+    assert notes[2] == "text left out: the font has no `\u6f22` (U+6F22)"
+    low, high = layers[0].box()
+    font = load_element_file(library.find("std/letters") or "").font
+    assert font is not None
+    width = 10 * font.line("il")[1]
+    assert 55 - width / 2 < low[0] < 55 < high[0] < 55 + width / 2
+    assert low[1] == pytest.approx(-20, abs=0.1)  # y up: the baseline
+    assert high[1] == pytest.approx(-20 + 7.4, abs=0.4)

@@ -27,6 +27,8 @@ def test_short_forms() -> None:
         (nsg.Shear("yx", 0.5), nsg.Shear(axes="yx", k=0.5)),
         (nsg.Twirl(1), nsg.Twirl(k=1)),
         (nsg.Displace(0.1, 8), nsg.Displace(amount=0.1, frequency=8)),
+        (nsg.Grow(0.1), nsg.Grow(r=0.1)),
+        (nsg.Shell(0.1), nsg.Shell(w=0.1)),
         (nsg.Hue.degrees(180), nsg.Hue(angle=math.pi)),
         (nsg.Color("#f80"), nsg.Color(rgb=(1, 136 / 255, 0))),
         (nsg.Color((1, 0, 0)), nsg.Color.hex("#ff0000")),

@@ -132,6 +132,8 @@ TRANSFORMS = {
     "twirl(-1);": nsg.Twirl(k=-1),
     "twist(2);": nsg.Twist(k=2),
     "displace(0.1, frequency = 5);": nsg.Displace(amount=0.1, frequency=5),
+    "grow(-0.5);": nsg.Grow(r=-0.5),
+    "shell(w = 1);": nsg.Shell(w=1),
     "matrix([[1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 1, 4], [0, 0, 0, 1]]);": nsg.Matrix(
         rows=((1, 0, 0, 2), (0, 1, 0, 3), (0, 0, 1, 4), (0, 0, 0, 1))
     ),

@@ -224,7 +224,7 @@ def test_reserved_names_and_the_users_own_files(tmp_path: Path) -> None:
     assert codes("std/shapes", "s.sides_of(0.3)") == []
     assert codes("std/shapes.nsg", "s.mine") == codes("./std/shapes", "s.mine") == []
     assert codes("std/mine", "s.mine") == [
-        ("E0214", "it has std/meshes, std/shapes; a file of your own is `./std/mine`")
+        ("E0214", "it has std/letters, std/meshes, std/shapes; a file of your own is `./std/mine`")
     ]
     assert [code for code, _ in codes("std/../std/shapes", "s.mine")] == []
     (tmp_path / "std" / "shapes.nsg").unlink()

@@ -74,9 +74,9 @@ def test_sheets_are_cycles_over_the_faces() -> None:
     for case in range(256):
         cut = {e for e, (a, b) in enumerate(ENDS) if (case >> a ^ case >> b) & 1}
         assert set(np.flatnonzero(table.crossed[case])) == cut
-        assert table.count[case] <= len(cut) / 3
-    assert table.count[0b01101001] == 4  # four corners apart
-    assert table.count[0b10000001] == 2
+        assert table.number[case] <= len(cut) / 3
+    assert table.number[0b01101001] == 4  # four corners apart
+    assert table.number[0b10000001] == 2
 
 
 def test_colours_and_files(tmp_path: Path) -> None:

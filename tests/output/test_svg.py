@@ -153,4 +153,4 @@ def test_the_command_writes_one_frame(tmp_path: Path) -> None:
     refused = CliRunner().invoke(cli, call)
     assert (refused.exit_code, "E0550" in refused.output) == (1, True)
     assert CliRunner().invoke(cli, [*call, "--frame", "2", "--size", "100x50"]).exit_code == 0
-    assert 'viewBox="0 0 100 50"' in (tmp_path / "a.svg").read_text()
+    assert 'width="100" height="50" viewBox="0 0 256 128"' in (tmp_path / "a.svg").read_text()

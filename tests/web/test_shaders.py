@@ -272,6 +272,23 @@ def test_pyramids_unfold_as_elements_do(page: Any) -> None:
         np.testing.assert_allclose(found, unpacked(shape).ravel(), atol=2e-6)
 
 
+LETTERS = """import "std/letters" as abc; canvas(160, 120); background(#fed);
+    abc.text("Twirl, ßΩ→", size = 0.4, align = "center") { twirl(0.7); translate(0, 0.5); }
+    chain { square { scale(0.6); translate(0, -0.4); material flat { color(#148); } }
+      subtract abc.text("ga@", size = 0.6, align = "right") { translate(0.4, -0.4); }
+      smooth abc.text("i", size = 0.5) { translate(0.3, -0.6); material flat { color(#c40); } } }"""
+
+
+@pytest.mark.browser
+def test_letters_of_the_page_are_those_of_the_field(page: Any) -> None:
+    program = nsg.compile(nsg.loads(LETTERS))
+    p = np.random.default_rng(4).uniform(-1.3, 1.3, (2000, 2))
+    off = abs(answered(page, program, p)[:, 0] - asked(program, p)[:, 0])
+    assert np.quantile(off, 0.99) < 1e-4  # coarser lists may name another piece, where both are far
+    assert off.max() < 3e-3
+    assert compared(page, program) > LEAST_DB[2]
+
+
 # ---------------------------------------------------------------- solids
 
 CORNERS = {

@@ -203,7 +203,9 @@ def _shape(
         raise click.UsageError(f"`{out}` is one file, and holds one scene.")
     if how.backend == "reference":
         raise click.UsageError("--backend reference draws pictures; shapes are those of the model's field.")
-    (path,) = targets(files, out)
+    path = Path(out)
+    if not path.parent.is_dir():
+        raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
     clock, first, result = Clock(), None, Diagnostics()
     if not files[0].endswith(PROGRAM):
         try:

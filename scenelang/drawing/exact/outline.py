@@ -24,8 +24,11 @@ from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, fea
 
 from scenelang.assets.curves import curves_of
 from scenelang.assets.element import TEXELS, Element, Painted
+from scenelang.assets.element_file import load_element_file
+from scenelang.assets.font import FontError
 from scenelang.assets.picture import frame_of, painted, texels
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
+from scenelang.language import library
 from scenelang.language.diagnostics import plural
 
 MOST_OF_PICTURE: Final = dict.fromkeys((".png", ".jpg", ".jpeg"), 32 << 20)  # bytes of a file
@@ -381,9 +384,18 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
         notes = _simplified(root, svgelements)
         simple = io.BytesIO(ElementTree.tostring(root))
         parsed = [*svgelements.SVG.parse(simple, reify=True).elements()]
-        shapes = [e for e in parsed if isinstance(e, svgelements.Shape)]
-        others = {type(e).__name__.lower() for e in parsed} & {"text", "image"}
-        layers = [layer for shape in shapes for layer in _layers(shape, svgelements)]
+        others = {type(e).__name__.lower() for e in parsed} & {"image"}
+        layers, left_out, edges = list[Layer](), dict[str, None](), 0
+        for element in parsed:
+            if isinstance(element, svgelements.Shape):
+                layers += _layers(element, svgelements)
+            elif isinstance(element, svgelements.Text):
+                own = [*_written(element, left_out)]
+                edges += sum(len(layer.edges) for layer in own)
+                if edges > MOST_EDGES:
+                    raise FitError(f"texts of more than {MOST_EDGES:,} edges")
+                layers += own
+        notes += [f"text left out: {said}" for said in left_out]
     except (FitError, MemoryError):
         raise
     except Exception as error:
@@ -520,6 +532,50 @@ def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
     width = float(shape.stroke_width or 0.0)
     if (color := _seen(shape.stroke, shape)) is not None and width > 0:
         yield Layer(edges, None, width / 2, color)
+
+
+_SANS: Final = frozenset(("sans-serif", "system-ui", "ui-sans-serif", "inter", "arial", "helvetica"))
+_MOST_WRITTEN: Final = 300  # letters of a text
+_OF_LETTERS: Final = 16  # edges of a curve of a letter
+
+
+def _written(text: Any, left_out: dict[str, None]) -> Iterator[Layer]:
+    """The layer of a text of a drawing, in the font that ships; why there is none goes into ``left_out``."""
+    words = " ".join((text.text or "").split())
+    color = _seen(text.fill, text)
+    if not words or color is None or text.values.get("visibility") in ("hidden", "collapse"):
+        return
+    families = [name.strip(" '\"").lower() for name in (text.font_family or "sans-serif").split(",")]
+    if not _SANS & {*families}:
+        left_out[f"`{families[0][:40]}` is not at hand"] = None
+        return
+    if len(words) > _MOST_WRITTEN:
+        left_out[f"more than {_MOST_WRITTEN:,} letters"] = None
+        return
+    if text.values.get("tag") == "tspan" and "x" not in text.values.get("attributes", text.values):
+        left_out["a tspan without a place"] = None
+        return
+    place = library.find("std/letters")
+    font = load_element_file(place).font if place else None
+    assert font is not None
+    try:
+        line, width = font.line(words)
+    except FontError as error:
+        left_out[str(error)] = None
+        return
+    size, m = float(text.font_size), text.transform
+    left = width * {"middle": 0.5, "end": 1.0}.get(text.anchor, 0.0)
+    edges = []
+    for name, x, y, radius in line:
+        a, b, c = (radius * curves_of(font.glyphs[name])[:, :, None] + (x - left, y)).swapaxes(0, 1)
+        t = np.linspace(0, 1, _OF_LETTERS + 1)[:, None]
+        points = size * ((1 - t) ** 2 * a + 2 * t * (1 - t) * b + t**2 * c) * (1.0, -1.0)
+        points += (float(text.x) + float(text.dx or 0), float(text.y) + float(text.dy or 0))
+        points = points @ np.array([[m.a, m.b], [m.c, m.d]]) + (m.e, m.f)
+        edges.append(np.stack([points[:, :-1], points[:, 1:]], 2).reshape(-1, 2, 2) * (1.0, -1.0))
+    if edges:
+        joined = np.concatenate(edges)
+        yield Layer(joined, winding(joined, odd=False), color=color)
 
 
 def _ends(segment: Any, svg: Any) -> list[tuple[float, float]]:

@@ -17,10 +17,19 @@ from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, texture_of
-from scenelang.drawing.neural.frames import FAR, Frames, read_skins
+from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
+from scenelang.drawing.neural.frames import FAR, Frames, Skins, read_skins
 from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
-from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, Floats, FramedNetwork, Slopes
+from scenelang.drawing.neural.network import (
+    EMPTY,
+    EXTENT,
+    RADIUS,
+    Cell,
+    Decoder,
+    Floats,
+    FramedNetwork,
+    Slopes,
+)
 from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
@@ -101,6 +110,7 @@ class Field:
         cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
         self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
         self.skins = read_skins(self.parts)
+        self.skinned = np.zeros(len(vectors), bool) if self.skins is None else np.any(self.skins[:3], axis=0)
         self.opacity = np.where(self.draws, 1.0 - self.parts.clear, 1.0).clip(0.0, 1.0).astype(np.float32)
         self.clear = bool((self.opacity < 1.0).any())
         self.register = 4 if self.clear else 3
@@ -125,6 +135,14 @@ class Field:
         ]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
+        self.levels: list[tuple[int, Lattice, float, float]] = []
+        """Corrections of leaves with skins: the leaf's index, how fast they change, and how much at most."""
+        known = {} if self.skins is None else network.levels()
+        for at, code in enumerate(codes):
+            if (grid := known.get(code.tobytes())) is not None:
+                steep = np.hypot(*(abs(np.diff(grid, axis=axis)).max() for axis in (0, 1)))
+                lattice = Lattice(xp, xp.array(grid.reshape(-1), self.like), len(grid), 2)
+                self.levels.append((at, lattice, steep * (len(grid) - 1) / 2 / EXTENT, float(np.ptp(grid))))
         grown = {self.brought[i] for i in more}
         elements = dict.fromkeys(element for element in self.brought if element is not None)
         if elements and network.config.features != 1:
@@ -262,10 +280,22 @@ class Field:
                 xp.put(feature, xp.array(index, q), values)
         assert result is not None
         if self.skins is not None:
-            result = self.skins.at(objects).placed(xp, q).put_on(xp, result)
+            result = self._skinned(self.skins, objects, q, result)
         scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
         result = result.swapaxes(0, 1) * scale
         return result.clip(-FAR, FAR) if self.frames.wild[objects].any() else result
+
+    def _skinned(self, skins: Skins, objects: np.ndarray, q: Array, result: Array) -> Array:
+        """What skins make of leaves' features (F, groups, P), which are corrected first."""
+        xp, shape = self.xp, np.where(self.skinned, self.shape, -1)[objects]
+        for at, lattice, *_ in self.levels:
+            index = np.flatnonzero(shape == at)
+            if len(index):
+                some = xp.array(index, q)
+                place = (xp.take(q, some) * (1 / EXTENT)).clip(-1.0, 1.0)
+                more = lattice.at(place.reshape(2, -1)).reshape(place.shape[1:])
+                xp.put(result[0], some, xp.take(result[0], some) + more)
+        return skins.at(objects).placed(xp, q).put_on(xp, result)
 
     def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
         """Features (F, M) in leaf units."""
@@ -399,6 +429,9 @@ class Field:
             here = np.flatnonzero(shape == at)
             if slopes is not None and len(here):
                 result[here] = slopes.rise(q.take(here, -1), radius[here])
+        for at, _, steep, most in self.levels:
+            here = np.flatnonzero((shape == at) & self.skinned[objects])
+            result[here] += np.minimum(steep * radius[here], most)
         most = np.fmin((result + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
         return np.asarray(most, np.float32)
 

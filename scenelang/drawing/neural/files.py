@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -28,6 +28,7 @@ from scenelang.compiler.weights import (
 )
 from scenelang.drawing.neural.network import (
     CELLS,
+    LEVEL_NODES,
     NODE,
     RADII,
     STEEP,
@@ -77,6 +78,18 @@ def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: flo
 MOST_SIZE: Final = 128  # Most units of a layer for solids: their square, times the code, is 9 MB
 MOST_WIDTH: Final = 1024  # Most units of a layer in the plane
 Config = TypeVar("Config", FramedConfig, SolidConfig)
+
+
+@lru_cache(maxsize=8)
+def load_levels(name: str, digest: str) -> Mapping[bytes, npt.NDArray[np.float32]]:
+    """By the bytes of codes, what leaves' decoders are short of far from their outlines (`LEVEL_NODES`,
+    `LEVEL_NODES`), which leaves that grow and shells show; none where there is no file for these weights.
+    """
+    path, network = weights_folder(name, digest) / "levels.safetensors", load_arrays(name, digest).network
+    shape = len(network.codes), LEVEL_NODES, LEVEL_NODES
+    arrays = read_proof(path, {"weights": digest}, {"levels": shape})
+    rows = () if arrays is None else arrays["levels"].astype(np.float32)
+    return {code.tobytes(): row for code, row in zip(network.codes, rows, strict=False)}
 
 
 def _sizes(kind: type[Config], config: Any, most: int) -> Config:
@@ -146,4 +159,5 @@ def _load(name: str, weights: str) -> ArrayModel:
         return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
     network = framed_arrays(data, manifest)
     network.slopes = load_slopes(name, digest, network.codes, float(network.far[0]))
+    network.levels = partial(load_levels, name, digest)
     return ArrayModel(network, digest)

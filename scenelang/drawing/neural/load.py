@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,13 @@ from scenelang.compiler.weights import (
     shipped_weights,
 )
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_slopes, solid_config
+from scenelang.drawing.neural.files import (
+    MOST_WIDTH,
+    framed_config,
+    load_levels,
+    load_slopes,
+    solid_config,
+)
 from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
@@ -172,6 +179,7 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None, weights
     if isinstance(network, Framed):
         host = network.codes.cpu().numpy()
         network.slopes = load_slopes(name, codes.digest, host, float(network.far[0]))
+        network.levels = partial(load_levels, name, codes.digest)
     return Model(manifest, network, codes, open_weights(data).header)
 
 

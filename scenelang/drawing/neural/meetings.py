@@ -271,10 +271,10 @@ class State(NamedTuple):
         """Move the colours of some columns towards others (R, n), by shares (n,) of the way; through these
         some of what was before is seen, ``through`` (n,).
         """
-        seen = through or (0.0, 0.0)
-        for side, own, choose, clear in zip(self.colour, colour, (np.minimum, np.maximum), seen, strict=True):
+        for at, choose in enumerate((np.minimum, np.maximum)):
+            side, own = self.colour[at], colour[at]
             now = side[:, columns]
-            more = own - now if through is None else own + (clear - 1.0) * now
+            more = own - now if through is None else own + (through[at] - 1.0) * now
             side[:, columns] = now + choose(share.low * more, share.high * more)
 
 

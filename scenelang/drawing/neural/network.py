@@ -26,7 +26,7 @@ beside the weights; for elements it is computed from their nodes. Where nothing 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
@@ -41,6 +41,10 @@ from scenelang.language.words import TOKENS as WORDS
 TOKENS = len(WORDS)
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
+EXTENT, LEVEL_NODES = (
+    2.6,
+    161,
+)  # half a side, leaf units, and nodes along it of a grid that corrects a decoder
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,7 @@ class FramedNetwork:
 
     config: FramedConfig
     slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes
+    levels: Callable[[], Mapping[bytes, Any]] = dict  # grids of `EXTENT` that are added far from outlines
     layout: Layout = PLANE_LAYOUT
     xp: ClassVar[Arrays]
     codes: Any  # (geometries, C)

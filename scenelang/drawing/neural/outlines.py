@@ -85,15 +85,15 @@ def _edges(cells: int) -> Floats:
 
 
 @lru_cache(maxsize=2048)
-def _table(element: Element) -> Table:
-    """The table of one outline."""
+def table_of(element: Element, sides: tuple[int, ...] = SIDES) -> Table:
+    """The table of one outline; ``sides`` are those of the grids that lead to its own."""
     pieces, _ = cut(curves_of(element))
     a, b, c = pieces.swapaxes(0, 1)
     ax, ay = a.T
     ex, ey = (c - a).T
     inverse = 1 / np.maximum(ex * ex + ey * ey, 1e-18)
-    cells, near = np.divmod(np.arange(SIDES[0] ** 2 * len(pieces)), len(pieces))
-    for side, finer in zip(SIDES, (*SIDES[1:], 0), strict=True):
+    cells, near = np.divmod(np.arange(sides[0] ** 2 * len(pieces)), len(pieces))
+    for side, finer in zip(sides, (*sides[1:], 0), strict=True):
         edges = _edges(side)
         middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
         y, x = np.divmod(np.arange(side * side), side)
@@ -113,7 +113,7 @@ def _table(element: Element) -> Table:
             cells = (at[0] * finer + at[1]).reshape(-1)
             by = np.argsort(cells, kind="stable")
             cells, near = cells[by], np.repeat(near, parts * parts)[by]
-    first = np.searchsorted(cells, np.arange(SIDES[-1] ** 2 + 1))
+    first = np.searchsorted(cells, np.arange(sides[-1] ** 2 + 1))
     rows = [a, 2 * (b - a), a - 2 * b + c, *_tangents(pieces)]
     return Table(np.concatenate(rows, 1).T.astype(np.float32), first, near)
 
@@ -121,7 +121,7 @@ def _table(element: Element) -> Table:
 @lru_cache(maxsize=16)
 def _joined(elements: tuple[Element, ...]) -> tuple[npt.NDArray[np.generic], ...]:
     """The tables of outlines as one, and (5, P) starts, ways and inverse squared lengths of chords."""
-    tables = [_table(element) for element in elements]
+    tables = [table_of(element) for element in elements]
     begins = np.cumsum([0, *(table.pieces.shape[1] for table in tables)])
     listed = np.cumsum([0, *(len(table.near) for table in tables)])
     first = [table.first[:-1] + at for table, at in zip(tables, listed, strict=False)]

@@ -5,6 +5,7 @@ import { Time, Angle, Vec, Wearing } from "./values.js";
 import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
 import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { entering, looping, prepared } from "./expressions.js";
+import { lineOf } from "./letters.js";
 import { MAPS } from "./maps.js";
 import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
 import { stageFrom } from "./stage.js";
@@ -202,7 +203,6 @@ function opacityFrom(share) {
 function samplesFrom([count] = [4]) {
   return [4, 16].includes(bare(count)) ? count : refuse(`${count} samples a pixel`);
 }
-};
 
 const STATEMENTS_OF_FORMS = {
   no: ([why]) => () => refuse(why),
@@ -281,6 +281,22 @@ const STATEMENTS_OF_FORMS = {
     return (slots, out) => {
       const [inside, own] = [new Block(), new Block()];
       make(slots, inside);
+      act(slots, own);
+      placeCalled(inside, own, out);
+    };
+  },
+  text: ([font, args, block], run) => {
+    const [parts, act] = [args.map((arg) => optionalValue(arg, run)), actionsOf(block, run)];
+    return (slots, out) => {
+      const [inside, own] = [new Block(), new Block()];
+      const { line } = lineOf(run.form.fonts[font], ...parts.map((part) => part(slots)));
+      run.spend(line.length);
+      run.objects += line.length;
+      if (run.objects > MOST_OBJECTS) refuse(`more than ${MOST_OBJECTS} objects`);
+      for (const { shape, x, y, radius } of line) {
+        const steps = [stepOf("even", [radius]), stepOf("translate", [x, y])];
+        inside.add({ shape, steps, worn: null });
+      }
       act(slots, own);
       placeCalled(inside, own, out);
     };

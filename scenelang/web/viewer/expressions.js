@@ -4,6 +4,7 @@ import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
 import { ARITHMETIC, ORDER, arithmetic, bare, equal, finite, kindOf, negative, ordered } from "./values.js";
 import { positive, refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { FUNCTIONS } from "./functions.js";
+import { lineOf } from "./letters.js";
 
 const UNITS_WRITTEN = {
   deg: (size) => new Angle(size * (Math.PI / 180)),
@@ -189,6 +190,10 @@ const WORDS_OF_VALUES = {
     return (slots) => knownValue(outerSlots(slots, hops)[slot]);
   },
   t: ([which], run) => () => run.animated[which] ?? refuse(NOT_YET),
+  width: ([font, ...args], run) => {
+    const [text, size] = args.map((arg) => (arg === null ? undefined : prepared(arg, run)));
+    return (slots) => lineOf(run.form.fonts[font], text(slots), size?.(slots)).width;
+  },
   "+1": onValues(positive),
   "-1": onValues(negative),
   "!1": ([part], run) => {

@@ -4,7 +4,7 @@
 
 uniform sampler2D rows; // of each object: some texels, its steps, the place and the steps of its picture; of groups
 uniform sampler2D lists; // of tiles, where each one's begins and its length; then texels of rows, four in one
-uniform sampler2D nodes; // distances of elements
+uniform sampler2D nodes; // distances and curves of elements
 uniform sampler2D texels; // of pictures
 uniform vec4 cell[KINDS * (LINES + 2)]; // of each kind of join: lines in distance, state and 1; then candidate, bump
 uniform vec4 background; // premultiplied
@@ -84,11 +84,13 @@ vec2 local(vec2 p, int at, int steps, inout float spread) {
 
 // ------------------------------------------------------------ elements
 
-#ifdef GRIDS
+#ifdef NODES
 float node(int at) {
   return texelFetch(nodes, ivec2(at & 2047, at >> 11), 0).r;
 }
 
+#endif
+#ifdef GRIDS
 float edge(int at, float share) {
   return mix(node(at), node(at + 1), share);
 }
@@ -103,6 +105,47 @@ float lattice(vec2 q, int first, int side) {
   float found = mix(edge(first, share.y), edge(first + side, share.y), share.x);
   SPEND(12);
   return off == vec2(0) ? found : sqrt(found * found + dot(off, off));
+}
+#endif
+
+#ifdef OUTLINES
+const int SIDE = 24; // cells of an outline's grid along an axis, as in scenelang/web/arrays.py
+const float WIDE = 4.0 / 3.0, LAST = 16.0; // as in scenelang/drawing/neural/outlines.py
+
+/** A distance by curves: where lists begin, cell by cell, lists of pieces, and of each piece ten numbers. */
+float outlined(vec2 q, int first) {
+  float radius = length(q), least = FAR, t = 0.0;
+  q *= LAST / max(radius, LAST);
+  vec2 place = clamp(q, -1.0, 1.0) * (WIDE - (WIDE - 1.0) / max(abs(q), vec2(1.0)));
+  ivec2 at = clamp(ivec2((place + WIDE) * (float(SIDE) / (2.0 * WIDE))), 0, SIDE - 1);
+  int cell = first + at.y * SIDE + at.x, lists = first + SIDE * SIDE + 1;
+  int pieces = lists + int(node(lists - 1)), end = lists + int(node(cell + 1)), best = pieces;
+  for (int k = lists + int(node(cell)); k < end; k++) {
+    int piece = pieces + 10 * int(node(k));
+    vec2 off = q - vec2(node(piece), node(piece + 1));
+    vec2 way = vec2(node(piece + 2) + node(piece + 4), node(piece + 3) + node(piece + 5));
+    float share = clamp(dot(off, way) / max(dot(way, way), 1e-12), 0.0, 1.0);
+    off -= share * way;
+    SPEND(12);
+    if (dot(off, off) >= least) continue;
+    least = dot(off, off);
+    best = piece;
+    t = share;
+  }
+  vec2 a = vec2(node(best), node(best + 1)), u = vec2(node(best + 2), node(best + 3));
+  vec2 w = vec2(node(best + 4), node(best + 5)), off, way;
+  for (int step = 0; step < 3; step++) {
+    off = a + t * (u + t * w) - q;
+    way = u + 2.0 * t * w;
+    if (step == 2) break;
+    float speed = dot(way, way), bend = max(speed + 2.0 * dot(off, w), 0.25 * speed);
+    t = clamp(t - dot(off, way) / max(bend, 1e-12), 0.0, 1.0);
+  }
+  SPEND(60);
+  if (t <= 0.0) way = vec2(node(best + 6), node(best + 7));
+  if (t >= 1.0) way = vec2(node(best + 8), node(best + 9));
+  float away = length(off);
+  return (way.y * off.x - way.x * off.y > 0.0 ? -away : away) + max(radius - LAST, 0.0);
 }
 #endif
 
@@ -316,10 +359,12 @@ void meet(vec2 p, ivec2 span) {
 #endif
       {
 #ifdef GRIDS
-        distance = c.y > 0.0 ? lattice(q, int(c.x), int(c.y)) : learned(int(c.x), q);
-#else
-        distance = learned(int(c.x), q);
+        if (c.y > 0.0) distance = lattice(q, int(c.x), int(c.y)); else
 #endif
+#ifdef OUTLINES
+        if (c.y < 0.0) distance = outlined(q, int(c.x)); else
+#endif
+        distance = learned(int(c.x), q);
 #ifdef SKINS
         vec4 skin = texel(rows, at + 4);
         distance -= skin.x;

@@ -162,16 +162,18 @@ export function planeDrawer(gl, view) {
   const textures = ["rows", "lists", "nodes", "texels", "points"];
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
-  const grids = view.shapes.slice(network.decoders.length);
-  const [nodes, ofGrid] = joined(grids.map(distances), Float32Array);
+  const brought = view.shapes.slice(network.decoders.length);
+  const [nodes, ofShape] = joined(brought.map(nodesOf), Float32Array);
   const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
     ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
-    ...grids.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest, first: ofGrid[i] })),
+    ...brought.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest ?? -1, first: ofShape[i] })),
   ];
   const pictures = view.paints.map((paint, i) => ({ ...paint, first: ofPicture[i] / 3 }));
-  if (grids.length) {
-    kinds.push("GRIDS");
+  if (brought.length) {
+    kinds.push("NODES");
+    if (brought.some(isOutline)) kinds.push("OUTLINES");
+    if (!brought.every(isOutline)) kinds.push("GRIDS");
     held.nodes = sheet(gl, nodes, [gl.R32F, gl.RED, gl.FLOAT], 1);
   }
   if (pictures.length) {
@@ -281,6 +283,13 @@ function bands(gl, { starts, tile, across, down }, width) {
     if (high < down) gl.flush();
   }
   gl.disable(gl.SCISSOR_TEST);
+}
+
+const isOutline = ({ kind }) => kind === "outline";
+
+/** What the shader knows of a shape that was brought: distances, or cells and pieces of its curves. */
+function nodesOf(shape) {
+  return isOutline(shape) ? joined([shape.cells, shape.pieces], Float32Array)[0] : distances(shape);
 }
 
 /** Arrays of a kind one after the other, and where each begins. */
