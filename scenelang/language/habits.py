@@ -1,47 +1,21 @@
-"""Habits from OpenSCAD, GLSL, JavaScript and Python: the pattern that people write, and its form here.
-
-A habit is a pattern and its replacement, as texts with holes: ``for (<i> = [<A>:<B>])`` and
-``for (<i> in <A>..<B>)``.
-
-======================  ======================================================================
-``<i>``                 one name
-``<A>``                 text of one statement whose brackets match, up to what follows
-``<in|of>``             one of these words or signs
-``<type>``              one of the words that `_WORDS` has under this name
-``<VALUES>``            as ``<A>``, where it begins with a number, a colour or a vector
-``<LINE>``              the rest of the line, or of the statement on it
-``<BODY>``              the same, or all lines below that stand further in
-``<STMT>``              one statement with its ``;`` or block
-``<BLOCK>``             a block with its braces
-``<PARAMS>``            parameters; the replacement has them without their types
-``…?`` before ``>``     may be missing
-======================  ======================================================================
-"""
+"""Habits from OpenSCAD, GLSL, JavaScript and Python, as `habits.txt` has them: found, reported, mended."""
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from functools import cache, lru_cache, partial
+from collections.abc import Iterator
+from functools import cache, lru_cache
 from math import inf
+from pathlib import Path
 from typing import Final
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Fix, ranked
+from scenelang.language.foreign import OPERATORS
 from scenelang.language.lexer import Report, Token, Tokens, reach
 from scenelang.language.tables import END, tables
-from scenelang.language.words import GEOMETRIES, NODES, OPERATIONS, TRANSFORMS
-
-OPERATORS: Final = {"and": "&&", "or": "||", "not": "!", "mod": "%"}
-"""Operators that other languages write as words."""
-
-HEADS: Final = (
-    dict.fromkeys(("function", "func", "fun", "def", "define"), "fn")
-    | dict.fromkeys(("var", "const", "float", "int", "bool", "vec2", "vec3"), "let")
-    | dict.fromkeys(("include", "use", "require"), "import")
-    | {"uniform": "param", "foreach": "for", "macro": "module", "class": "module"}
-)
-"""Words that begin statements in other languages, and the keyword that begins them here."""
+from scenelang.language.words import GEOMETRIES, LEAVES, NODES, OPERATIONS, TRANSFORMS
 
 MAX_REPLAY: Final = 400
 """A statement with more tokens before the mistake is not tried again from its start."""
@@ -58,19 +32,13 @@ _WORDS: Final[dict[str, tuple[str, ...]]] = {
     "type": _TYPES,
     "fn": ("fn", "function", "func", "fun", "def", *_TYPES),
     "let": ("let", "var", "const", *_TYPES),
-    "use": ("use", "include", "require"),
     "node": tuple(NODES),
     "object": (*NODES, *GEOMETRIES),
-    "elif": ("elif", "elsif", "elseif"),
     "call": (*(TRANSFORMS | OPERATIONS), "canvas", "background"),
     "move": tuple(TRANSFORMS),
-    "turn": tuple(TRANSFORMS),
     "before": _MOVES,
     "next": _MOVES,
     "block": (*NODES, "for", "if"),
-    "control": ("for", "if"),
-    "color": ("color", "colour"),
-    "library": ("math", "numpy", "random", "sys", "os", "Math"),
 }
 """Words that a hole of this name takes."""
 
@@ -86,179 +54,29 @@ class Habit(Record):
     pattern: str  # what is written
     meant: str  # what is written here; also read in its place, so that the rest can be checked
     message: str  # the fact; words that the pattern has found may stand in it
-    help: str | None = None
-    code: str = "E0133"
-    safe: bool = True  # whether ``meant`` is sure to mean the same, and so is a fix
+    help: str | None
+    code: str
+    safe: bool  # whether ``meant`` is sure to mean the same, and so is a fix
 
 
-_unsafe: Final = partial(Habit, safe=False)
+def _read() -> Iterator[Habit]:
+    fact: tuple[str, str | None, str, bool] = ("", None, "", True)
+    for line in Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines():
+        if line.startswith(" "):
+            pattern, _, meant = line.partition("→")
+            yield Habit(pattern.strip(), meant.strip(), *fact)
+        elif line and not line.startswith("#"):
+            message, *more = line.split(" | ")
+            code = next((part for part in more if re.fullmatch("E[0-9]{4}", part)), "E0133")
+            help = next((part for part in more if part not in (code, "unsafe")), None)
+            fact = message, help, code, "unsafe" not in more
 
 
-_LOOP: Final = "`for` takes a range or a vector"
-_PASSES: Final = "write for (<i> in 0..<n) { … }"
-_BRACES: Final = "blocks stand in braces"
-_FUNCTION: Final = "a function is `fn` and one expression"
-_UNNAMED_FN: Final = "missing `fn` before `<f>`"
-_SQUARE: Final = "write fn <f>(x) = x ^ 2;"
-_PIECE_OF: Final = "write module <f>() { … }"
-_PARENTHESES: Final = "missing parentheses"
-_UNTYPED: Final = "names have no types"
-_RANGE: Final = "ranges are written with `..`"
-_CALLED: Final = "`<call>` is called, not set"
-_BOUND: Final = "missing `let` before `<n>`"
-_ONCE: Final = "`<n>` cannot be changed"
-_NEW_NAME: Final = "names keep their values; bind another one with let, or count with for (i in 0..<n) { … }"
-_BRACKETS: Final = "vectors stand in brackets"
-_BLOCKS: Final = "write camera(eye = [0, 1, 6]); light(position = [2, 4, 3]); sphere { translate(0, 1, 0); }"
-_JOINS: Final = "`<node>` joins no loop"
-_HOLDS: Final = "the loop stands in its block: <node> { square; for (i in 0..3) { star; } }"
-_LISTED: Final = "a vector is made by `for` before its values"
-_COMMAS: Final = "`,` between statements"
-_JOINED: Final = "objects are joined by words"
-_ARGUED: Final = "`<node>` takes no objects as arguments"
-_STANDS: Final = "objects stand in its block: <node> { square; star; }"
-_METHOD: Final = "transforms stand in the block of what they move"
-_VALUE: Final = "objects are not values"
-_DRAWN: Final = "objects are drawn where they stand"
-_MODULE: Final = "a piece of scene to use again is module <n>() { … }, and is drawn by <n>();"
-_BEFORE: Final = "transforms stand behind what they apply to"
-_INSIDE: Final = "it stands in the block, as in square { translate(1, 0); material flat { color(#d33); } }"
-_ARGUMENTS: Final = "a material takes no arguments"
-_OPERATIONS: Final = "a material's colour stands in its block"
-_COLOUR: Final = "its colour stands in its block: material <n> { color(#d33); }"
-_CONSTANT: Final = "a colour is not a material"
-_UNNAMED: Final = "a scene in 2D has `flat`, one in 3D `diffuse` and `volumetric`"
-_PATH: Final = "files are imported by their path"
-_IMPORTED: Final = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
-_IMPORT: Final = "functions are there without an import"
-_MANDATORY: Final = "braces are mandatory here"
-
-HABITS: Final = (
-    # loops and conditions
-    Habit("for (<i> = [<A>:<S>:<B>])", "for (<i> in <A>..<B> step <S>)", _LOOP),
-    Habit("for (<i> = [<A>:<B>])", "for (<i> in <A>..<B>)", _LOOP),
-    Habit("for (<let?> <i> = <A>; <i> < <B>; <i>++)", "for (<i> in <A>..<<B>)", _LOOP, code="E0126"),
-    Habit("for (<let?> <i> = <A>; <i> <= <B>; <i>++)", "for (<i> in <A>..<B>)", _LOOP, code="E0126"),
-    _unsafe("for (<let?> <i> = <A>; <B?>; <C?>)", "for (<i> in BAD_EXPRESSION)", _LOOP, _PASSES, "E0126"),
-    Habit("for (<let?> <i> <=|of|in> <E>)", "for (<i> in <E>)", _LOOP),
-    Habit("for <i> in <E>: <BODY>", "for (<i> in <E>) { <BODY> }", _BRACES),
-    Habit("if <E>: <BODY>", "if (<E>) { <BODY> }", _BRACES),
-    Habit("<control> <E> {", "<control> (<E>) {", _PARENTHESES, code="E0107"),
-    Habit("<elif> <E>: <BODY>", "<elif> (<E>) { <BODY> }", _BRACES),
-    Habit("<elif> <E> {", "<elif> (<E>) {", _PARENTHESES, "it is `else if (…) { … }` here", "E0107"),
-    Habit("<A> if <C> else <B>", "<C> ? <A> : <B>", "`if` does not choose between values"),
-    _unsafe("for (<i>, <v> in <E>)", "for (<i> in <E>)", "a loop has one name", _PASSES),
-    Habit("<control> (<E>) <STMT>", "<control> (<E>) { <STMT> }", "missing braces", _MANDATORY, "E0106"),
-    Habit("else <STMT>", "else { <STMT> }", "missing braces", _MANDATORY, "E0106"),
-    _unsafe("<node> <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
-    _unsafe("<node>(<P>) <for|if> <LINE> {", "BAD_HEAD {", _JOINS, _HOLDS),
-    _unsafe("let (<P>) <LINE?>", "BAD_HEAD", "`let` has no parentheses", "write let x = 1; before its use"),
-    # functions and modules
-    Habit("<fn> <f>(<PARAMS?>) { return <E> <;?> }", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    Habit("<fn> <f>(<PARAMS?>): return <LINE> <;?>", "fn <f>(<PARAMS>) = <LINE>;", _FUNCTION),
-    _unsafe("def <f>(<P?>): <BODY>", "BAD_STATEMENT", _BRACES, _PIECE_OF),
-    Habit("<fn> <f>(<PARAMS?>) <=|-> > <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    _unsafe("<fn> <f>(<P?>) <=?> <BLOCK>", "BAD_STATEMENT", _FUNCTION, _SQUARE),
-    _unsafe("void <f>(<P?>) <BLOCK>", "BAD_STATEMENT", _FUNCTION, _PIECE_OF),
-    Habit("<let> <f> = (<PARAMS?>) => <E>;", "fn <f>(<PARAMS>) = <E>;", _FUNCTION),
-    Habit("<let> <f> = <x> => <E>;", "fn <f>(<x>) = <E>;", _FUNCTION),
-    Habit("<let> <f> = lambda <P?>: <E>;", "fn <f>(<P>) = <E>;", _FUNCTION),
-    Habit("<let?> <f>(<PARAMS?>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNNAMED_FN, code="E0126"),
-    Habit("module <f>(<P?>) = <E>;", "fn <f>(<P>) = <E>;", "`module` where `fn` belongs", code="E0130"),
-    Habit("fn <f>(<PARAMS>) = <E>;", "fn <f>(<PARAMS>) = <E>;", _UNTYPED),
-    Habit("module <f>(<PARAMS>) {", "module <f>(<PARAMS>) {", _UNTYPED),
-    Habit("fn <f> <P> = <E>;", "fn <f>(<P>) = <E>;", _PARENTHESES, code="E0107"),
-    Habit("module <f> <P> {", "module <f>(<P>) {", _PARENTHESES, code="E0107"),
-    # names
-    Habit("const <type> <n> = <E>;", "let <n> = <E>;", _UNTYPED),
-    Habit("<let> <n>: <t> = <E>;", "let <n> = <E>;", _UNTYPED),
-    Habit("uniform <type> <n> = <E>;", "param <n> = <E>;", "it is `param` here"),
-    _unsafe("uniform <type?> <n>;", "BAD_STATEMENT", "`<n>` has no value", "write param <n> = 0.5 in 0..1;"),
-    Habit("param <n> = <E> in (<A>, <B>);", "param <n> = <E> in <A>..<B>;", _RANGE),
-    Habit("<call> <=|:> (<E>);", "<call>(<E>);", _CALLED),
-    Habit("<call> <=|:> <E>;", "<call>(<E>);", _CALLED),
-    Habit("<n>: <E>;", "<n>(<E>);", "`<n>` is called, not set"),
-    Habit("<n> = <LINE> <;?>", "let <n> = <LINE>;", _BOUND, code="E0126"),
-    _unsafe("<n> <+|-|*|/|%> = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
-    _unsafe("<n><++|-->;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
-    _unsafe("<n>[<I>] = <E>;", "let <n> = BAD_EXPRESSION;", _ONCE, _NEW_NAME),
-    # objects and their blocks
-    Habit("<move>(<P>) <o>;", "<o> { <move>(<P>); }", _BEFORE, _INSIDE),
-    Habit("<move>(<P>) <o>(<Q?>);", "<o>(<Q>) { <move>(<P>); }", _BEFORE, _INSIDE),
-    Habit("color(<E>) <o>;", "<o> { material <material> { color(<E>); } }", _BEFORE, _INSIDE),
-    _unsafe("<before>(<P>) <next>(<Q>) <o>", "<o>", _BEFORE, _INSIDE),
-    _unsafe("<before>(<P>) <o>", "<o>", _BEFORE, _INSIDE),
-    _unsafe("<before>(<P>) <next>(<Q>) <block>", "<block>", _BEFORE, _INSIDE),
-    _unsafe("<before>(<P>) <node>()", "<node>", _BEFORE, _INSIDE),
-    _unsafe("<before>(<P>) <block>", "<block>", _BEFORE, _INSIDE),
-    _unsafe("<let> <n> = new <LINE> <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
-    _unsafe("<let> <n> = <object> <BLOCK>", "BAD_STATEMENT", _VALUE, _MODULE),
-    _unsafe("<let> <n> = <node>(<P?>) <;?>", "BAD_STATEMENT", _VALUE, _MODULE),
-    _unsafe("new <LINE> <;?>", "BAD_STATEMENT", _DRAWN, "write sphere { scale(0.5); }"),
-    Habit("<object>().<call>(<P?>);", "<object> { <call>(<P>); }", _METHOD),
-    _unsafe("<object>().<LINE> <;?>", "BAD_STATEMENT", _METHOD, "square { scale(0.5); translate(1, 0); }"),
-    Habit("<n> <o> }", "<n>; <o>; }", "missing `;`", code="E0102"),
-    Habit("<difference|minus|without> <o>", "subtract <o>", "it is `subtract` here"),
-    Habit("<blend|smin> <o>", "smooth <o>", "it is `smooth` here"),
-    Habit("intersection <o>", "intersect <o>", "it is `intersect` here"),
-    Habit("<n> - <o>;", "subtract { <n>; <o>; }", _JOINED),
-    Habit("<n> + <o>;", "union { <n>; <o>; }", _JOINED),
-    Habit("<n>, <o> }", "<n>; <o>; }", _COMMAS),
-    _unsafe("<n>, <LINE> }", "BAD_STATEMENT }", _COMMAS, "every statement ends with `;`"),
-    Habit("<n> <VALUES>;", "<n>(<VALUES>);", _PARENTHESES, code="E0107"),
-    Habit("<node>(<A>, <B>);", "<node> { <A>; <B>; }", _ARGUED, _STANDS),
-    _unsafe("<node>(<P>);", "BAD_STATEMENT", _ARGUED, _STANDS),
-    Habit("<node>()", "<node>", "`<node>` takes no arguments"),
-    _unsafe(
-        "<node>(<P>) {",
-        "<node> {",
-        "`<node>` takes no arguments",
-        "the width of a blend stands with `smooth`, `subtract` or `intersect`: smooth(k = 0.3) { … }",
-    ),
-    _unsafe("<n?> < <A>, <B>, <C> > <LINE?> <BLOCK?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
-    _unsafe(
-        "< <n> <LINE>",
-        "BAD_STATEMENT",
-        "this is SVG or HTML",
-        "a drawing becomes a shape: scenelang learn drawing.svg -o zoo.safetensors",
-    ),
-    _unsafe("<location|look_at|angle> [<A>] <LINE?> <;?>", "BAD_STATEMENT", _BRACKETS, _BLOCKS),
-    Habit("<call> <rgb|srgb> < <A>, <B>, <C> ><;?>", "<call>([<A>, <B>, <C>]);", _BRACKETS),
-    # materials
-    Habit("material { <call>(", "material <material> { <call>(", "material without a name", _UNNAMED),
-    Habit("material <=|:?> <VALUES>;", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
-    Habit("material(<VALUES>);", "material <material> { color(<VALUES>); }", _CONSTANT, _UNNAMED),
-    Habit("material = <n>;", "material <n>;", "`material` is not set"),
-    Habit("material(<n>)", "material <n>", "a material's name stands without parentheses"),
-    Habit("material <n>()", "material <n>", _ARGUMENTS),
-    _unsafe("material <n>(<A>, <P>)", "material <n>", _ARGUMENTS, _COLOUR),
-    Habit("material <n>(<color?> <=?> <E>);", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
-    Habit("material <n>(<color?> <=?> <E>)", "material <n> { color(<E>); }", _ARGUMENTS, _COLOUR),
-    Habit("material <m> = <n> <BLOCK>", "let <m> = material <n> <BLOCK>;", "a material is named by `let`"),
-    Habit("material <n> <VALUES>;", "material <n> { color(<VALUES>); }", _OPERATIONS),
-    Habit("material <n> <,?> color(<E>);", "material <n> { color(<E>); }", _OPERATIONS),
-    # expressions
-    Habit("[for <i> in <F>: <E>]", "[for (<i> in <F>) <E>]", _LISTED),
-    Habit("[<E> for <i> in <F> if <C>]", "[for (<i> in <F>) if (<C>) <E>]", _LISTED),
-    Habit("[<E> for <i> in <F>]", "[for (<i> in <F>) <E>]", _LISTED),
-    Habit("[<A>:<S>:<B>]", "<A>..<B> step <S>", _RANGE),
-    Habit("[<A>:<B>]", "<A>..<B>", _RANGE),
-    Habit("(<A>, <E>)", "[<A>, <E>]", _BRACKETS),
-    Habit("(<A>, <B>, <C>)", "[<A>, <B>, <C>]", _BRACKETS),
-    Habit("<rgb|srgb?> < <A>, <B>, <C> >", "[<A>, <B>, <C>]", _BRACKETS),
-    Habit("<A>%", "<A> / 100", "`%` is the rest of a division", "a share is a number: 50 % is 0.5"),
-    # settings and imports
-    Habit("canvas(<A> x <B>);", "canvas(<A>, <B>);", "sides are separated by a comma"),
-    Habit("import <library> <LINE?> <;?>", "", _IMPORT),
-    Habit("from <library> import <LINE> <;?>", "", _IMPORT),
-    Habit("import <n> from <A>;", "import <A> as <n>;", "the path comes first"),
-    _unsafe("import <A> as <n>;", "BAD_STATEMENT", "a path stands in quotes", _IMPORTED, "E0126"),
-    _unsafe("import <n> <LINE?> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
-    _unsafe("from <n> import <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED),
-    _unsafe("<use> < <LINE> <;?>", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
-    _unsafe("<use> <A>;", "BAD_STATEMENT", _PATH, _IMPORTED, "E0126"),
+HABITS: Final = tuple(_read())
+_ONCE, _BOUND, _BEFORE = (
+    next(habit for habit in HABITS if habit.pattern == pattern)
+    for pattern in ("<n><++|-->;", "<n> = <LINE> <;?>", "<before>(<P>) <o>")
 )
-"""Habits that do not parse. The first that fits, and after which more of the text reads, is taken."""
 
 
 # ---------------------------------------------------------------- patterns over text
@@ -270,8 +88,7 @@ _PIECE: Final = re.compile(
 _TYPED: Final = re.compile(rf"\b(?:{'|'.join(_TYPES)})\s+(?=[A-Za-z_])|\s*:\s*[A-Za-z_]\w*")
 """The types that stand before or after the names of parameters."""
 
-_FLAT: Final = re.compile(r"\b(?:square|triangle|pentagon|star)\b")
-_SOLID: Final = re.compile(r"\b(?:sphere|torus)\b")
+_FLAT, _SOLID = (re.compile(rf"(?<![.\w])(?:{'|'.join(LEAVES[n])})\b") for n in (2, 3))
 
 
 def _balanced(besides: str = "", word: str = "", depth: int = 4) -> str:
@@ -489,12 +306,12 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
     old = text[start:end]
     code, message, help = habit.code, filled(habit.message), habit.help and filled(habit.help)
     safe = habit.safe and "…" not in new and "//" not in old and "/*" not in old
-    if habit.message == _BOUND:
+    if habit is _BOUND:
         if re.search(rf"\b{_text(tokens, match['n'])}\b", text[:start]):
-            code, message, help, safe = "E0133", filled(_ONCE), _NEW_NAME, False
+            code, message, help, safe = _ONCE.code, filled(_ONCE.message), _ONCE.help, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
             help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
-    elif habit.message == _BEFORE and match[""][0] and head(tokens, match[""][0] - 1) in _MOVES:
+    elif habit.message == _BEFORE.message and match[""][0] and head(tokens, match[""][0] - 1) in _MOVES:
         safe = False  # it may lack its `;`, and what follows be a material
     elif "STMT" in match and tokens.on_new_line(match["STMT"][0]):
         safe = False  # more of the lines below may be meant

@@ -500,6 +500,12 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
     word, name = written.shading, written.name
     if word is None:
         return None
+    if word.text in words.PAINTS and name.text in words.MATERIALS:
+        turned = f"{name.text} {word.text}"
+        edit = Edit(Span(word.span.source, word.span.start, name.span.end), turned)
+        fact, fix = f"`{word.text}` before the way it is lit", Fix(f"write `{turned}`", (edit,))
+        place.report.error("E0213", fact, word.span, help=f"write material {turned}", fix=fix)
+        return ""
     if word.text not in words.MATERIALS:
         _unknown(word, place, {*words.MATERIALS})
         return ""

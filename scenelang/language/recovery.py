@@ -19,7 +19,8 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Label, Span
-from scenelang.language.habits import HEADS, MAX_REPLAY, OPERATORS, head, keywords_near, mend_habit
+from scenelang.language.foreign import HEADS, OPERATORS
+from scenelang.language.habits import MAX_REPLAY, head, keywords_near, mend_habit
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
