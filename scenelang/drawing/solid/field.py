@@ -312,10 +312,11 @@ class SolidField:
                 sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * max(solid.radius - 1, 0.0)
                 low, high = (xp.array(side, network.codes) for side in sides.astype(np.float32))
                 self.solids[i] = replace(solid, box=(low, high))
-        plain = ~self.skinned & [
+        lone = [
             element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
             for element, s in zip(brought, self.solids, strict=True)
         ]
+        plain = ~self.skinned & np.array(lone, bool)
         media = np.asarray(xp.to_numpy(self.looks))[-1] > 0.5
         self.segments = [network.segment(code) for code in learned] if (plain & media).any() else []
         known = np.array([bool(own) for own in self.segments] + [False] * len(ordered), bool)
