@@ -20,7 +20,7 @@ from typing import Any, Final
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Label, Span
 from scenelang.language.foreign import HEADS, OPERATORS
-from scenelang.language.habits import MAX_REPLAY, head, keywords_near, mend_habit
+from scenelang.language.habits import MAX_REPLAY, head_word, keywords_near, mend_habit
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
@@ -49,32 +49,15 @@ def balance(tokens: Tokens, report: Report) -> None:
         for first, missing in reversed(_slips(tokens)):  # from the last on, so that indices hold
             _mend(tokens, report, first, missing)
     last = len(tokens.kinds) - 1
-    stray = _unmatched(tokens, last)[1]
+    stray = tokens.unmatched(last)[1]
     for at in stray:
         report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
     tokens.drop(stray)
     last -= len(stray)
-    open_ = _unmatched(tokens, last)[0]
+    open_ = tokens.unmatched(last)[0]
     if open_ and not tokens.cut:
         _report_unclosed(tokens, report, last, open_[-3:], len(open_))
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
-
-
-def _unmatched(tokens: Tokens, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
-    """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
-    signs = [tables().literals[sign] for sign in pairs]
-    opening, closing = signs[::2], signs[1::2]
-    open_: list[int] = []
-    stray: list[int] = []
-    for index in range(first, stop):
-        kind = tokens.kinds[index]
-        if kind in opening:
-            open_.append(index)
-        elif kind in closing and open_:
-            open_.pop()
-        elif kind in closing:
-            stray.append(index)
-    return open_, stray
 
 
 def _report_unclosed(tokens: Tokens, report: Report, at: int, open_: list[int], count: int = 1) -> None:
@@ -134,7 +117,7 @@ def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
     if names == ["{"] and not repair.delete:
         report.add("E0106", "missing `{`", end, end, fix=" {")
     elif names == ["}"] and not repair.delete:
-        _report_unclosed(tokens, report, repair.at, _unmatched(tokens, repair.at)[0][-1:])
+        _report_unclosed(tokens, report, repair.at, tokens.unmatched(repair.at)[0][-1:])
     else:
         report_repair(tokens, report, repair, [])
     tokens.replace(repair.at, repair.delete, repair.insert)
@@ -315,7 +298,7 @@ class Recovery:
         if repair is None:
             del states[depth + 1 :], values[depth:]
             return self._skip(first, at)
-        report_repair(self.tokens, self.report, repair, _unmatched(self.tokens, repair.at, first, "()[]")[0])
+        report_repair(self.tokens, self.report, repair, self.tokens.unmatched(repair.at, first, "()[]")[0])
         self.tokens.replace(repair.at, repair.delete, repair.insert)
         if at - first > MAX_REPLAY:
             return at
@@ -388,7 +371,7 @@ class Recovery:
         tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
         kind, new_line = kinds[at], tokens.on_new_line(at)
         after = kinds[at + 1] if kind != END else END
-        open_ = _unmatched(tokens, at, first, "()[]")[0]
+        open_ = tokens.unmatched(at, first, "()[]")[0]
         if open_:
             dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
             closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
@@ -454,7 +437,7 @@ class Recovery:
             self.report.add("W0101", "stray `;`", *place, help="no `;` follows a block", fix="")
             tokens.replace(at, 1, [])
         elif self._is(at, "{") and at and self._is(at - 1, ";") and not tokens.on_new_line(at):
-            fix = None if head(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
+            fix = None if head_word(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
             self.report.add("E0130", "`;` between a statement and its block", *tokens.place(at - 1), fix=fix)
             tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
         elif self._is(at, "{"):
@@ -570,7 +553,7 @@ def _surely_next(tokens: Tokens, at: int) -> bool:
     """Test whether a token within a line can only begin a statement of its own."""
     text = tokens.text(at)
     inside = text == "material" or text in TRANSFORMS
-    moved = inside and tokens.text(at - 1) == ")" and head(tokens, at - 1) in TRANSFORMS
+    moved = inside and tokens.text(at - 1) == ")" and head_word(tokens, at - 1) in TRANSFORMS
     return moved or text in _BEGINNINGS
 
 
@@ -587,7 +570,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
         message = f"expected {_NAMED[names[0]]}, found {_shown(tokens, at)}"
     elif new == "==":
         code, message, help = "E0111", "`=` does not compare", "equality is `==`"
-        fix = None if head(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
+        fix = None if head_word(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
     elif names == ["{", "}"]:
         code, message = "E0106", f"missing block, found `{text}`"
     elif {text, new} == {")", "]"}:
