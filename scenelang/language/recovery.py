@@ -39,7 +39,7 @@ from scenelang.language.words import TRANSFORMS, UNITS
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
 _MOST: Final = 50  # slips of one text
-_INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
+_INSTEAD: Final = "( ) [ ] ; , = BAD_EXPRESSION NAME * . .. : in as"
 """Tokens that a brace may be written for, likely ones first."""
 
 
@@ -112,11 +112,10 @@ def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
     last = len(tokens.kinds) - 1
     stop = last if newline < 0 else bisect_left(tokens.starts, newline, first + 1)
     repair = _best(tokens, first, stop, missing)
-    names = [tables().kinds[kind] for kind in repair.insert]
     end = tokens.end_before(repair.at)
-    if names == ["{"] and not repair.delete:
+    if repair.insert == _kinds("{") and not repair.delete:
         report.add("E0106", "missing `{`", end, end, fix=" {")
-    elif names == ["}"] and not repair.delete:
+    elif repair.insert == _kinds("}") and not repair.delete:
         _report_unclosed(tokens, report, repair.at, tokens.unmatched(repair.at)[0][-1:])
     else:
         report_repair(tokens, report, repair, [])
@@ -155,12 +154,11 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
 
 def _inside(kinds: list[int], first: int) -> list[int]:
     """The states deep inside blocks: all that a line can close fits there."""
-    words = "if ( NAME ) {" if tables().literals["else"] in kinds[first : first + 2] else "NAME {"
+    other = _kinds("else")[0]
+    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
     stack = [tables().start]
-    for kind in _kinds(words) * 40:
+    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
         advance(stack, kind)
-    if kinds[first] == tables().literals["else"]:
-        advance(stack, tables().literals["}"])
     return stack
 
 
@@ -168,24 +166,23 @@ def _mends(
     tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
 ) -> Iterator[Repair]:
     """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
-    literals, kind = tables().literals, tokens.kinds[at]
-    closes = missing == literals["}"]
-    surplus = literals["{" if closes else "}"]
+    (brace,), (end,) = _kinds("}"), _kinds(";")
+    closes, name = missing == brace, tokens.name(at)
     if at <= stop:
         yield Repair(at, 0, (missing,), -0.3)
-    if at == stop and not fits(stack, literals["}"]):  # the line breaks off
-        rest = completion(stack, literals[";" if closes else "{"])
+    if at == stop and not fits(stack, brace):  # the line breaks off
+        rest = completion(stack, end if closes else missing)
         if rest is not None and (closes or rest):
-            yield Repair(at, 0, (*rest, *((literals[";"],) if closes else ()), missing), -0.6)
+            yield Repair(at, 0, (*rest, end, missing) if closes else (*rest, missing), -0.6)
     elif at == stop and closes:
-        yield Repair(at, 0, (missing, literals[";"]), -0.25)
+        yield Repair(at, 0, (missing, end), -0.25)
     if at >= limit:
         return
-    if kind == surplus:
+    if name == ("{" if closes else "}"):
         yield Repair(at, 1, (), -0.2 if closes else -0.5 - 0.05 * tokens.on_new_line(at))
-        for rank, name in enumerate(_INSTEAD):
-            yield Repair(at, 1, (tables().kind(name),), 0.001 * rank - 0.1)
-    elif kind != missing:
+        for rank, kind in enumerate(_kinds(_INSTEAD)):
+            yield Repair(at, 1, (kind,), 0.001 * rank - 0.1)
+    elif tokens.kinds[at] != missing:
         yield Repair(at, 1, (missing,), -0.1)
 
 
@@ -281,21 +278,19 @@ class Recovery:
         depth = statement_depth(states)
         base = states[: depth + 1]
         first = self._index(values[depth]) if depth < len(values) else at
-        resumed: int | None = first
-        if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
-            pass
-        elif self._spaced_unit(at) or (first == at and self._start_mistake(at)):
+        near = at - first <= MAX_REPLAY
+        mended = near and mend_habit(self.tokens, self.report, base, first, at)
+        if not mended and (self._spaced_unit(at) or (first == at and self._start_mistake(at))):
             return at
-        elif (repair := self._search(base, states, first, at)) is None:
-            resumed = self._skip(first, at)
-        else:
+        if not mended and (repair := self._search(base, states, first, at)) is not None:
             open_ = self.tokens.unmatched(repair.at, first, "()[]")[0]
             report_repair(self.tokens, self.report, repair, open_)
             self.tokens.replace(repair.at, repair.delete, repair.insert)
-            if at - first > MAX_REPLAY:
+            if not near:
                 return at
+            mended = True
         del states[depth + 1 :], values[depth:]
-        return resumed
+        return first if mended else self._skip(first, at)
 
     def _index(self, value: Any) -> int:
         if isinstance(value, int):
@@ -352,7 +347,8 @@ class Recovery:
     def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
         tokens, kind = self.tokens, self.tokens.kinds[at]
         name, new_line = tokens.name(at), tokens.on_new_line(at)
-        after = tokens.kinds[at + 1] if kind != END else END
+        following = at + (kind != END)
+        after = tokens.kinds[following]
         open_ = [tokens.name(index) for index in tokens.unmatched(at, first, "()[]")[0]]
         if open_:
             cost = _CLOSING + (tokens.name(at - 1) in ("(", "[", ","))  # nobody forgets to close these
@@ -364,24 +360,23 @@ class Recovery:
                 yield Repair(at, 1, closings[:1], cost + _SUBSTITUTION)
             if new_line:
                 yield Repair(at, 0, (closings[0], *_kinds(",")), cost + 0.7)
-        for insert, cost, following in _insertions():
+        for insert, cost, needed in _insertions():
             starts = tables().kinds[insert[0]]
-            if not fits(stack, insert[0]) or (
-                starts == "as" and not (at and tokens.name(at - 1) == "STRING")
-            ):
+            behind = tokens.name(at - 1) if at else ""
+            if not fits(stack, insert[0]) or (starts == "as" and behind != "STRING"):
                 continue
-            if following in ((), (after,)) and name not in _FIXED and insert != (kind,):
+            if needed in ((), (after,)) and name not in _FIXED and insert != (kind,):
                 yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line + len(insert) - 1)
             if starts == ";" and (new_line or name in _ENDS):
                 cost = 1.0
             elif new_line and starts not in _ENDS:
                 cost += _NEW_LINE / 2
-            if following in ((), (kind,)):
+            if needed in ((), (kind,)):
                 yield Repair(at, 0, insert, cost)
         if new_line or name in _ENDS:
             yield from self._broken_off(stack, at)
-        fixed = {tables().kind(sign) for sign in _FIXED}
-        if END not in (kind, after) and kind != after and not fixed.issuperset((kind, after)):
+        both = {name, tokens.name(following)}
+        if END not in (kind, after) and len(both) == 2 and not both <= {*_FIXED}:
             yield Repair(at, 2, (after, kind), _SWAP)
         if name in _FIXED:
             return
@@ -461,10 +456,10 @@ class Recovery:
             place = (tokens.end_before(at),) * 2 if tokens.kinds[at] == END else tokens.place(at)
             self.report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", *place)
         stop = at
-        while tokens.name(stop) not in _FIXED and not (
-            stop > at
-            and (tokens.name(stop - 1) == ";" or (tokens.name(stop).islower() and tokens.on_new_line(stop)))
-        ):
+        while tokens.name(stop) not in _FIXED:
+            begins = tokens.name(stop).islower() and tokens.on_new_line(stop)
+            if stop > at and (begins or tokens.name(stop - 1) == ";"):
+                break
             stop += 1
         if stop == first:
             return None
