@@ -43,6 +43,11 @@ _WORDS: Final[dict[str, tuple[str, ...]]] = {
 """Words that a hole of this name takes."""
 
 
+def head_word(tokens: Tokens, at: int) -> str:
+    """First word of the statement that a token is in."""
+    return tokens.text(tokens.head(at, MAX_REPLAY))
+
+
 @lru_cache(maxsize=256)
 def keywords_near(text: str) -> tuple[str, ...]:
     """Keywords that a word may have been meant for, nearest first."""
@@ -176,7 +181,7 @@ def _extent(tokens: Tokens, hole: str, at: int, head: int) -> int:
     level = column(head) if tokens.on_new_line(at) else inf
     depth, last = 0, min(at + 4000, len(tokens.kinds) - 1)
     for index in range(at, last):
-        sign = tables().kinds[tokens.kinds[index]]
+        sign = tokens.name(index)
         ended = depth == 0 and tokens.on_new_line(index) and column(index) <= level
         if (hole == "BODY" and ended) or (hole == "BLOCK" and index == at and sign != "{"):
             return index
@@ -311,7 +316,7 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
             code, message, help, safe = _ONCE.code, filled(_ONCE.message), _ONCE.help, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
             help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
-    elif habit.message == _BEFORE.message and match[""][0] and head(tokens, match[""][0] - 1) in _MOVES:
+    elif habit.message == _BEFORE.message and match[""][0] and head_word(tokens, match[""][0] - 1) in _MOVES:
         safe = False  # it may lack its `;`, and what follows be a material
     elif "STMT" in match and tokens.on_new_line(match["STMT"][0]):
         safe = False  # more of the lines below may be meant
@@ -326,13 +331,6 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
         shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
         fix = report.change(start, end, new, f"write `{shown}`" if shown else "remove it")
     report.add(code, message, *place, help=help, fix=fix)
-
-
-def head(tokens: Tokens, at: int) -> str:
-    first = at
-    while first and at - first < MAX_REPLAY and tokens.text(first - 1) not in (";", "{", "}"):
-        first -= 1
-    return tokens.text(first) if first < at else ""
 
 
 def _alike(one: str, other: str) -> int:

@@ -134,6 +134,32 @@ class Tokens:
     def text(self, index: int) -> str:
         return self.source.text[self.starts[index] : self.ends[index]]
 
+    def name(self, index: int) -> str:
+        """Name of a token's kind: the text itself of a literal."""
+        return tables().kinds[self.kinds[index]]
+
+    def head(self, index: int, most: int | None = None) -> int:
+        """Index of the first token of the statement that ``index`` ends or goes on, at most so many back."""
+        last = 0 if most is None else max(0, index - most)
+        while index > last and self.name(index - 1) not in (";", "{", "}"):
+            index -= 1
+        return index
+
+    def unmatched(self, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
+        """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
+        names, opening, closing = tables().kinds, (*pairs[::2],), (*pairs[1::2],)
+        open_: list[int] = []
+        stray: list[int] = []
+        for index in range(first, stop):
+            name = names[self.kinds[index]]
+            if name in opening:
+                open_.append(index)
+            elif name in closing and open_:
+                open_.pop()
+            elif name in closing:
+                stray.append(index)
+        return open_, stray
+
     def place(self, first: int, stop: int = 0) -> tuple[int, int]:
         """Start and end of a token, or of those before ``stop``."""
         return self.starts[first], self.ends[(stop or first + 1) - 1]
