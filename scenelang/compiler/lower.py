@@ -165,7 +165,7 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
     if manifest.white and scene.background not in (WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
-    if scene.samples != 4 and manifest.lifting != "exact":
+    if scene.samples != 4 and not manifest.framed:
         help = "leave `samples` out, or draw with another model"
         diagnostics.add("E0381", f"{model} takes four samples of a pixel and no others", place, help=help)
 

@@ -72,7 +72,7 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
     manifest = context.manifest
     own = next((move for move in leaf.moves if isinstance(move.step, Grow | Shell)), None)
-    if own is not None and manifest.lifting != "exact":
+    if own is not None and not manifest.framed:
         fact = f"model `{manifest.name}` does not draw `{type(own.step).__name__.lower()}`"
         help = "leave `model` out, or draw with another one"
         context.diagnostics.add("E0506", fact, own.span or leaf.span, help=help)
