@@ -168,7 +168,7 @@ def test_messages_name_the_place() -> None:
         assert words in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming"])
+@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming-learned"])
 @pytest.mark.parametrize(
     "extra", ["codes", "renderer.more", "lifting.more", "lifting.geometry.affine.layers.3.weight"]
 )

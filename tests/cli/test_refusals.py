@@ -17,7 +17,7 @@ SCENES = {
     "late": MOVING.replace("0.6", "2 - frame"),
     "solids": SOLIDS,
     "orbit": "animate(1, 3); camera(eye = [6 * sin(1turn * u), 1, 5]);\n" + SOLIDS,
-    "learned": 'model "shapes2d-streaming"; canvas(32, 32); background(#fff); square { }',
+    "learned": 'model "shapes2d-streaming"; canvas(64, 64); background(#fff); square { }',
     "wrong": "square { scale(foo); }",
     "grown": "animate(1, 4); square { scale(0.2 + 0.1 * u); }\n",
 }
