@@ -169,7 +169,7 @@ def test_every_scene_of_a_set_compiles() -> None:
 def test_sets_of_textures_are_of_models_that_have_some() -> None:
     """One has squares that move and grow, with flips, turns and hues; the other has everything."""
     plain, textured = (sets_of(load_manifest(name)) for name in ("shapes2d-streaming", "shapes2d"))
-    assert set(textured) - set(plain) == {"textures2d", "textures2d-mixed"}
+    assert set(textured) - set(plain) == {"textures2d", "textures2d-mixed", "skins", "leaves2d"}
     for name, shapes, ops in (
         ("textures2d", {"square"}, {"flip", "rotate", "hue"}),
         ("textures2d-mixed", {*GEOMETRIES}, {*OPERATIONS} - {"stop"}),
