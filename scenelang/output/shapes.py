@@ -159,6 +159,6 @@ def _check(program: Program, *, flat: bool, diagnostics: Diagnostics) -> None:
         manifest = load_manifest(program.model)
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
-    if manifest.renderer not in ("framed", "solid") or manifest.lifting != "exact":
+    if not manifest.framed:
         raise RenderError(f"model `{program.model}` draws pictures alone")
     keep_memory()

@@ -158,7 +158,7 @@ def view_of(
     manifest, store = load_manifest(program.model), Store()
     if manifest.renderer not in ("framed", "solid"):
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
-    if manifest.lifting != "exact":
+    if not manifest.framed:
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
