@@ -19,12 +19,11 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Label, Span
-from scenelang.language.foreign import HEADS, OPERATORS
+from scenelang.language.foreign import HEADS, OPERATORS, UNIT_NAMES
 from scenelang.language.habits import MAX_REPLAY, head_word, keywords_near, mend_habit
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
-    UNIT_ALIASES,
     Report,
     Tokens,
     advance,
@@ -437,7 +436,7 @@ class Recovery:
     def _spaced_unit(self, at: int) -> bool:
         """`30 deg`: one number, whose value is unknown."""
         tokens, number, word = self.tokens, tables().kind("NUMBER"), self.tokens.text(at)
-        unit, gap = UNIT_ALIASES.get(word, word), (tokens.end_before(at), tokens.starts[at])
+        unit, gap = UNIT_NAMES.get(word, word), (tokens.end_before(at), tokens.starts[at])
         bare = at > 0 and tokens.kinds[at - 1] == number and tokens.text(at - 1)[-1:].isdigit()
         if not bare or unit not in UNITS or tokens.source.text[slice(*gap)].strip(" "):
             return False
