@@ -499,11 +499,11 @@ class Layout:
             head.append(ends_of(_lined([limits], flat_of(limits)), limits, limits))
         return self._ended(head, rest[-1])
 
-    def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", name, *self._assigned(equal, value)], last)
+    def let(self, word: int, *rest: Any) -> Part:
+        *named, equal, value, last = rest
+        return self._ended([self.word(word), " ", *named, *self._assigned(equal, value)], last)
 
-    def fn(self, word: int, name: Part, params: Part, equal: int, body: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", name, params, *self._assigned(equal, body)], last)
+    fn = let
 
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)

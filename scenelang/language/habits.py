@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from scenelang.assets.records import Record
-from scenelang.language.diagnostics import Fix, ranked
+from scenelang.language.diagnostics import Fix, common_start, ranked
 from scenelang.language.foreign import OPERATORS
 from scenelang.language.lexer import Report, Token, Tokens, reach
 from scenelang.language.tables import END, tables
@@ -335,8 +335,7 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
 
 def _alike(one: str, other: str) -> int:
     """Number of letters that two texts have in common at their start, without half a word."""
-    pairs = enumerate(zip(one, other, strict=False))
-    count = next((at for at, (a, b) in pairs if a != b), min(len(one), len(other)))
+    count = common_start(one, other)
     while count and re.match(r"\w\w", one[count - 1 : count + 1] + other[count : count + 1]):
         count -= 1
     return count
