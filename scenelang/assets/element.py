@@ -81,6 +81,11 @@ class Element:
         return self.form in ("picture", "colours")
 
     @property
+    def credited(self) -> str:
+        """What a license is said to be of: of letters their font."""
+        return str(self.about.get("original", "letters")) if self.form == "outline" else self.name
+
+    @property
     def names_coding(self) -> bool:
         """True where a header names the coding; early files have none, as all grids were deflated."""
         return self.material or self.coding != FORMS[self.form].codings[0]
@@ -151,7 +156,7 @@ class Element:
 def credit_of(elements: Iterable[Element]) -> str:
     """Licenses and sources of elements, a line each; elements with neither are left out."""
     said = [
-        (element.name, [str(element.about[key]) for key in ("license", "source") if key in element.about])
+        (element.credited, [str(element.about[key]) for key in ("license", "source") if key in element.about])
         for element in elements
     ]
     return "\n".join(dict.fromkeys(f"{name}: {', '.join(what)}" for name, what in said if what))

@@ -191,7 +191,7 @@ def element_file_bytes(
         for key, table in tables.items()
         for element in table.values()
     }
-    for name in TENSORS if font is not None else ():
-        tensors[name] = np.array(font.tables[name])
+    if font is not None:
+        tensors |= {name: np.array(table) for name, table in font.tables.items()}
     data: bytes = save(tensors, metadata={"scenelang": text})
     return data

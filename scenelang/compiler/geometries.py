@@ -24,9 +24,10 @@ class Geometry(Record):
 
     A disc or ball of radius ``inner``, 0 for none, about the origin lies within it. In space ``slopes`` are
     the distance and its gradient (4, …), ``half`` is half the sides of a box around it, ``thickness`` its
-    least thickness. In the plane ``sectors`` of a shape of dihedral symmetry are its order n, direction of a
-    vertex, outer radius, and the radius at half a sector, where the edge from the vertex ends (for the star
-    an inner vertex); ``corners`` are those of a convex polygon around it, none for the unit disc.
+    least thickness, ``edged`` whether it has edges. In the plane ``sectors`` of a shape of dihedral symmetry
+    are its order n, direction of a vertex, outer radius, and the radius at half a sector, where the edge from
+    the vertex ends (for the star an inner vertex); ``corners`` are those of a convex polygon around it, none
+    for the unit disc.
     """
 
     distance: Callable[[Points], Array]
@@ -34,6 +35,7 @@ class Geometry(Record):
     slopes: Callable[[Points], tuple[Array, ...]] | None = None
     half: tuple[float, float, float] = (1.0, 1.0, 1.0)
     thickness: float = math.inf
+    edged: bool = False
     sectors: tuple[int, float, float, float] | None = None
     corners: tuple[Corner, ...] = ()
 
@@ -245,14 +247,14 @@ GEOMETRIES: Final[dict[str, Geometry]] = {
     "sphere": Geometry(_sphere, 1.0, _sphere_slopes, thickness=2.0),
     "torus": Geometry(_torus, 0.0, _torus_slopes, (1.0, _TUBE, 1.0), 2.0 * _TUBE),
     "box": Geometry(
-        lambda p: _corner(*(abs(a) - _CUBE for a in p)), _CUBE, _box_slopes, (_CUBE,) * 3, 2.0 * _CUBE
+        lambda p: _corner(*(abs(a) - _CUBE for a in p)), _CUBE, _box_slopes, (_CUBE,) * 3, 2.0 * _CUBE, True
     ),
     "cylinder": Geometry(
-        lambda p: _corner(*_cylinder_levels(p)), _CAN, _cylinder_slopes, (_CAN,) * 3, 2.0 * _CAN
+        lambda p: _corner(*_cylinder_levels(p)), _CAN, _cylinder_slopes, (_CAN,) * 3, 2.0 * _CAN, True
     ),
-    "cone": Geometry(_cone, 0.5, _cone_slopes, (_LEAN, 1.0, _LEAN), 1.0),
+    "cone": Geometry(_cone, 0.5, _cone_slopes, (_LEAN, 1.0, _LEAN), 1.0, True),
     "capsule": Geometry(_capsule, _PILL, _capsule_slopes, (_PILL, 1.0, _PILL), 2.0 * _PILL),
-    "octahedron": Geometry(_octahedron, _CUBE, _octahedron_slopes, thickness=2.0 * _CUBE),
+    "octahedron": Geometry(_octahedron, _CUBE, _octahedron_slopes, thickness=2.0 * _CUBE, edged=True),
 }
 """All of them; their dimensions and meaning are in `scenelang.language.words.LEAVES`."""
 SECTORS: Final = {name: row.sectors for name, row in GEOMETRIES.items() if row.sectors is not None}

@@ -61,13 +61,15 @@ def weights_path(name: str, digest: str = "") -> Path:
     return weights_folder(name, digest) / "weights.safetensors"
 
 
-def manifest_of(name: str, digest: str = "") -> Manifest:
-    """A model's manifest; of weights `replaced` since, with the first of its geometries, which these know."""
+def manifest_of(name: str, digest: str = "", path: Path | None = None) -> Manifest:
+    """A model's manifest; of weights `replaced` since, or at a path, with the first of its geometries, which
+    these know.
+    """
     manifest = load_manifest(name)
-    if not replaced(digest):
+    if path is None and not replaced(digest):
         return manifest
-    known = len(open_weights(shipped_weights(name, digest)).arrays["codes"])
-    return dataclasses.replace(manifest, geometries=manifest.geometries[:known])
+    codes = open_weights(shipped_weights(name, digest, path)).arrays.get("codes", manifest.geometries)
+    return dataclasses.replace(manifest, geometries=manifest.geometries[: len(codes)])
 
 
 def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:

@@ -21,6 +21,7 @@ from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import Floats, FramedArrays, FramedConfig
 from scenelang.drawing.solid.network import Cell, SolidArrays, Wanted
+from scenelang.drawing.solid.norms import Norms
 
 if TYPE_CHECKING:
     from scenelang.compiler.program import Program
@@ -117,7 +118,7 @@ class ClosedSolids(SolidArrays):
     """`SolidArrays` by formulas: distances, their gradients, looks and the fold."""
 
     def __init__(self, model: str) -> None:
-        self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": []})
+        self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": [], "segment_b": []})
         manifest = load_manifest(model)
         self.geometries = manifest.geometries
         self.media = np.array([material == "volumetric" for material in manifest.materials], np.float32)
@@ -138,7 +139,8 @@ class ClosedSolids(SolidArrays):
         token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
         return (Cell(token_, width_, none, none, none),) * len(Wanted)
 
-    def field(self, q: Array, layers: Smooth, gradient: bool) -> Array:
+    def field(self, q: Array, layers: Smooth | Norms, gradient: bool) -> Array:
+        assert isinstance(layers, Smooth)
         geometry = self.geometries[layers[0][0]]
         if not gradient:
             return leaf_distance(geometry, q)[None]
@@ -158,9 +160,14 @@ class ClosedSolids(SolidArrays):
             register[-1] = np.where(paint > 0.5, look[-1], memory[-1])
         return np.concatenate([joined[:1], register]), joined[1]
 
-    def box(self, layers: Smooth) -> np.ndarray:
+    def box(self, layers: Smooth | Norms) -> np.ndarray:
+        assert isinstance(layers, Smooth)
         half = np.array(GEOMETRIES[self.geometries[layers[0][0]]].half, np.float32)
         return np.stack([-half, half])
+
+    def edged(self, layers: Smooth | Norms) -> bool:
+        assert isinstance(layers, Smooth)
+        return GEOMETRIES[self.geometries[layers[0][0]]].edged
 
     def alone(self, reach: Array, cell: Cell) -> Array:
         return 0 * reach + 1

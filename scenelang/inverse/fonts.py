@@ -219,12 +219,12 @@ def _boundary(curves: Curves) -> Curves:
     if not len(pieces):
         return pieces
     starts, ends = pieces[:, 0], pieces[:, 2]
-    loose = [_gaps(a, b) > 1e-6 * size for a, b in ((starts, ends), (ends, starts))]
-    bridges = []
-    for end in ends[loose[1]] if loose[0].any() else ():  # what is left of contours that touch
-        start = min(starts[loose[0]], key=lambda at, end=end: float(np.hypot(*(at - end))))
-        bridges.append((end, (end + start) / 2, start))
-    return np.concatenate([pieces, np.array(bridges).reshape(-1, 3, 2)])
+    starts, ends = starts[_gaps(starts, ends) > 1e-6 * size], ends[_gaps(ends, starts) > 1e-6 * size]
+    if not len(starts) or not len(ends):
+        return pieces
+    near = [starts[np.hypot(*(starts - end).T).argmin()] for end in ends]  # of contours that touch
+    bridges = [((end, (end + start) / 2, start)) for end, start in zip(ends, near, strict=True)]
+    return np.concatenate([pieces, np.array(bridges)])
 
 
 def _gaps(points: Curves, others: Curves) -> Curves:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
@@ -416,6 +416,13 @@ def _join_child(node: Any, where: Written, out: Builder, session: Session) -> No
         session.watch(where.statement, node)
 
 
+_SIDES: Final = {
+    "square": ("sqrt(2)", "rect(w, h)", library.SHAPES),
+    "box": ("2 / sqrt(3)", "block(w, h, d)", library.SOLIDS),
+}
+"""Leaves, how long their sides are, and what of the library takes sides."""
+
+
 def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
@@ -425,10 +432,11 @@ def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -
         prepare_arguments(stmt.args, place)
         if fits:
             help = f"size it in its block: {name} {{ scale(0.5); }}"
-            if name == "square":
-                help += f'; its sides are sqrt(2) long, those of rect(w, h) in "{library.SHAPES}" as written'
+            sides, written, path = _SIDES.get(name, ("", "", ""))
+            if sides:
+                help += f'; its sides are {sides} long, those of {written} in "{path}" as written'
             fix = None
-            if name == "sphere" and len(stmt.args) == 1 and stmt.body is None:
+            if name in ("sphere", "disc") and len(stmt.args) == 1 and stmt.body is None:
                 rest = Span(where.name.source, where.name.end, stmt.span.end)
                 fix = Fix(
                     "put it into its block", (Edit(rest, f" {{ scale({stmt.args[0].value.span.text}); }}"),)

@@ -17,6 +17,7 @@ from scenelang.language.diagnostics import Edit, Fix, SourceFile, Span
 from scenelang.language.scopes import outwards
 
 SHAPES: Final = "std/shapes"
+SOLIDS: Final = "std/solids"
 MESHES: Final = "std/meshes"
 _FOLDER: Final = Path(__file__).resolve().parent / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")

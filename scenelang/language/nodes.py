@@ -27,10 +27,10 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
-from pydantic_core import ErrorDetails
 
 from scenelang.assets.gradient import material_fault
 from scenelang.language.diagnostics import plural
+from scenelang.language.refusals import refusal
 from scenelang.language.words import BLEND, RESERVED, Combine
 
 Triple = tuple[float, float, float]
@@ -163,13 +163,6 @@ def _decoded(name: str, text: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def unstated(data: dict[str, Any], name: str, usual: float) -> dict[str, Any]:
-    """Data of a node without a field that came later and has its usual value, so that it is as before."""
-    if data.get(name) == usual:
-        del data[name]
-    return data
-
-
 class Frozen(BaseModel):
     """Base of all nodes of a Scene."""
 
@@ -233,65 +226,16 @@ class Frozen(BaseModel):
             return f"{type(self).__name__}(…)"
 
 
-TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
-"""Parts of the place of a mistake in pydantic that text does not nest by."""
-_MOST: Final = 3  # mistakes that one exception tells
-_WIDTH: Final = 40  # characters of a value that are shown
-_KINDS: Final = {
-    "float_type": "a number",
-    "int_type": "a whole number",
-    "string_type": "text",
-    "bool_type": "true or false",
-    "tuple_type": "a sequence",
-}
+LATER: Final = {"opacity": 1.0, "samples": 4}
+"""Fields that came later, and their usual values."""
 
 
-def said(item: ErrorDetails) -> str:
-    """A mistake's message as it stands after the name of its place and a colon."""
-    match item["type"]:
-        case "string_pattern_mismatch":
-            return "not a possible name"
-        case "missing":
-            return "is missing"
-    words = item["msg"].removeprefix("Value error, ")
-    return (words[:1].lower() + words[1:]).removeprefix("input ")
+class Brief(Frozen):
+    """Base of nodes with such fields, which data leave out where they have these values."""
 
-
-def refusal(name: str, error: ValidationError, known: list[str]) -> ValueError:
-    """Exception that the constructor of class ``name`` raises; ``known`` are the names of its arguments."""
-    errors = error.errors(include_url=False)
-    lines = [_line(item, known) for item in errors[:_MOST]]
-    more = f"; and {len(errors) - _MOST} more" if len(errors) > _MOST else ""
-    return ValueError(f"{name}: {'; '.join(lines)}{more}")
-
-
-def _line(item: ErrorDetails, known: list[str]) -> str:
-    parts = [part for part in item["loc"] if part not in TAGS]
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
-    kind, value = item["type"], item["input"]
-    if kind == "extra_forbidden":
-        from difflib import get_close_matches  # only mistakes need it
-
-        near = get_close_matches(path, known, 1)
-        there = f"did you mean `{near[0]}`?" if near else f"only {', '.join(known)}"
-        return f"there is no `{path}`, {there}"
-    if kind == "missing":
-        return f"`{path}` is missing"
-    if kind == "union_tag_invalid":
-        wanted = item["ctx"]["expected_tags"].replace("'", "")
-        return f"`{path}` is a {_shown(value)}; it may be {wanted}"
-    if "class_name" in item.get("ctx", {}):
-        return f"`{path}` is {_shown(value)}, not a {item['ctx']['class_name']}"
-    if kind in _KINDS:
-        return f"`{path}` is {_shown(value)}, not {_KINDS[kind]}"
-    return f"`{path}`: {said(item)}" if path else said(item)
-
-
-def _shown(value: Any) -> str:
-    if hasattr(value, "kind"):
-        return type(value).__name__
-    text = repr(value)
-    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"
+    @model_serializer(mode="wrap")
+    def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: v for name, v in plain(self).items() if name not in LATER or LATER[name] != v}
 
 
 class _Turn(Frozen):
@@ -601,7 +545,7 @@ SAMPLES: Final = 4, 16
 SampleCount = Annotated[Literal[4, 16], Field(description="samples of a pixel"), BeforeValidator(_whole)]
 
 
-class Material(Frozen):
+class Material(Brief):
     """A material, with its texture and colour operations in order.
 
     One of the model that is a texture, a gradient, or an element's, is lit as its ``shading`` says.
@@ -624,10 +568,6 @@ class Material(Frozen):
             shading: str | None = None,
             opacity: float = 1.0,
         ) -> None: ...
-
-    @model_serializer(mode="wrap")
-    def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return unstated(plain(self), "opacity", 1.0)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:

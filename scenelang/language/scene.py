@@ -14,15 +14,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import (
-    BaseModel,
-    Field,
-    PrivateAttr,
-    SerializerFunctionWrapHandler,
-    TypeAdapter,
-    ValidationError,
-    model_serializer,
-)
+from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.assets import notebook
@@ -34,20 +26,7 @@ from scenelang.assets.tensors import TensorError
 from scenelang.language import library, nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, plural
 from scenelang.language.library import SpanMap, Written
-from scenelang.language.nodes import (
-    EITHER,
-    STATED,
-    TAGS,
-    Frozen,
-    Opaque,
-    Pixels,
-    SampleCount,
-    Unsaid,
-    Version,
-    Word,
-    said,
-    unstated,
-)
+from scenelang.language.nodes import EITHER, STATED, Frozen, Opaque, Pixels, Unsaid, Version, Word
 from scenelang.language.nodes import MAX_FRAMES as MAX_FRAMES
 from scenelang.language.nodes import MAX_NODE_DEPTH as MAX_NODE_DEPTH
 from scenelang.language.nodes import Animation as Animation
@@ -70,6 +49,7 @@ from scenelang.language.nodes import MaterialOp as MaterialOp
 from scenelang.language.nodes import Matrix as Matrix
 from scenelang.language.nodes import Object as Object
 from scenelang.language.nodes import Rotate as Rotate
+from scenelang.language.nodes import SampleCount as SampleCount
 from scenelang.language.nodes import Scale as Scale
 from scenelang.language.nodes import SceneNode as SceneNode
 from scenelang.language.nodes import Shear as Shear
@@ -79,6 +59,7 @@ from scenelang.language.nodes import Transform as Transform
 from scenelang.language.nodes import Translate as Translate
 from scenelang.language.nodes import Twirl as Twirl
 from scenelang.language.nodes import Twist as Twist
+from scenelang.language.refusals import TAGS, said
 from scenelang.language.reports import SceneError
 from scenelang.language.scene_text import angle, node_lines, number, rgb, vector
 from scenelang.language.words import BLEND, STAGE
@@ -206,7 +187,7 @@ def load_elements(path: str | Path, name: str | None = None) -> Elements:
     return Elements.of(Path(path).stem if name is None else name, str(path), zoo)
 
 
-class Scene(Frozen):
+class Scene(nodes.Brief):
     """A whole scene: settings and top-level nodes, which form a union in file order."""
 
     version: Version = 1
@@ -252,10 +233,6 @@ class Scene(Frozen):
             elements: Iterable[Elements] | Elements = (),
             nodes: Iterable[SceneNode] | SceneNode = (),
         ) -> None: ...
-
-    @model_serializer(mode="wrap")
-    def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return unstated(plain(self), "samples", 4)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
@@ -473,7 +450,7 @@ def _plain(value: Any, *, brief: bool = False) -> Any:
         return {
             name: _plain(item, brief=brief)
             for name, item in value.__dict__.items()
-            if not (brief or name in ("opacity", "samples"))
+            if not (brief or name in nodes.LATER)
             or name in ("kind", "version")
             or not _same(item, fields[name].default)
         }

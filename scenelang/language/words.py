@@ -162,8 +162,6 @@ PLAIN_SETTINGS: Final = _table(
         "animate(seconds = ${1:2}, fps = ${2:24}, loop = ${3|true,false|});",
         head="animate(seconds, fps, loop = true)",
     ),
-)
-SAMPLING: Final = _table(
     _call(
         "samples",
         "n:samples",
@@ -196,7 +194,7 @@ STAGE: Final = _table(
     ),
 )
 """Settings of 3D scenes; a scene's own module of such a name hides them."""
-SETTINGS: Final = PLAIN_SETTINGS | SAMPLING | STAGE
+SETTINGS: Final = PLAIN_SETTINGS | STAGE
 _BOTH: Final = _table(
     _call(
         "translate",
@@ -278,7 +276,23 @@ TRANSFORMS: Final = _BOTH | _table(
         "shell(${1:0.1});",
     ),
 )
-PROPERTIES: Final = _table(
+OPERATIONS: Final = _BOTH | _table(
+    _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
+    _call(
+        "color",
+        "c:colour",
+        "Multiplies the material's colour.",
+        ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
+        "color(${1:#d33});",
+    ),
+    _call(
+        "grayscale",
+        "a",
+        "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
+        ("0 keeps the colour, 1 is grey",),
+        "grayscale(${1:1});",
+    ),
+    _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
     _call(
         "opacity",
         "a:share",
@@ -286,38 +300,17 @@ PROPERTIES: Final = _table(
         ("0 shows all of it, 1 none",),
         "opacity(${1:0.5});",
     ),
-)
-"""Properties of a material: they stand in its block, in no order with its operations."""
-OPERATIONS: Final = (
-    _BOTH
-    | PROPERTIES
-    | _table(
-        _call("flip", "", "Mirrors the texture: x → −x.", snippet="flip();"),
-        _call(
-            "color",
-            "c:colour",
-            "Multiplies the material's colour.",
-            ("`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`",),
-            "color(${1:#d33});",
-        ),
-        _call(
-            "grayscale",
-            "a",
-            "Mixes with the luma 0.2126 R + 0.7152 G + 0.0722 B: 0 keeps the colour, 1 makes it grey.",
-            ("0 keeps the colour, 1 is grey",),
-            "grayscale(${1:1});",
-        ),
-        _call("hue", "angle:hue", "Shifts the hue, keeping S and V of HSV.", (_ANGLE,), "hue(${1:0.1}turn);"),
-        _call(
-            "stop",
-            "offset c:colour",
-            "A stop of a gradient, which has 2 to 8 in order; of equal offsets the edge is hard.",
-            ("where it lies, 0 to 1", "`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`"),
-            "stop(${1:0}, ${2:#d33});",
-        ),
-    )
+    _call(
+        "stop",
+        "offset c:colour",
+        "A stop of a gradient, which has 2 to 8 in order; of equal offsets the edge is hard.",
+        ("where it lies, 0 to 1", "`#d33`, `[r, g, b]`, `rgb(r, g, b)` or `hsv(h, s, v)`"),
+        "stop(${1:0}, ${2:#d33});",
+    ),
 )
 """Operations in a material's block."""
+PROPERTIES: Final = ("opacity",)
+"""Those that stand in no order with the others, each at most once."""
 
 FUNCTIONS: Final = _table(
     _call("sin", "x:angle", "The sine of an angle."),
@@ -431,7 +424,7 @@ SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
 OWN_TRANSFORMS: Final = "grow", "shell", "displace"
 """Transforms of a leaf's own distance, which stand first in its block, each at most once."""
-NEWER: Final = frozenset(("grow", "shell", "stop", *STAGE, *SAMPLING, *PROPERTIES))
+NEWER: Final = frozenset(("grow", "shell", "stop", "samples", "opacity", *STAGE))
 """Words that head a statement unless a scene's own module has their name."""
 SCENES: Final = {2: "flat", 3: "solid"}
 """Names for scenes of a dimension."""

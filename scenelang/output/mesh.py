@@ -194,7 +194,7 @@ class Grid:
                 raise RenderError(f"more than {MOST_CELLS:,} cells at a resolution of {resolution}")
         sampler.widen(2 * self.side)
         self.bits, self.cells = self.number(_BITS), self.number(cells)
-        self.nodes, self.values = np.zeros(0, np.intp), np.zeros(0)
+        self.nodes, self.values, self.holed = np.zeros(0, np.intp), np.zeros(0), False
         while True:
             fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
@@ -206,6 +206,7 @@ class Grid:
                 self.cells = np.concatenate([self.cells, left])
             elif len(taken := self._pinched()):
                 self.values[np.searchsorted(self.nodes, taken)] = TINY
+                self.holed = True
             else:
                 break
 
@@ -262,7 +263,7 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
         return empty, said
     grid = Grid(sampler, resolution)
     cases, table, side = grid.cases(), sheets(), grid.side
-    thin = _thin(grid, cases)
+    thin = grid.holed or _thin(grid, cases)
     active = np.flatnonzero((cases > 0) & (cases < 255))
     if not len(active):
         return empty, said
@@ -286,16 +287,16 @@ def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMes
     triangles = _cut(sampler, quad, places, side)
     met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), Wanted.ALL)
     if thin:
-        said["W0552"] = f"parts thinner than a cell of {side:.2g} are missing or have holes"
+        said["W0552"] = f"parts about as thin as a cell of {side:.2g} may be missing or have holes"
     return TriangleMesh(places, triangles, encoded(met.register[:3].T)), said
 
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
     sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
-    ends, values = (grid.points(a).T, grid.points(b).T), [grid.value(end) for end in (a, b)]
+    low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
-    zero, _, beyond = zeros(lambda p: sampler.at(p.T), *ends, *values, steps, mixed)
+    zero, _, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
     p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T

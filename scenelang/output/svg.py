@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import How
+from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
@@ -39,6 +39,7 @@ ROUND: Final = 2.0  # times as much: circles
 BEVEL: Final = 0.3  # units: shorter pieces between two corners are left out
 SMALL: Final = 0.3  # square units: smaller specks are left out
 BORDER: Final = 2.0  # units around the canvas where layers end
+MOST_BLENDED: Final = 100  # each is compared with all that were blended before
 FINER: Final = 2.0  # texels of a picture for a unit
 MOST_TEXELS: Final = 1 << 22
 
@@ -167,11 +168,10 @@ class Region:
         self.wins = [(shapes.fold(one), shapes.fold(other), floor) for one, other, floor in layer.wins]
         fields = [self.bound, *(field for one, other, _ in self.wins for field in (one, other))]
         self.steep = STEEP * max(float(field.frames.stretch.max()) for field in fields)
-        low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for operand in layer.shape:
-            if operand.operator < SUBTRACT or operand is layer.shape[0]:
-                box = shapes.program.bounds[operand.rows.start : operand.rows.stop].astype(np.float64)
-                low, high = np.minimum(low, box[:, :2].min(0)), np.maximum(high, box[:, 2:].max(0))
+        shown = [o.rows for o in layer.shape if o.operator < SUBTRACT or o is layer.shape[0]]
+        rows = [layer.row] if layer.wins else [row for some in shown for row in some]
+        boxes = shapes.program.bounds[rows].astype(np.float64)
+        low, high = boxes[:, :2].min(0), boxes[:, 2:].max(0)
         half = shapes.half[:, 0, 0]
         corners = np.array([[low[0], -high[1]], [high[0], -low[1]]]) * shapes.unit + half
         self.low, self.high = corners.clip(-2 * BORDER, shapes.size + 2 * BORDER)
@@ -507,6 +507,8 @@ def svg_of(program: Program, how: How) -> tuple[str, bool]:
         fill = _hex(program.background)
         body.append(f'<rect width="{across}" height="{down}" fill="{fill}"/>')
     layers = layers_of(operands(program.tokens), inks.looks)
+    if (blended := sum(bool(layer.wins) for layer in layers)) > MOST_BLENDED:
+        raise RenderError(f"{blended:,} objects of other colours in a blend; an SVG has {MOST_BLENDED}")
     for layer in layers:
         region = Region(shapes, layer)
         data = ""
@@ -526,4 +528,4 @@ def svg_of(program: Program, how: How) -> tuple[str, bool]:
         else ""
     )
     text = "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg"{linked} {size}>', *body, "</svg>", ""])
-    return text, any(layer.wins for layer in layers)
+    return text, blended > 0

@@ -197,9 +197,9 @@ def view_of(
         "animation": form and animation and {**animation.model_dump(), "frames": animation.frames},
         "source": [{"name": name, "text": text} for name, text in source],
         "licences": [
-            {"name": element.name, "text": credit}
-            for element in elements
-            if isinstance(element, Element) and (credit := credit_of([element]))
+            {"name": name, "text": credit}
+            for name, element in {e.credited: e for e in elements if isinstance(e, Element)}.items()
+            if (credit := credit_of([element]))
         ],
     }
     if isinstance(network, FramedArrays):

@@ -458,7 +458,7 @@ class Writer:
         zoo = self.files[file]
         assert zoo is not None
         assert zoo.font is not None
-        font, letters, pairs = zoo.font, {}, {}
+        font, letters, pairs = zoo.font, dict[str, Json](), dict[str, float]()
         for letter in sorted(self.written & font.letters.keys()):
             advance, x, y, radius = font.metrics[font.letters[letter]]
             called = name_of(letter)

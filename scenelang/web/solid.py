@@ -167,7 +167,7 @@ def _norms(layers: Norms, sloped: bool) -> list[str]:
         at += size
     lines.append(f"float far = {_highest(lengths) if lengths else '0.0'};")
     inner = [f"l{i}" for i in range(outer, len(levels))]
-    lines.append(f"float deep = min({_highest(inner) if inner else '0.0'}, 0.0);")
+    lines.append(f"float deep = {_highest(inner) if inner else '0.0'};")
     if sloped:
         lines.append("vec3 a = vec3(0.0); float about = 0.0, up = 0.0, top = 0.0, low = 0.0;")
         places = ("a.x", "a.y", "a.z", "about", "up", "top", "low")
@@ -176,14 +176,14 @@ def _norms(layers: Norms, sloped: bool) -> list[str]:
         for k, size in enumerate(layers.units):
             rates += [f"u{k} == far ? l{i} / max(far, 1e-18) : 0.0" for i in range(at, at + size)]
             at += size
-        rates += [f"deep < 0.0 && {name} == deep ? 1.0 : 0.0" for name in inner]
+        rates += [f"(deep < 0.0 || far == 0.0) && {name} == deep ? 1.0 : 0.0" for name in inner]
         for rate, row in zip(rates, layers.w.tolist(), strict=True):
             terms = [f"{places[i]} += r * {v!r};" for i, v in zip(layers.features, row, strict=True) if v]
             lines.append(f"{{ float r = {rate}; {' '.join(terms)} }}")
         lines.append("a += top * vec3(equal(s, vec3(most))) + low * vec3(equal(s, vec3(least)));")
         lines.append("g = mix(a, -a, vec3(lessThan(q, vec3(0.0)))) + vec3(0.0, up, 0.0);")
         lines.append("g.xz += q.xz * (about / max(across, 1e-18));")
-    return [*lines, f"return far + deep - {float(layers.radius)!r};"]
+    return [*lines, f"return far + min(deep, 0.0) - {float(layers.radius)!r};"]
 
 
 def _highest(names: Sequence[str]) -> str:

@@ -16,7 +16,7 @@ def outline(geometry: str) -> list[tuple[float, float]]:
     if geometry == "star":
         radii, count, first = [1.0, 0.381966] * 5, 10, 90.0
     else:
-        count = {"square": 4, "triangle": 3, "pentagon": 5}[geometry]
+        count = {"square": 4, "triangle": 3, "pentagon": 5, "hexagon": 6}[geometry]
         radii, first = [1.0] * count, 45.0 if geometry == "square" else 90.0
     angles = [math.radians(first + 360.0 * i / count) for i in range(count)]
     return [(r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True)]
@@ -119,7 +119,8 @@ def sample(node: Any, x: float, y: float, outer: list[Any], material: Any) -> tu
     material = node.material or material
     if node.kind == "object":
         qx, qy = carry_back(moves, x, y)
-        d = polygon_distance(outline(node.geometry), qx, qy)
+        is_round = node.geometry == "disc"
+        d = math.hypot(qx, qy) - 1 if is_round else polygon_distance(outline(node.geometry), qx, qy)
         for move in moves:
             d = d - move.r if move.kind == "grow" else abs(d) - move.w / 2 if move.kind == "shell" else d
         return d * scale_of(moves), colour_of(material)

@@ -104,7 +104,7 @@ def test_completion_goes_by_the_block(client: Client, uri: str) -> None:
     client.replace(uri, SCENE + text)
     for before, offered, withheld in (
         ("group {\n  ", "square star ring lib translate let for", ""),
-        ("\nsquare { ", "translate rotate twirl material", "square canvas color"),
+        ("\nsquare { ", "translate rotate twirl grow shell material", "square canvas color"),
         ("subtract ", "square ring group", "canvas"),
         ("flat { ", "color hue grayscale flip opacity", "twirl square samples"),
         ("\nmod", "module canvas animate samples square", "translate opacity"),

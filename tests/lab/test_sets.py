@@ -47,7 +47,7 @@ def test_scenes_are_what_their_set_says(name: str) -> None:
     )
     assert warped == (config.warp > 0 or config.shuffled)
     assert any(getattr(s, word) != "default" for s in made for word in STAGE) == config.staged
-    drawn = {"sphere", "torus"} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
+    drawn = {*config.leaves} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
     assert {solid.geometry for solid in solids} == drawn
     for s in made:
         compile_scene(s)  # raises where it is refused

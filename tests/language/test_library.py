@@ -14,6 +14,8 @@ import pytest
 
 import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
+from scenelang.drawing.exact.solid import Field as Solid
+from scenelang.drawing.render import exact_graph
 from scenelang.language import library
 from scenelang.language.diagnostics import SourceFile, apply_fixes
 from scenelang.language.evaluation import Source
@@ -125,6 +127,7 @@ SHAPE_FIELDS = {
     "disc(0.7, 64)": (disc(0.7), 0.0008),
     "disc(0.03)": (disc(0.03), ROUND),
     "disc(0.015)": (disc(0.015), ROUND),
+    "disc(0.7, 16)": (regular(16, 0.7 * math.sqrt(math.tau / (16 * math.sin(math.tau / 16)))), 0.02),
     "ellipse(0.8, 0.5)": (lambda x, y: 0.5 * (math.hypot(x / 0.8, y / 0.5) - 1), ROUND),
     "ring(0.8, 0.2)": (band(0.8, 0.2), ROUND),
     "ring(0.8, 3)": (disc(0.8), ROUND),
@@ -224,7 +227,10 @@ def test_reserved_names_and_the_users_own_files(tmp_path: Path) -> None:
     assert codes("std/shapes", "s.sides_of(0.3)") == []
     assert codes("std/shapes.nsg", "s.mine") == codes("./std/shapes", "s.mine") == []
     assert codes("std/mine", "s.mine") == [
-        ("E0214", "it has std/letters, std/meshes, std/shapes; a file of your own is `./std/mine`")
+        (
+            "E0214",
+            "it has std/letters, std/meshes, std/shapes, std/solids; a file of your own is `./std/mine`",
+        )
     ]
     assert [code for code, _ in codes("std/../std/shapes", "s.mine")] == []
     (tmp_path / "std" / "shapes.nsg").unlink()
@@ -242,10 +248,10 @@ NEST = "module m(n) {{ if (n > 0) {{ subtract {{ {level} m(n - 1); }} }} else {{
 def test_mistakes_in_calls_are_shown_at_the_call() -> None:
     """And so are those of the compiler: nothing in the library is the user's to mend."""
     for text, code, where in (
-        ('s.disc("a");', "E0301", "s.disc"),
+        ('s.disc("a");', "E0303", "s.disc"),
         ("s.line([0, 0], 3deg);", "E0303", "s.line"),
         ("s.arc(1, 0.1, 0, 9);", "E0302", "s.arc"),
-        (f"{NEST.format(level='square {}', inmost='s.disc_mask(1);')} m(16);", "E0409", "s.disc_mask"),
+        (f"{NEST.format(level='square {}', inmost='s.disc_mask(1, 8);')} m(16);", "E0409", "s.disc_mask"),
     ):
         found = nsg.Diagnostics()
         scene, spans = Source(text=SourceFile("a.nsg", IMPORT + text)).scene(found)
@@ -261,7 +267,7 @@ def test_known_shapes_lead_to_the_library() -> None:
     for text, code, help in (
         ("circle { scale(0.5); }", "E0204", 'import "std/shapes" as s; then s.'),
         ("Circle(0.2);", "E0204", 'import "std/shapes" as s; then s.'),
-        ("hexagon() {}", "E0204", 'import "std/shapes" as s; then s.'),
+        ("octagon() {}", "E0204", 'import "std/shapes" as s; then s.'),
         ("line;", "E0204", 'import "std/shapes" as s; then s.'),
         ('import "std/shapes" as form; let s = 1; circle;', "E0204", "form.disc(r)"),
     ):
@@ -269,3 +275,41 @@ def test_known_shapes_lead_to_the_library() -> None:
         assert (only.code, (only.help or "")[: len(help)]) == (code, help)
     with pytest.raises(nsg.SceneError, match="rect"):
         nsg.loads("square(0.5);")
+
+
+SOLIDS = {
+    "ball(0.6)": lambda x, y, z: math.hypot(x, y, z) - 0.6,
+    "block(1, 0.6, 0.8)": lambda x, y, z: max(abs(x) - 0.5, abs(y) - 0.3, abs(z) - 0.4),
+    "column(0.5, 1.2)": lambda x, y, z: max(math.hypot(x, z) - 0.5, abs(y) - 0.6),
+    "spike(0.5, 1.2)": lambda x, y, z: max(math.hypot(x, z) - 0.5 * (0.6 - y) / 1.2, -y - 0.6),
+    "ring(0.6, 0.3)": lambda x, y, z: math.hypot(math.hypot(x, z) - 0.6, y) - 0.15,
+    "tube(0.6, 1, 0.2)": lambda x, y, z: max(abs(math.hypot(x, z) - 0.5) - 0.1, abs(y) - 0.5),
+    "dome(0.8)": lambda x, y, z: max(math.hypot(x, y, z) - 0.8, -y),
+    "wedge(1, 0.6, 0.8)": lambda x, y, z: max(abs(x) - 0.5, abs(z) - 0.4, y - 0.6 * x, -y - 0.3),
+    "pyramid(1, 1.2)": lambda x, y, z: max(max(abs(x), abs(z)) - (0.6 - y) / 2.4, -y - 0.6),
+    "prism(4, 0.6, 1)": lambda x, y, z: max(abs(x) + abs(z) - 0.6, abs(y) - 0.5),
+    "prism(3, 0.8, 1)": lambda x, y, z: max(-z - 0.4, abs(x) * 3**0.5 / 2 + z / 2 - 0.4, abs(y) - 0.5),
+    "rounded(1, 0.8, 0.6, 0.2)": lambda x, y, z: (
+        math.hypot(max(abs(x) - 0.3, 0), max(abs(y) - 0.2, 0), max(abs(z) - 0.1, 0)) - 0.2
+    ),
+    "pill([0.3, -0.2, 0.1], [-0.4, -0.2, 0.1], 0.3)": lambda x, y, z: (
+        math.hypot(max(x - 0.3, -0.4 - x, 0), y + 0.2, z - 0.1) - 0.3
+    ),
+    "rod([0.1, -0.5, 0.2], [0.1, -0.5, -0.6], 0.2)": lambda x, y, z: max(
+        math.hypot(x - 0.1, y + 0.5) - 0.2, abs(z + 0.2) - 0.4
+    ),
+}
+"""Below 0 in a shape, and 0 on its outline."""
+
+
+@pytest.mark.parametrize("call", SOLIDS)
+def test_solids_are_their_closed_forms(call: str) -> None:
+    scene = nsg.loads(f'import "std/solids" as s; s.{call};')
+    program = nsg.compile(scene)
+    exact = Solid(exact_graph(scene)[0].root)
+    p = np.random.default_rng(1).uniform(-1, 1, (3, 3000))
+    wanted = np.array([SOLIDS[call](*point) for point in p.T.tolist()])
+    sure = abs(wanted) > 1e-5
+    assert ((exact.at(p).d < 0) == (wanted < 0))[sure].all()
+    assert (wanted < 0).sum() > 30
+    assert len(program) <= 15

@@ -346,6 +346,17 @@ CORNERS = {
             intersect sphere { scale(1.1); translate(0.1, 0, 0); }
         }
         """,
+    "edges": """
+        canvas(96, 64);
+        box { scale(0.7, 0.3, 0.5); rotate(30deg, axis = Y); translate(-1.5, 0.6, 0); }
+        cylinder { twist(0.7); scale(0.6); translate(-0.5, 0.6, 0.2); }
+        chain {
+            cone { scale(0.6, 0.8, 0.6); translate(0.8, 0.4, 0); }
+            smooth capsule { scale(0.5); rotate(40deg); translate(1.3, 0.6, 0.3); }
+            subtract box { scale(0.3); translate(0.8, 0.2, 0.6); }
+        }
+        octahedron { scale(0.6); translate(-0.5, -0.4, 1.2); material volumetric { color(#8af); } }
+        """,
     "skins": """
         canvas(64, 48);
         chain {

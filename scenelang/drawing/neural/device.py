@@ -470,7 +470,7 @@ def _rows(field: Field) -> np.ndarray:
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
     """The kernel's ``parts``, of each object (N, 6), and its ``weights``."""
-    shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]
+    shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]  # type: ignore[arg-type]
     textures = [_texture_table(texture) for texture in field.textures]
     weights = [np.empty(0, np.float32), *shapes, *textures]
     begins = np.cumsum([part.size for part in weights])

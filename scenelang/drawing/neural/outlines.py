@@ -74,7 +74,8 @@ def _tangents(pieces: Floats) -> tuple[Floats, Floats]:
 def _unit(way: Floats, otherwise: Floats) -> Floats:
     length = np.hypot(*way.T)[:, None]
     away = np.hypot(*otherwise.T)[:, None]
-    return np.where(length > 1e-9, way / np.maximum(length, 1e-12), otherwise / np.maximum(away, 1e-12))
+    ways = way / np.maximum(length, 1e-12), otherwise / np.maximum(away, 1e-12)
+    return np.asarray(np.where(length > 1e-9, *ways))
 
 
 def _edges(cells: int) -> Floats:
@@ -135,7 +136,7 @@ def _joined(elements: tuple[Element, ...]) -> tuple[npt.NDArray[np.generic], ...
 @lru_cache
 def true_slopes() -> Slopes:
     """What bounds true distances, which change by no more than a point moves."""
-    return Slopes(np.zeros((len(RADII), CELLS, CELLS)), 0.0)
+    return Slopes(np.zeros((len(RADII), CELLS, CELLS)), 1e-9)  # 0 times infinity would be no number
 
 
 class OutlineShapes:

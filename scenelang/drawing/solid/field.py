@@ -200,8 +200,7 @@ class SolidField:
             self._alone()
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         drawn = np.array([solid.draws for solid in self.solids], bool)
-        # whether leaves have edges, which lines inside make
-        self.edged = any(isinstance(decoder, Norms) and decoder.inner > 0 for decoder in self.decoders)
+        self.edged = any(not isinstance(own, GridShape) and network.edged(own) for own in self.decoders)
         self.draws = bool(drawn.all())  # whether all objects draw
         self.media = bool(kinds.any())  # whether some object is a medium
         self.mixed = self.media and not kinds.all()  # whether some are and some are not
@@ -293,7 +292,7 @@ class SolidField:
             for key in ordered
             if isinstance(key, bytes)
         ]
-        self.decoders: list[Smooth | GridShape] = [
+        self.decoders: list[Smooth | Norms | GridShape] = [
             *map(network.decoder, learned),
             *(
                 grid_shape(key, xp, network.codes, key in grown)
@@ -313,10 +312,11 @@ class SolidField:
                 sides = box[:, :, None] + np.reshape([-1, 1], (2, 1, 1)) * max(solid.radius - 1, 0.0)
                 low, high = (xp.array(side, network.codes) for side in sides.astype(np.float32))
                 self.solids[i] = replace(solid, box=(low, high))
-        plain = ~self.skinned & [
+        lone = [
             element is None and s.draws and s.radius <= 1 + SLACK and not s.frame.steps
             for element, s in zip(brought, self.solids, strict=True)
         ]
+        plain = ~self.skinned & np.array(lone, bool)
         media = np.asarray(xp.to_numpy(self.looks))[-1] > 0.5
         self.segments = [network.segment(code) for code in learned] if (plain & media).any() else []
         known = np.array([bool(own) for own in self.segments] + [False] * len(ordered), bool)
@@ -472,7 +472,7 @@ class SolidField:
                 xp.put(result, index, self._field(xp.take(q, index), gradient, layers))
         return result
 
-    def _field(self, q: Array, gradient: bool, decoder: Smooth | GridShape) -> Array:
+    def _field(self, q: Array, gradient: bool, decoder: Smooth | Norms | GridShape) -> Array:
         if isinstance(decoder, GridShape):
             return decoder.field(q, gradient)
         return self.network.field(q, decoder, gradient)

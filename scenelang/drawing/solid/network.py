@@ -230,6 +230,10 @@ class SolidNetwork:
         parts = [np.asarray(self.xp.to_numpy(part)) for layer in layers for part in layer]
         return decoder_box(tuple(part.shape for part in parts), b"".join(part.tobytes() for part in parts))
 
+    def edged(self, layers: Smooth | Norms) -> bool:
+        """Whether a decoder shows edges, which lines inside make; rays may clip them."""
+        return isinstance(layers, Norms) and layers.inner > 0
+
     def _slopes(self, q: Array, layers: Smooth) -> Array:
         """Distances and gradients (4, M), which go back through the layers."""
         xp, kept = self.xp, []

@@ -42,7 +42,7 @@ class Norms(NamedTuple):
     @property
     def products(self) -> int:
         """How many products an answer takes."""
-        return self.w.shape[0] * (self.w.shape[1] + 1)
+        return len(self.b) * (len(self.features) + 1)
 
 
 def norms(xp: Arrays, lines: Array, radius: Array, far: float) -> Norms:
@@ -90,7 +90,8 @@ def answers(xp: Arrays, q: Array, layers: Norms, gradient: bool) -> Array:
     highest = reduce(xp.maximum, sums)
     rates = [above[part] * (far * (own == highest)) for part, own in zip(parts, sums, strict=False)]
     if depth is not None:
-        rates.append(((inside == depth) & (depth < 0)) * (0 * depth + 1))
+        within = (depth < 0) | (length == 0)  # on a face, rounding may say neither
+        rates.append(((inside == depth) & within) * (0 * depth + 1))
     by = dict(zip(used, layers.w.T @ xp.concat(rates, 0), strict=True))
     return xp.concat([d[None], _spread(xp, q, sides, by, across, most, least)], 0)
 
