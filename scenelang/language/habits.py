@@ -48,6 +48,11 @@ def head_word(tokens: Tokens, at: int) -> str:
     return tokens.text(tokens.head(at, MAX_REPLAY))
 
 
+def quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
+
+
 @lru_cache(maxsize=256)
 def keywords_near(text: str) -> tuple[str, ...]:
     """Keywords that a word may have been meant for, nearest first."""
@@ -327,9 +332,7 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
     place = (start + lead, end - tail) if lead + tail < len(old) else (start, end)
     fix: Fix | None = None
     if safe:
-        shown = " ".join(new.split())
-        shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
-        fix = report.change(start, end, new, f"write `{shown}`" if shown else "remove it")
+        fix = report.change(start, end, new, f"write {quoted(new)}" if new.strip() else "remove it")
     report.add(code, message, *place, help=help, fix=fix)
 
 
