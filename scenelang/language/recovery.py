@@ -128,7 +128,11 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
     while kinds[limit] in (opening, closing):
         limit += 1
     end = min(limit + _BEHIND, len(kinds) - 1)
-    stack = _inside(kinds, first)
+    other = _kinds("else")[0]
+    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
+    stack = [tables().start]
+    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
+        advance(stack, kind)  # deep inside blocks, where all that a line can close fits
     misfit = min(reach(stack.copy(), kinds, first, end), limit)
     places = range(max(first, misfit - _LONGEST), misfit + 1)
     reach(stack, kinds, first, places.start)
@@ -149,16 +153,6 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
         if at == limit or not advance(stack, kinds[at]):
             break
     return best
-
-
-def _inside(kinds: list[int], first: int) -> list[int]:
-    """The states deep inside blocks: all that a line can close fits there."""
-    other = _kinds("else")[0]
-    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
-    stack = [tables().start]
-    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
-        advance(stack, kind)
-    return stack
 
 
 def _mends(
@@ -276,7 +270,11 @@ class Recovery:
             return None
         depth = statement_depth(states)
         base = states[: depth + 1]
-        first = self._index(values[depth]) if depth < len(values) else at
+        begun = values[depth] if depth < len(values) else at
+        if not isinstance(begun, int):
+            span: Span = begun[1] if isinstance(begun, tuple) else begun.span
+            begun = bisect_left(self.tokens.starts, span.start)
+        first: int = begun
         near = at - first <= MAX_REPLAY
         mended = near and mend_habit(self.tokens, self.report, base, first, at)
         if not mended and (self._spaced_unit(at) or (first == at and self._start_mistake(at))):
@@ -290,12 +288,6 @@ class Recovery:
             mended = True
         del states[depth + 1 :], values[depth:]
         return first if mended else self._skip(first, at)
-
-    def _index(self, value: Any) -> int:
-        if isinstance(value, int):
-            return value
-        span: Span = value[1] if isinstance(value, tuple) else value.span
-        return bisect_left(self.tokens.starts, span.start)
 
     # ------------------------------------------------------------ the best repair
 

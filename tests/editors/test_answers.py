@@ -14,6 +14,7 @@ from PIL import Image
 from scenelang.assets.element import Part
 from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.manifest import available
+from scenelang.language import library
 from scenelang.language.words import PAINTS
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.editors.client import CAPABILITIES, Client, Json
@@ -124,7 +125,7 @@ def test_completion_of_arguments_members_paths_models_and_units(client: Client, 
     assert not {"ring", "n ="} & set(found)
     assert labels(client, client.at(uri, "lib.;", 4)) == ["dot", "twice", "unit"]
     assert labels(client, client.at(uri, "lib.;", 4, 1)) == ["dot", "unit"]
-    files = ["std/letters", "std/meshes", "std/shapes", "lib.nsg"]
+    files = [*library.names(), "lib.nsg"]
     assert labels(client, client.at(uri, 'import "" as', 8)) == files
     assert labels(client, client.at(uri, 'model ""', 7)) == available()
     assert labels(client, client.at(uri, "30d;", 3)) == ["30deg"]
