@@ -288,7 +288,7 @@ def test_the_library_that_ships_is_read_and_never_changed(client: Client, folder
     found = client.request("textDocument/definition", client.at(uri, "disc", 1))
     assert found["uri"].endswith("std/shapes.nsg")
     assert client.request("textDocument/definition", client.at(uri, "std/", 1))["uri"] == found["uri"]
-    says(client, uri, [("disc", 1, ["module disc(r = 1, sides = sides_of(r))", "A disc of radius r"])])
+    says(client, uri, [("disc", 1, ["module disc(r = 1, ", "A disc of radius r"])])
     assert {"disc", "rect", "arrow"} <= set(labels(client, client.at(uri, "disc", 0)))
     assert "std/shapes" in labels(client, client.at(uri, "shapes", 0))
     for method, more in (("prepareRename", {}), ("rename", {"newName": "round"})):
