@@ -115,9 +115,6 @@ def drawn(place: Place) -> str:
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"
 
 
-"""Kinds of bindings that are values."""
-
-
 def report_unknown(
     name: tree.Name, place: Place, code: str, message: str, advise: Callable[[], Advice]
 ) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from scenelang.assets.records import Record
-from scenelang.language.diagnostics import Fix, ranked
+from scenelang.language.diagnostics import Fix, common_start, ranked
 from scenelang.language.foreign import OPERATORS
 from scenelang.language.lexer import Report, Token, Tokens, reach
 from scenelang.language.tables import END, tables
@@ -46,6 +46,11 @@ _WORDS: Final[dict[str, tuple[str, ...]]] = {
 def head_word(tokens: Tokens, at: int) -> str:
     """First word of the statement that a token is in."""
     return tokens.text(tokens.head(at, MAX_REPLAY))
+
+
+def quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
 
 
 @lru_cache(maxsize=256)
@@ -327,16 +332,13 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
     place = (start + lead, end - tail) if lead + tail < len(old) else (start, end)
     fix: Fix | None = None
     if safe:
-        shown = " ".join(new.split())
-        shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
-        fix = report.change(start, end, new, f"write `{shown}`" if shown else "remove it")
+        fix = report.change(start, end, new, f"write {quoted(new)}" if new.strip() else "remove it")
     report.add(code, message, *place, help=help, fix=fix)
 
 
 def _alike(one: str, other: str) -> int:
     """Number of letters that two texts have in common at their start, without half a word."""
-    pairs = enumerate(zip(one, other, strict=False))
-    count = next((at for at, (a, b) in pairs if a != b), min(len(one), len(other)))
+    count = common_start(one, other)
     while count and re.match(r"\w\w", one[count - 1 : count + 1] + other[count : count + 1]):
         count -= 1
     return count

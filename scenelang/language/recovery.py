@@ -19,12 +19,11 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Label, Span
-from scenelang.language.foreign import HEADS, OPERATORS
-from scenelang.language.habits import MAX_REPLAY, head_word, keywords_near, mend_habit
+from scenelang.language.foreign import HEADS, OPERATORS, UNIT_NAMES
+from scenelang.language.habits import MAX_REPLAY, head_word, keywords_near, mend_habit, quoted
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
-    UNIT_ALIASES,
     Report,
     Tokens,
     advance,
@@ -129,7 +128,11 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
     while kinds[limit] in (opening, closing):
         limit += 1
     end = min(limit + _BEHIND, len(kinds) - 1)
-    stack = _inside(kinds, first)
+    other = _kinds("else")[0]
+    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
+    stack = [tables().start]
+    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
+        advance(stack, kind)  # deep inside blocks, where all that a line can close fits
     misfit = min(reach(stack.copy(), kinds, first, end), limit)
     places = range(max(first, misfit - _LONGEST), misfit + 1)
     reach(stack, kinds, first, places.start)
@@ -150,16 +153,6 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
         if at == limit or not advance(stack, kinds[at]):
             break
     return best
-
-
-def _inside(kinds: list[int], first: int) -> list[int]:
-    """The states deep inside blocks: all that a line can close fits there."""
-    other = _kinds("else")[0]
-    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
-    stack = [tables().start]
-    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
-        advance(stack, kind)
-    return stack
 
 
 def _mends(
@@ -277,7 +270,11 @@ class Recovery:
             return None
         depth = statement_depth(states)
         base = states[: depth + 1]
-        first = self._index(values[depth]) if depth < len(values) else at
+        begun = values[depth] if depth < len(values) else at
+        if not isinstance(begun, int):
+            span: Span = begun[1] if isinstance(begun, tuple) else begun.span
+            begun = bisect_left(self.tokens.starts, span.start)
+        first: int = begun
         near = at - first <= MAX_REPLAY
         mended = near and mend_habit(self.tokens, self.report, base, first, at)
         if not mended and (self._spaced_unit(at) or (first == at and self._start_mistake(at))):
@@ -291,12 +288,6 @@ class Recovery:
             mended = True
         del states[depth + 1 :], values[depth:]
         return first if mended else self._skip(first, at)
-
-    def _index(self, value: Any) -> int:
-        if isinstance(value, int):
-            return value
-        span: Span = value[1] if isinstance(value, tuple) else value.span
-        return bisect_left(self.tokens.starts, span.start)
 
     # ------------------------------------------------------------ the best repair
 
@@ -413,31 +404,29 @@ class Recovery:
     def _start_mistake(self, at: int) -> bool:
         """A token that no statement begins with."""
         tokens, place, name = self.tokens, self.tokens.place(at), self.tokens.name(at)
-        after = tokens.name(at + 1) if tokens.kinds[at] != END else ""
-        instead: tuple[str, ...] = ("BAD_HEAD",)
-        if name == ";" and after != "{":
+        block = tokens.kinds[at] != END and tokens.name(at + 1) == "{"
+        if name == ";" and not block:
             self.report.add("W0101", "stray `;`", *place, help="no `;` follows a block", fix="")
-            count, instead = 1, ()
+            tokens.replace(at, 1, ())
         elif name == "{" and at and tokens.name(at - 1) == ";" and not tokens.on_new_line(at):
             fix = None if head_word(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
             self.report.add("E0130", "`;` between a statement and its block", *tokens.place(at - 1), fix=fix)
-            count = 0
+            tokens.replace(at, 0, _kinds("BAD_HEAD"))
         elif name == "{":
             help = "a block belongs to an object, a module, `group`, `material`, `for`, `if` or a boolean"
             self.report.add("E0129", "block without a head", *place, help=help)
-            count = 0
+            tokens.replace(at, 0, _kinds("BAD_HEAD"))
         elif name == "else":
             self.report.add("E0101", "`else` without `if`", *place)
-            count, instead = 1, instead if after == "{" else ()
+            tokens.replace(at, 1, _kinds("BAD_HEAD") if block else ())
         else:
             return False
-        tokens.replace(at, count, _kinds(" ".join(instead)))
         return True
 
     def _spaced_unit(self, at: int) -> bool:
         """`30 deg`: one number, whose value is unknown."""
         tokens, number, word = self.tokens, tables().kind("NUMBER"), self.tokens.text(at)
-        unit, gap = UNIT_ALIASES.get(word, word), (tokens.end_before(at), tokens.starts[at])
+        unit, gap = UNIT_NAMES.get(word, word), (tokens.end_before(at), tokens.starts[at])
         bare = at > 0 and tokens.kinds[at - 1] == number and tokens.text(at - 1)[-1:].isdigit()
         if not bare or unit not in UNITS or tokens.source.text[slice(*gap)].strip(" "):
             return False
@@ -490,7 +479,7 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_: list[in
         twice = text.isalpha() and text in (tokens.text(stop), tokens.text(at - 1))
         help = "between values choose with c ? a : b" if text.startswith("else") else None
         place = tokens.place(at, stop)
-        report.add(code, f"{word} {_quoted(text)}", *place, help=help, fix="" if twice else None)
+        report.add(code, f"{word} {quoted(text)}", *place, help=help, fix="" if twice else None)
     else:
         _report_replacement(tokens, report, repair, names)
 
@@ -513,11 +502,12 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
             simple = {"`;`": _PLAIN, "`{`": _FLAT}.get(shown)
             fix = first if simple and simple.fullmatch(tokens.source.text, *inside) else None
     elif first == ";":
-        help = "a `;` ends every statement without a block"
+        help, text = "a `;` ends every statement without a block", tokens.text(at)
+        moved = tokens.text(at - 1) == ")" and head_word(tokens, at - 1) in TRANSFORMS
         if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
             help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
-        elif breaks_off or shown == "`}`" or _surely_next(tokens, at):
-            fix = ";"
+        elif breaks_off or text in ("}", *_BEGINNINGS) or (moved and text in (*TRANSFORMS, "material")):
+            fix = ";"  # what comes next can only begin a statement of its own
     elif first in _NAMED:
         message = f"expected {_NAMED[first]}, found {shown}"
         if not breaks_off:  # an operand is missed where the next token stands
@@ -528,14 +518,6 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message = f"{message} before {shown}"
         fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
     report.add(code, message, *place, labels=labels, help=help, fix=fix)
-
-
-def _surely_next(tokens: Tokens, at: int) -> bool:
-    """Test whether a token within a line can only begin a statement of its own."""
-    text = tokens.text(at)
-    inside = text == "material" or text in TRANSFORMS
-    moved = inside and tokens.text(at - 1) == ")" and head_word(tokens, at - 1) in TRANSFORMS
-    return moved or text in _BEGINNINGS
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
@@ -579,9 +561,4 @@ def _listed(names: list[str]) -> str:
 
 
 def _shown(tokens: Tokens, at: int) -> str:
-    return "the end of the file" if tokens.kinds[at] == END else _quoted(tokens.text(at))
-
-
-def _quoted(text: str) -> str:
-    text = " ".join(text.split())
-    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
+    return "the end of the file" if tokens.kinds[at] == END else quoted(tokens.text(at))
