@@ -27,7 +27,7 @@ from scenelang.assets.files import lock, open_own, write_whole
 from scenelang.compiler.lower import Memory
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import image_format
-from scenelang.language.diagnostics import Diagnostics, SourceFile, plural
+from scenelang.language.diagnostics import Diagnostics, plural
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.library import SpanMap
 from scenelang.language.reports import SceneError
@@ -336,32 +336,6 @@ class Shot:
     spans: SpanMap  # where its nodes were written
 
 
-@dataclass(frozen=True, slots=True)
-class FixedFrames:
-    scenes: tuple[Scene, ...]  # at least one
-    fps: float | None = None  # frames a second; None for those of the first scene's animation
-    wanted: tuple[Path, ...] = ()
-    sources: tuple[SourceFile, ...] = ()
-
-    @property
-    def animates(self) -> bool:
-        return len(self.scenes) > 1
-
-    @property
-    def animation(self) -> Animation:
-        """Length and rate of the frames; raises `ValueError` without a rate, or where canvases differ."""
-        if len({scene.canvas for scene in self.scenes}) > 1:
-            raise ValueError("scenes with several canvases, where size says one for all")
-        first, count = self.scenes[0].animation, len(self.scenes)
-        fps = self.fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
-        if fps is None:
-            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
-        return Animation(count / fps, fps, first.loop if first is not None else True)
-
-    def run(self, number: int) -> tuple[Scene, SpanMap]:
-        return self.scenes[number], SpanMap()
-
-
 class Clip:
     """A scene evaluated and compiled by frames, or Scenes as frames; a mistake in any frame ends it."""
 
@@ -375,10 +349,12 @@ class Clip:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         if isinstance(source, Source):
             source = source.evaluation(self.diagnostics, replays=True)
-        self._evaluation = FixedFrames(source, fps) if isinstance(source, tuple) else source
+        self._evaluation, self._scenes = (None, source) if isinstance(source, tuple) else (source, ())
+        self._fps = fps  # of Scenes; None for those of the first one's animation
         self._last: tuple[Shot, Program] | None = None
         self._memory: Memory | None = Memory()
-        self.wanted = self._evaluation.wanted  # all files that it imports, also those that do not exist
+        # all files that it imports, also those that do not exist
+        self.wanted = self._evaluation.wanted if self._evaluation is not None else ()
 
     @cached_property
     def first(self) -> Shot:
@@ -387,22 +363,28 @@ class Clip:
 
     @property
     def animates(self) -> bool:
-        return self._evaluation.animates
+        return len(self._scenes) > 1 if self._evaluation is None else self._evaluation.animates
 
     @property
     def texts(self) -> tuple[str, ...]:
-        return tuple(source.text for source in self._evaluation.sources)
+        return tuple(one.text for one in self._evaluation.sources) if self._evaluation is not None else ()
 
     @property
     def animation(self) -> Animation:
-        """Length, frames a second and whether it is a loop."""
-        given = self._evaluation
-        return given.animation if isinstance(given, FixedFrames) else self.first.scene.animation or STILL
+        """Length, rate and whether it is a loop; raises `ValueError` where Scenes do not say."""
+        if self._evaluation is not None:
+            return self.first.scene.animation or STILL
+        if len({scene.canvas for scene in self._scenes}) > 1:
+            raise ValueError("scenes with several canvases, where size says one for all")
+        first, count = self._scenes[0].animation, len(self._scenes)
+        fps = self._fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
+        if fps is None:
+            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
+        return Animation(count / fps, fps, first.loop if first is not None else True)
 
     @property
     def frames(self) -> int:
-        given = self._evaluation
-        return len(given.scenes) if isinstance(given, FixedFrames) else self.animation.frames
+        return len(self._scenes) or self.animation.frames
 
     def numbers(self, frames: FrameRange) -> range:
         """Numbers of the requested frames; raises `SceneError` where some do not exist."""
@@ -417,6 +399,8 @@ class Clip:
 
     def shot(self, number: int) -> Shot:
         """Evaluate a frame; raises `SceneError` if it has errors."""
+        if self._evaluation is None:
+            return Shot(number, self._scenes[number], SpanMap())
         scene, spans = self._evaluation.run(number)
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
