@@ -28,11 +28,9 @@ from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import TileCache
 from scenelang.output.frames import Clip, Shot, frame_key, put_frame
-from scenelang.output.workers import AHEAD, Link
+from scenelang.output.workers import Link
 
 if TYPE_CHECKING:
-    from distributed import Future as Task
-
     from scenelang.drawing.image import Image, Output
 
 
@@ -264,7 +262,6 @@ class Cluster:
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
         self._each_s = BATCH_S  # estimated time of a frame
-        self._under_way: dict[Task[Any], list[Errand]] = {}
 
     @property
     def count(self) -> int:
@@ -272,20 +269,20 @@ class Cluster:
 
     @property
     def waiting(self) -> int:
-        while self._under_way and self._link.ready:
+        while self._link.ready:
             self._receive()
-        return len(self._batch) + sum(map(len, self._under_way.values()))
+        return len(self._batch) + sum(map(len, self._link.under_way.values()))
 
     def submit(self, program: Program, errand: Errand) -> None:
         self._batch.append((program_bytes(program), errand))
         large = sum(len(data) for data, _ in self._batch) > MOST_BYTES
         if large or len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
-            while len(self._under_way) >= AHEAD * self.count:
+            while self._link.full:
                 self._receive()
             self._send()
 
     def take(self) -> None:
-        """Send an incomplete batch, and write the next files that come back; raises as `Link.result`."""
+        """Send an incomplete batch, and write the next files that come back; raises as `Link.take`."""
         self._send()
         self._receive()
 
@@ -293,9 +290,8 @@ class Cluster:
         self._link.close()
 
     def _receive(self) -> None:
-        future = self._link.next()
-        errands = self._under_way.pop(future)
-        seconds, result = self._link.result(future)
+        errands, taken = self._link.take()
+        seconds, result = taken()
         self._each_s = 0.5 * (self._each_s + seconds / len(errands))
         for errand, files in zip(errands, result, strict=True):
             folder = Path(errand.file).parent
@@ -303,7 +299,7 @@ class Cluster:
 
     def _send(self) -> None:
         if self._batch:
-            self._under_way[self._link.send(draw_batch, self._batch)] = [errand for _, errand in self._batch]
+            self._link.send([errand for _, errand in self._batch], draw_batch, self._batch)
             self._batch, self.batches = [], self.batches + 1
 
 
