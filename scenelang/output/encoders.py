@@ -303,23 +303,20 @@ class NoFfmpeg(RenderError):
     """There is no ffmpeg, or it cannot encode."""
 
 
-def find_ffmpeg() -> str:
-    """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
-    result = shutil.which("ffmpeg")
-    if result is not None:
-        return result
-    try:
-        import imageio_ffmpeg
-
-        return str(imageio_ffmpeg.get_ffmpeg_exe())
-    except (ImportError, RuntimeError, OSError):
-        raise NoFfmpeg(MISSING) from None
-
-
 @lru_cache(maxsize=len(VIDEOS))
 def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
-    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without."""
-    ffmpeg = find_ffmpeg()
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without.
+
+    It is the one on the PATH, or the one that imageio-ffmpeg brings.
+    """
+    ffmpeg = shutil.which("ffmpeg")
+    if ffmpeg is None:
+        try:
+            import imageio_ffmpeg
+
+            ffmpeg = str(imageio_ffmpeg.get_ffmpeg_exe())
+        except (ImportError, RuntimeError, OSError):
+            raise NoFfmpeg(MISSING) from None
     done = run([ffmpeg, "-hide_banner", "-encoders"], capture_output=True, check=False, stdin=DEVNULL)
     lines = done.stdout.decode(errors="replace").splitlines()
     known = [words[1] for line in lines if len(words := line.split()) > 1]

@@ -544,8 +544,8 @@ def render_many(
         SceneError: the scene has errors whatever the values are.
         RenderError, OSError, ValueError, TypeError: as for `scenelang.animate`.
     """
-    given: object = path
-    if not isinstance(given, str | os.PathLike):
+    place: object = path
+    if not isinstance(place, str | os.PathLike):
         fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
         raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
@@ -560,7 +560,16 @@ def render_many(
     first = source.evaluation(diagnostics, frame=frame)
     if first.run(frame)[0] is None or diagnostics.errors:  # those of its syntax are of no row
         raise SceneError(diagnostics)
-    rows, across = _rows(first, values, grid or {}, random, count, seed)
+    given = [{name: text_of(value) for name, value in row.items()} for row in values]
+    drawn = dict(random) if isinstance(random, Mapping) else dict.fromkeys(random, "")
+    if given and (grid or drawn or count is not None):
+        raise ParamError("values are given as they are, and as a grid or at random")
+    if len(given) > MOST_ROWS:
+        raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
+    for name in dict.fromkeys(name for row in given for name in row):
+        if name not in first.inputs.known:
+            param_named(first, name)
+    rows, across = (given, 0) if given else rows_of(first, grid or {}, drawn, count, seed)
     for name in fixed:
         if any(name in row for row in rows):
             raise ParamError(f"param `{name}` with one value for all pictures, and with others")
@@ -584,25 +593,3 @@ def _target(out: str, stem: str) -> Target:
     if path.is_file() or (path.suffix and not path.is_dir() and not out.endswith(("/", "\\"))):
         raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
     return Target("sequence", path, f"{stem.replace('%', '%%')}-%06d.png")
-
-
-def _rows(
-    first: Evaluation,
-    values: Iterable[Mapping[str, Any]],
-    grid: Mapping[str, str | Iterable[Any]],
-    random: Iterable[str] | Mapping[str, str],
-    count: int | None,
-    seed: int,
-) -> tuple[list[dict[str, str]], int]:
-    given = [{name: text_of(value) for name, value in row.items()} for row in values]
-    drawn = dict(random) if isinstance(random, Mapping) else dict.fromkeys(random, "")
-    if not given:
-        return rows_of(first, grid, drawn, count, seed)
-    if grid or drawn or count is not None:
-        raise ParamError("values are given as they are, and as a grid or at random")
-    if len(given) > MOST_ROWS:
-        raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
-    for name in dict.fromkeys(name for row in given for name in row):
-        if name not in first.inputs.known:
-            param_named(first, name)
-    return given, 0

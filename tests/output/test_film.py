@@ -19,7 +19,7 @@ from scenelang.output.encoders import (
     Census,
     NoFfmpeg,
     Palette,
-    find_ffmpeg,
+    find_codec,
     mapped,
     write_apng,
     write_gif,
@@ -210,7 +210,7 @@ def test_frames_are_read_one_at_a_time(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.fixture
 def ffmpeg() -> str:
     try:
-        return find_ffmpeg()
+        return find_codec(".mp4")[0]
     except NoFfmpeg as error:
         pytest.skip(str(error))
 
