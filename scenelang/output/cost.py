@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from scenelang.compiler.compile import why_chosen
@@ -120,13 +121,11 @@ def drawing_cost(
 
     by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
 
+    draw = partial(draw_small, program) if by_numpy else partial(draw_program, program, model)
     times = []
     for _ in range(1 + REPEATS):
         started = time.perf_counter()
-        if by_numpy:
-            drawing = draw_small(program, threads=threads)
-        else:
-            drawing = draw_program(program, model, threads=threads)
+        drawing = draw(threads=threads)
         times.append(1000 * (time.perf_counter() - started))
     own, unknown = over_white(drawing.image), None
     try:

@@ -100,17 +100,13 @@ class Painter:
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
+        from scenelang.drawing.render import draw, draw_exact
+
         if frame.program is None:
-            from scenelang.drawing.render import draw_exact
-
             return draw_exact(self.how.sampled(frame.shot.scene), spans=frame.shot.spans)
-        from scenelang.drawing.render import draw
-
         how = self.how._replace(threads=self.split(frame.program))
-        drawing = draw(
-            frame.program, how, place=frame.place, split=how.threads, kept=self.kept, progress=progress
-        )
-        return drawing.image
+        place, split = frame.place, how.threads
+        return draw(frame.program, how, place=place, split=split, kept=self.kept, progress=progress).image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
