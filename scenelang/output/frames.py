@@ -57,13 +57,10 @@ class FrameRange:
         match = _RANGE.fullmatch(text)
         if match is None or (match[2] and match[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
-        first = int(match[1])
+        first, last = int(match[1]), int(match[3]) - bool(match[2]) if match[3] else None
         if ".." not in text:
             return cls(first, first)
-        if match[3] is None:
-            return cls(first)
-        last = int(match[3]) - bool(match[2])
-        if last < first:
+        if last is not None and last < first:
             raise FramesError(f"the range of frames `{text}` is empty")
         return cls(first, last)
 

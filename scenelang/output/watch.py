@@ -57,11 +57,7 @@ class Outcome:
     draft: bool = False  # the picture is coarse, and a better one follows
     same: bool = False  # nothing was drawn: the picture is the previous one
     diagnostics: list[Diagnostic] = field(default_factory=list)  # of the scene
-    # times of the steps; `load_s` is torch's import
-    compile_s: float = 0.0
-    load_s: float = 0.0
-    draw_s: float = 0.0
-    save_s: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)  # time of each step
     files: list[Path] = field(default_factory=list)  # written files
 
 
@@ -114,31 +110,32 @@ class Easel:
         if self.target is not None and (clip.animates or self.target.kind == "sequence"):
             run = make(painter, self.target, numbers, progress=checking(before))
             outcome.good, outcome.files = True, run.files
-            outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
+            outcome.seconds = {"compile": run.compile_s, "draw": run.draw_s, "save": run.encode_s}
             return
         frame = painter.prepare(clip.shot(self.frame), single=True)
-        outcome.load_s = painter.load_s
-        outcome.compile_s = time.perf_counter() - started - painter.load_s
+        outcome.seconds["compile"] = time.perf_counter() - started - painter.load_s
+        if painter.load_s:
+            outcome.seconds["load torch"] = painter.load_s
         if frame.key == self._key and self.out.exists():
             outcome.image, outcome.good, outcome.same = self._image, True, True
             return
         if self._took_s > DRAFT_S:
-            started, draft = time.perf_counter(), replace(outcome, draft=True)
+            started, draft = time.perf_counter(), replace(outcome, draft=True, seconds={**outcome.seconds})
             draft.image = painter.draft(frame)
-            draft.draw_s = time.perf_counter() - started
+            draft.seconds["draw"] = time.perf_counter() - started
             if draft.image is not None:
                 self._save(draft, draft.image, None)  # the file is not the picture of a scene now
                 self.drafted(draft)
         started = time.perf_counter()
         outcome.image = painter.draw(frame, checking(before))
-        outcome.draw_s = self._took_s = time.perf_counter() - started
+        outcome.seconds["draw"] = self._took_s = time.perf_counter() - started
         self._image = outcome.image
         self._save(outcome, outcome.image, frame.key)
 
     def _save(self, outcome: Outcome, image: Image, key: str | None) -> None:
         started, self._key = time.perf_counter(), None
         image.save(self.out)
-        outcome.save_s = time.perf_counter() - started
+        outcome.seconds["save"] = time.perf_counter() - started
         outcome.good, outcome.files, self._key = True, [self.out], key
 
     def _open(self, diagnostics: Diagnostics) -> Clip:
