@@ -18,9 +18,7 @@ from scenelang.compiler.steps import Affine
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
-from scenelang.drawing.neural.draw import Drawing
 from scenelang.drawing.small import draw_small
-from scenelang.drawing.solid.march import Work
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS
@@ -112,9 +110,14 @@ def drawing_cost(
     """Draw a Program of a scene and measure its work, time and error.
 
     Returns:
-        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), counts of `_meetings` or `_rays`,
+        ``pixels`` of the canvas, ``refined`` (pixels sampled four times),
         ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
         (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
+        In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
+        ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample
+        with every object). In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the
+        light, how many of both came ``near`` an object, their ``steps`` (points at which the field was asked)
+        and ``evaluations`` (an object's network at a point).
     """
     from scenelang.drawing.neural.load import place_of
     from scenelang.drawing.torch_backend import draw_program
@@ -132,44 +135,25 @@ def drawing_cost(
         exact = over_white(reference_of(scene, model.manifest, spans=spans))
     except ValueError as error:
         exact, unknown = None, str(error)
+    if (work := drawing.work) is not None:
+        counts = {"rays": work.rays, "light_rays": work.lights, "near": work.near, "steps": work.steps}
+        counts["evaluations"] = work.met
+    else:
+        samples = program.canvas[0] * program.canvas[1] + program.samples * drawing.refined
+        if model.manifest.renderer != "framed":  # others take every sample, with every object
+            samples = drawing.pairs // max(1, len(program))
+        counts = {"evaluated": drawing.met, "samples": samples, "meetings": drawing.pairs}
+        counts["meetings_unskipped"] = samples * len(program)
     off = None
     with suppress(ImportError):
         off = None if exact is None else round(flip(own, exact), 5)
     return {
         "pixels": program.canvas[0] * program.canvas[1],
         "refined": drawing.refined,
-        **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
+        **counts,
         "ms": round(min(times[1:]), 2),
         "psnr": None if exact is None else round(min(MOST_DB, psnr(own, exact)), 2),
         "flip": off,
         "unknown": unknown,
         "parameters": sum(p.numel() for p in model.network.parameters()),
-    }
-
-
-def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int]:
-    """In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
-    ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
-    every object)."""
-    samples = program.canvas[0] * program.canvas[1] + program.samples * drawing.refined
-    if model.manifest.renderer != "framed":  # others take every sample, with every object
-        samples = drawing.pairs // max(1, len(program))
-    return {
-        "evaluated": drawing.met,
-        "samples": samples,
-        "meetings": drawing.pairs,
-        "meetings_unskipped": samples * len(program),
-    }
-
-
-def _rays(work: Work) -> dict[str, int]:
-    """In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the light, how many of
-    both came ``near`` an object, their ``steps`` (points at which the field was asked) and ``evaluations``
-    (an object's network at a point)."""
-    return {
-        "rays": work.rays,
-        "light_rays": work.lights,
-        "near": work.near,
-        "steps": work.steps,
-        "evaluations": work.met,
     }

@@ -333,6 +333,15 @@ class Shot:
     spans: SpanMap  # where its nodes were written
 
 
+@dataclass(frozen=True, slots=True)
+class Drawable:
+    number: int  # from 0
+    key: str  # digest of all that determines its pixels
+    shot: Shot  # the frame
+    program: Program | None  # what the network draws; None for the reference
+    place: str = "cpu"  # the renderer: numpy, or a torch device
+
+
 class Clip:
     """A scene evaluated and compiled by frames, or Scenes as frames; a mistake in any frame ends it."""
 
@@ -414,3 +423,11 @@ class Clip:
         )
         self._last = shot, program
         return program
+
+    def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
+        """Files to write next to a frame's picture, by suffix; an exception ends the run."""
+        return {}
+
+    def failed(self, number: int, error: SceneError) -> None:
+        """Raise the errors of a frame, or note them, and it is left out."""
+        raise error

@@ -27,7 +27,7 @@ from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import TileCache
-from scenelang.output.frames import Clip, Shot, frame_key, put_frame
+from scenelang.output.frames import Clip, Drawable, Shot, frame_key, put_frame
 from scenelang.output.workers import Link
 
 if TYPE_CHECKING:
@@ -37,15 +37,6 @@ if TYPE_CHECKING:
 DRAFT = 4  # pixels across that one of a draft stands for
 Progress = Callable[[float], None]
 _version = lru_cache(version)
-
-
-@dataclass(frozen=True, slots=True)
-class Drawable:
-    number: int  # from 0
-    key: str  # digest of all that determines its pixels
-    shot: Shot  # the frame
-    program: Program | None  # what the network draws; None for the reference
-    place: str = "cpu"  # the renderer: numpy, or a torch device
 
 
 @dataclass(slots=True)

@@ -48,8 +48,8 @@ from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
-from scenelang.output.frames import Clip, Shot, Store, Target, TargetError, find_target, is_pattern
-from scenelang.output.painting import Drawable, Painter
+from scenelang.output.frames import Clip, Drawable, Shot, Store, Target, TargetError, find_target, is_pattern
+from scenelang.output.painting import Painter
 
 MOST_ROWS: Final = 1_000_000
 MOST_LISTED: Final = 10_000  # values or ranges of a param between commas
@@ -577,7 +577,7 @@ def render_many(
     clip = Variants(source, rows, frame, diagnostics, target, outputs, stem)
     run = make(
         Painter(clip, checked, outputs=clip.outputs, single=True), target, range(len(rows)), jobs=jobs,
-        cluster=cluster, beside=clip.beside, failed=clip.failed, progress=progress,
+        cluster=cluster, progress=progress,
     )  # fmt: skip
     if table is not None:
         write_output(table, table_bytes(Path(table), clip.names, clip.lines))
