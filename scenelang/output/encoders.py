@@ -59,9 +59,9 @@ def write_gif(
     census = Census(most)
     count = len(lengths)
     if palette != "frame":
-        for index, (file, length) in enumerate(runs(film.files, lengths)):
+        for done, (file, length) in enumerate(runs(film.files, lengths)):
             census.add(film.read(file), length)
-            progress(0.4 * index / count)
+            progress(0.4 * done / count)
     own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
     common = None if own else census.choose()
     with part.open("wb") as out:

@@ -355,7 +355,8 @@ class Clip:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         if isinstance(source, Source):
             source = source.evaluation(self.diagnostics, replays=True)
-        self._evaluation, self._scenes = (None, source) if isinstance(source, tuple) else (source, ())
+        self._scenes = source if isinstance(source, tuple) else ()
+        self._evaluation = None if isinstance(source, tuple) else source
         self._fps = fps  # of Scenes; None for those of the first one's animation
         self._last: tuple[Shot, Program] | None = None
         self._memory: Memory | None = Memory()

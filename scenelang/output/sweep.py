@@ -273,9 +273,7 @@ def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
 
     fields, arrays = [], []
     for name, texts in zip(heads, zip(*(line.cells for line in lines), strict=True), strict=True):
-        column = (
-            [(text, "") for text in texts] if name in (*_FRONT, *_BACK) else [_value(text) for text in texts]
-        )
+        column = [(text, "") if name in (*_FRONT, *_BACK) else _value(text) for text in texts]
         kinds = {(type(value), unit) for value, unit in column if value is not None}
         values, unit = [value for value, _ in column], next(iter(kinds), (None, ""))[1]
         arrays.append(arrow.array(values if len(kinds) <= 1 else texts))  # None for defaults
@@ -366,7 +364,7 @@ class Variants(Clip):
 
     def shot(self, number: int) -> Shot:
         assert isinstance(self._evaluation, Evaluation)
-        self._evaluation.inputs.values = self._source.values | self._rows[number]
+        self._evaluation.inputs.values = {**self._source.values, **self._rows[number]}
         return replace(super().shot(self._frame), number=number)
 
     def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
