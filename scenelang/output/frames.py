@@ -160,7 +160,7 @@ def is_animation(out: str) -> bool:
     return is_pattern(out) or Path(out).suffix.lower() in FILM_FORMATS
 
 
-def find_target(out: str, stem: str = "frame") -> Target:
+def find_target(out: str, stem: str = "frame", digits: int = 4) -> Target:
     """Parse ``out``, one of `FILM_FORMATS`, a pattern, or a folder of ``stem``s, or raise `TargetError`."""
     path = Path(out)
     if is_pattern(out):
@@ -172,26 +172,22 @@ def find_target(out: str, stem: str = "frame") -> Target:
             image_format(path)
         except ValueError as error:
             raise TargetError(str(error)) from None
-        _check_folder(path.parent, out)
-        return Target("sequence", path.parent, path.name)
-    if out.endswith(("/", "\\")) or path.is_dir():
+        target = Target("sequence", path.parent, path.name)
+    elif out.endswith(("/", "\\")) or path.is_dir():
         if path.exists() and not path.is_dir():
             raise TargetError(f"`{out}` is a file")
-        return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
-    kind = FILM_FORMATS.get(path.suffix.lower())
-    if kind is None:
+        return Target("sequence", path, f"{stem.replace('%', '%%')}-%0{digits}d.png")
+    elif (kind := FILM_FORMATS.get(path.suffix.lower())) is not None:
+        target = Target(kind, path)
+    else:
         raise TargetError(
             f"`{out}` holds one picture; an animation goes to a file with one of the suffixes "
             f"{', '.join(FILM_FORMATS)}, to "
             "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
         )
-    _check_folder(path.parent, out)
-    return Target(kind, path)
-
-
-def _check_folder(folder: Path, out: str) -> None:
-    if not folder.is_dir():
-        raise TargetError(f"cannot write `{out}`: there is no folder `{folder}`")
+    if not path.parent.is_dir():
+        raise TargetError(f"cannot write `{out}`: there is no folder `{path.parent}`")
+    return target
 
 
 _LOCK: Final = "lock"

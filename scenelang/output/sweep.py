@@ -585,9 +585,7 @@ def render_many(
 
 
 def _target(out: str, stem: str) -> Target:
-    if is_pattern(out):
-        return find_target(out)
-    path = Path(out)
-    if path.is_file() or (path.suffix and not path.is_dir() and not out.endswith(("/", "\\"))):
+    path, pattern, folder = Path(out), is_pattern(out), out.endswith(("/", "\\"))
+    if not pattern and (path.is_file() or (path.suffix and not path.is_dir() and not folder)):
         raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
-    return Target("sequence", path, f"{stem.replace('%', '%%')}-%06d.png")
+    return find_target(out if pattern or folder else f"{out}/", stem, 6)
