@@ -245,16 +245,6 @@ class Line(Record):
         return (self.picture, *self.values, self.digest, self.error)
 
 
-def check_table(path: Path) -> None:
-    """Raise `TableError` where a table of this name cannot be written."""
-    if path.suffix.lower() not in (".csv", PARQUET):
-        raise TableError(f"`{path}` is not a table; one ends in .csv or {PARQUET}")
-    if not path.parent.is_dir():
-        raise TableError(f"cannot write `{path}`: there is no folder `{path.parent}`")
-    if path.suffix.lower() == PARQUET and find_spec("pyarrow") is None:
-        raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
-
-
 def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> bytes:
     """Contents of a table of this name."""
     heads = (*_FRONT, *names, *_BACK)
@@ -549,7 +539,13 @@ def render_many(
     stem = Path(path).stem
     target = _target(os.fspath(out), stem)
     if table is not None:
-        check_table(Path(table))
+        kind, folder = Path(table).suffix.lower(), Path(table).parent
+        if kind not in (".csv", PARQUET):
+            raise TableError(f"`{Path(table)}` is not a table; one ends in .csv or {PARQUET}")
+        if not folder.is_dir():
+            raise TableError(f"cannot write `{Path(table)}`: there is no folder `{folder}`")
+        if kind == PARQUET and find_spec("pyarrow") is None:
+            raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
     if sheet is not None:
         image_format(sheet)
     diagnostics = Diagnostics()
