@@ -19,7 +19,7 @@ import numpy as np
 
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.exact.mesh import FitError
-from scenelang.drawing.how import Samples
+from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
 from scenelang.inverse.problem import LEVELS, Moment, Problem
@@ -63,7 +63,7 @@ def problems_of(
     smallest = min(min(goal.weights.shape) for goal in goals)
     short = min(MOST_SOLID if solid else SIDES[-1], *canvas, smallest)
 
-    def compared(side: int, samples: Samples, levels: int, soft: bool) -> Problem:
+    def compared(side: int, samples: Sampling, levels: int, soft: bool) -> Problem:
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
         return Problem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
 

@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from scenelang.assets.records import Record
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import Samples
+from scenelang.drawing.how import Sampling
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.small import draw_small
 from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
@@ -86,7 +87,7 @@ class Problem:
         *,
         light: bool = False,
         soft: bool = False,
-        samples: Samples = "four",
+        samples: Sampling = "four",
         levels: int = LEVELS,
     ) -> None:
         self.moments, self.space, self.under = moments, space, targets[0].under
@@ -96,7 +97,7 @@ class Problem:
         # colours (H, W, 3), and roots of the weights (H, W, 1), of each frame
         self.colours, weights = zip(*(target.sized(canvas, light) for target in targets), strict=True)
         self.roots = [np.sqrt(each / max(1e-9, each.mean()))[..., None] for each in weights]
-        self._rates = [Rates(lambda u, at=at: self._program(at, u), space) for at in range(len(moments))]
+        self._rates = [Rates(partial(self._program, at), space) for at in range(len(moments))]
         self._last: tuple[bytes, list[Program | None]] = b"", []
 
     def __call__(self, u: Point) -> Point | None:
@@ -143,7 +144,7 @@ class Problem:
 
     def residuals(self, pictures: Sequence[Picture], levels: int = 1) -> Point:
         """Residuals (R,) of pictures, at so many levels of the pyramid."""
-        return np.concatenate(self._gaps(pictures, levels)) / np.sqrt(len(pictures))
+        return np.asarray(np.concatenate(self._gaps(pictures, levels)) / np.sqrt(len(pictures)))
 
     def _gaps(self, pictures: Sequence[Picture], levels: int) -> list[Point]:
         """Residuals of each frame, whose squares sum to the mean square errors of the levels."""

@@ -48,8 +48,8 @@ from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
-from scenelang.output.frames import Clip, Shot, Store, Target, TargetError, find_target, is_pattern
-from scenelang.output.painting import Drawable, Painter
+from scenelang.output.frames import Clip, Drawable, Shot, Store, Target, TargetError, find_target, is_pattern
+from scenelang.output.painting import Painter
 
 MOST_ROWS: Final = 1_000_000
 MOST_LISTED: Final = 10_000  # values or ranges of a param between commas
@@ -245,16 +245,6 @@ class Line(Record):
         return (self.picture, *self.values, self.digest, self.error)
 
 
-def check_table(path: Path) -> None:
-    """Raise `TableError` where a table of this name cannot be written."""
-    if path.suffix.lower() not in (".csv", PARQUET):
-        raise TableError(f"`{path}` is not a table; one ends in .csv or {PARQUET}")
-    if not path.parent.is_dir():
-        raise TableError(f"cannot write `{path}`: there is no folder `{path.parent}`")
-    if path.suffix.lower() == PARQUET and find_spec("pyarrow") is None:
-        raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
-
-
 def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> bytes:
     """Contents of a table of this name."""
     heads = (*_FRONT, *names, *_BACK)
@@ -273,9 +263,7 @@ def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
 
     fields, arrays = [], []
     for name, texts in zip(heads, zip(*(line.cells for line in lines), strict=True), strict=True):
-        column = (
-            [(text, "") for text in texts] if name in (*_FRONT, *_BACK) else [_value(text) for text in texts]
-        )
+        column = [(text, "") if name in (*_FRONT, *_BACK) else _value(text) for text in texts]
         kinds = {(type(value), unit) for value, unit in column if value is not None}
         values, unit = [value for value, _ in column], next(iter(kinds), (None, ""))[1]
         arrays.append(arrow.array(values if len(kinds) <= 1 else texts))  # None for defaults
@@ -366,7 +354,7 @@ class Variants(Clip):
 
     def shot(self, number: int) -> Shot:
         assert isinstance(self._evaluation, Evaluation)
-        self._evaluation.inputs.values = self._source.values | self._rows[number]
+        self._evaluation.inputs.values = {**self._source.values, **self._rows[number]}
         return replace(super().shot(self._frame), number=number)
 
     def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
@@ -544,14 +532,20 @@ def render_many(
         SceneError: the scene has errors whatever the values are.
         RenderError, OSError, ValueError, TypeError: as for `scenelang.animate`.
     """
-    given: object = path
-    if not isinstance(given, str | os.PathLike):
+    place: object = path
+    if not isinstance(place, str | os.PathLike):
         fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
         raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
     target = _target(os.fspath(out), stem)
     if table is not None:
-        check_table(Path(table))
+        kind, folder = Path(table).suffix.lower(), Path(table).parent
+        if kind not in (".csv", PARQUET):
+            raise TableError(f"`{Path(table)}` is not a table; one ends in .csv or {PARQUET}")
+        if not folder.is_dir():
+            raise TableError(f"cannot write `{Path(table)}`: there is no folder `{folder}`")
+        if kind == PARQUET and find_spec("pyarrow") is None:
+            raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
     if sheet is not None:
         image_format(sheet)
     diagnostics = Diagnostics()
@@ -560,7 +554,16 @@ def render_many(
     first = source.evaluation(diagnostics, frame=frame)
     if first.run(frame)[0] is None or diagnostics.errors:  # those of its syntax are of no row
         raise SceneError(diagnostics)
-    rows, across = _rows(first, values, grid or {}, random, count, seed)
+    given = [{name: text_of(value) for name, value in row.items()} for row in values]
+    drawn = dict(random) if isinstance(random, Mapping) else dict.fromkeys(random, "")
+    if given and (grid or drawn or count is not None):
+        raise ParamError("values are given as they are, and as a grid or at random")
+    if len(given) > MOST_ROWS:
+        raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
+    for name in dict.fromkeys(name for row in given for name in row):
+        if name not in first.inputs.known:
+            param_named(first, name)
+    rows, across = (given, 0) if given else rows_of(first, grid or {}, drawn, count, seed)
     for name in fixed:
         if any(name in row for row in rows):
             raise ParamError(f"param `{name}` with one value for all pictures, and with others")
@@ -568,7 +571,7 @@ def render_many(
     clip = Variants(source, rows, frame, diagnostics, target, outputs, stem)
     run = make(
         Painter(clip, checked, outputs=clip.outputs, single=True), target, range(len(rows)), jobs=jobs,
-        cluster=cluster, beside=clip.beside, failed=clip.failed, progress=progress,
+        cluster=cluster, progress=progress,
     )  # fmt: skip
     if table is not None:
         write_output(table, table_bytes(Path(table), clip.names, clip.lines))
@@ -578,31 +581,7 @@ def render_many(
 
 
 def _target(out: str, stem: str) -> Target:
-    if is_pattern(out):
-        return find_target(out)
-    path = Path(out)
-    if path.is_file() or (path.suffix and not path.is_dir() and not out.endswith(("/", "\\"))):
+    path, pattern, folder = Path(out), is_pattern(out), out.endswith(("/", "\\"))
+    if not pattern and (path.is_file() or (path.suffix and not path.is_dir() and not folder)):
         raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
-    return Target("sequence", path, f"{stem.replace('%', '%%')}-%06d.png")
-
-
-def _rows(
-    first: Evaluation,
-    values: Iterable[Mapping[str, Any]],
-    grid: Mapping[str, str | Iterable[Any]],
-    random: Iterable[str] | Mapping[str, str],
-    count: int | None,
-    seed: int,
-) -> tuple[list[dict[str, str]], int]:
-    given = [{name: text_of(value) for name, value in row.items()} for row in values]
-    drawn = dict(random) if isinstance(random, Mapping) else dict.fromkeys(random, "")
-    if not given:
-        return rows_of(first, grid, drawn, count, seed)
-    if grid or drawn or count is not None:
-        raise ParamError("values are given as they are, and as a grid or at random")
-    if len(given) > MOST_ROWS:
-        raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
-    for name in dict.fromkeys(name for row in given for name in row):
-        if name not in first.inputs.known:
-            param_named(first, name)
-    return given, 0
+    return find_target(out if pattern or folder else f"{out}/", stem, 6)
