@@ -135,35 +135,19 @@ def _places(leaf: Leaf) -> list[Label]:
 
 Measures = list[tuple[str, float]]
 
-_CODES = {
-    "objects": "W0501",
-    "twirl": "W0502",
-    "bend": "W0503",
-    "scale": "W0504",
-    "smooth": "W0505",
-    "thin": "W0506",
-    "thickness": "W0506",
-    "blend": "W0507",
-    "twist": "W0509",
-    "displace": "W0510",
-    "frequency": "W0510",
-    "texels": "W0511",
-    "width": "W0512",
-    "level": "W0513",
-}
 _SUBJECTS = {
-    "twirl": "a `twirl` of {value} on {name}",
-    "bend": "a `bend` of {value} on {name}",
-    "twist": "a `twist` of {value} on {name}",
-    "displace": "a displacement of {value} of {name}",
-    "frequency": "a displacement of frequency {value} of {name}",
-    "scale": "a scale of {value} of {name}",
-    "thin": "{name}, {value} times as long as wide,",
-    "thickness": "{name}, {value} thick,",
-    "texels": "a texture of {value} texels to a pixel on {name}",
-    "level": "an edge of {name} at {value} from that of its leaf",
+    "twirl": ("W0502", "a `twirl` of {value} on {name}"),
+    "bend": ("W0503", "a `bend` of {value} on {name}"),
+    "twist": ("W0509", "a `twist` of {value} on {name}"),
+    "displace": ("W0510", "a displacement of {value} of {name}"),
+    "frequency": ("W0510", "a displacement of frequency {value} of {name}"),
+    "scale": ("W0504", "a scale of {value} of {name}"),
+    "thin": ("W0506", "{name}, {value} times as long as wide,"),
+    "thickness": ("W0506", "{name}, {value} thick,"),
+    "texels": ("W0511", "a texture of {value} texels to a pixel on {name}"),
+    "level": ("W0513", "an edge of {name} at {value} from that of its leaf"),
 }
-"""Subjects of warnings about an object, in the order of the warnings."""
+"""Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
 _TOLERANCE = 1e-9
@@ -191,27 +175,24 @@ def check_trained(graph: Graph, context: Context) -> Graph:
                 excess = max(low - value, above) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
-    for quantity, subject in _SUBJECTS.items():
+    for quantity, (code, subject) in _SUBJECTS.items():
         if result := outside.get(quantity):
             _, value, leaf = max(result, key=itemgetter(0))
             more = len({id(leaf) for *_, leaf in result}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
-            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
+            _warn(context, code, quantity, f"{said} is", leaf, value, others)
     widest = max((row for row in rows if row.op != "union"), key=attrgetter("k"), default=None)
     if widest is not None and "width" in trained and widest.k > trained["width"][1]:
-        fact = f"a `{widest.op}` of width {widest.k:.3g} is outside the measured range {{}}"
-        _warn(context, "width", fact, widest.leaf)
+        _warn(context, "W0512", "width", f"a `{widest.op}` of width {widest.k:.3g} is", widest.leaf)
     smooth = [row.leaf for row in rows if row.op == "smooth"]
     if "smooth" in trained and len(smooth) > trained["smooth"][1]:
-        fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
-        _warn(context, "smooth", fact, smooth[-1])
+        _warn(context, "W0505", "smooth", f"{len(smooth):,} smooth unions are", smooth[-1])
     if smooth and "blend" in trained:
         _check_blends(rows, measures, context)
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
-        fact = f"{count:,} objects are outside the measured range {{}}"
-        _warn(context, "objects", fact, rows[-1].leaf)
+        _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
     return graph
 
 
@@ -236,7 +217,7 @@ def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context
     if worst is not None and worst[0] > context.manifest.trained["blend"][1]:
         product, contrast, scale, leaf = worst
         said = f"a `smooth` of colours {contrast:.2g} apart at a scale of {scale:.3g}"
-        _warn(context, "blend", f"{said}: the product {product:.3g} is outside the measured range {{}}", leaf)
+        _warn(context, "W0507", "blend", f"{said}: the product {product:.3g} is", leaf)
 
 
 def _measures(leaf: Leaf, space: Space) -> Measures:
@@ -283,15 +264,17 @@ def _texels(leaf: Leaf, graph: Graph) -> Measures:
     return [("texels", texels * pixel)]
 
 
-def _warn(context: Context, quantity: str, message: str, leaf: Leaf, value: float = 0.0) -> None:
+def _warn(
+    context: Context, code: str, quantity: str, said: str, leaf: Leaf, value: float = 0.0, others: str = ""
+) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
     doubt = "the picture may be less exact than the model's figures"
-    fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
+    fact = f"{said} outside the measured range {low:g} to {high:g} of model `{context.manifest.name}`{others}"
     help = f"measured there: {figures}" if figures else doubt
     if quantity in _WRONG and abs(value) > WILD * high:
         help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
-    context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)
+    context.diagnostics.add(code, fact, leaf.span, help=help)
 
 
 Point = tuple[float, float, float]

@@ -73,63 +73,24 @@ def _opaque(value: Any, operand: int, what: str = "colour") -> tuple[float, ...]
     return rgb
 
 
-def _side(value: Any, operand: int) -> int:
-    side = number(value, operand)
-    if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
-        message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
-        raise Problem("E0311", message, operand=operand)
-    return int(side)
+def _within(
+    fits: Callable[[float], bool], message: str, help: str | None = None, code: str = "E0311"
+) -> Callable[[Any, int], float]:
+    """The reader of a number that fits; the message has ``{}`` for one that does not."""
 
+    def read(value: Any, operand: int) -> float:
+        given = number(value, operand)
+        if not fits(given):
+            raise Problem(code, message.format(show(given)), help, operand)
+        return given
 
-def _share(value: Any, operand: int) -> float:
-    share = number(value, operand)
-    if not 0.0 <= share <= 1.0:
-        raise Problem("E0311", f"an opacity of {show(share)} is outside 0..1", operand=operand)
-    return share
-
-
-def _samples(value: Any, operand: int) -> int:
-    count = number(value, operand)
-    if count not in SAMPLES:
-        raise Problem("E0311", f"{show(count)} samples a pixel, where it takes 4 or 16", operand=operand)
-    return int(count)
-
-
-def _positive(value: Any, operand: int, what: str) -> float:
-    size = float(value.size) if value.__class__ is Time and what == "length" else number(value, operand)
-    if size <= 0.0:
-        raise Problem("E0311", f"a {what} of {show(size)} is not above 0", operand=operand)
-    return size
+    return read
 
 
 def _boolean(value: Any, operand: int) -> bool:
     if value.__class__ is bool:
         return value
     raise unexpected("a boolean", value, operand=operand)
-
-
-def _factor(value: Any, operand: int) -> float:
-    factor = number(value, operand)
-    if factor == 0.0:
-        help = "decimals stand behind a point, as in 0.5"
-        raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand)
-    return factor
-
-
-def _growth(value: Any, operand: int) -> float:
-    growth = number(value, operand)
-    if not -0.5 <= growth <= 1.0:
-        help = "r is in units of the leaf, before any scale"
-        raise Problem("E0311", f"a growth of {show(growth)} is outside -0.5..1", help, operand)
-    return growth
-
-
-def _wall(value: Any, operand: int) -> float:
-    wall = number(value, operand)
-    if not 0.0 < wall <= 1.0:
-        help = "w is in units of the leaf, before any scale"
-        raise Problem("E0311", f"a wall of {show(wall)} is not above 0 and at most 1", help, operand)
-    return wall
 
 
 def _axis(value: Any, operand: int) -> tuple[float, ...]:
@@ -157,25 +118,39 @@ def _rows(rows: Any, operand: int) -> tuple[tuple[float, ...], ...]:
     return values
 
 
+_LEAF_UNITS: Final = "{} is in units of the leaf, before any scale"
+_side = _within(
+    lambda side: side.is_integer() and 1 <= side <= MAX_SIDE_PX,
+    f"a canvas side of {{}} is not a whole number in 1..{MAX_SIDE_PX}",
+)
+_samples = _within(lambda count: count in SAMPLES, "{} samples a pixel, where it takes 4 or 16")
+_seconds = _within(lambda seconds: seconds > 0.0, "a length of {} is not above 0")
+
 KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "number": number,
     "angle": angle,
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
-    "factor": _factor,
-    "growth": _growth,
-    "wall": _wall,
+    "factor": _within(
+        bool, "a scale by 0 flattens what it moves", "decimals stand behind a point, as in 0.5", "E0312"
+    ),
+    "growth": _within(
+        lambda r: -0.5 <= r <= 1.0, "a growth of {} is outside -0.5..1", _LEAF_UNITS.format("r")
+    ),
+    "wall": _within(
+        lambda w: 0.0 < w <= 1.0, "a wall of {} is not above 0 and at most 1", _LEAF_UNITS.format("w")
+    ),
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,
     "colour": color,
     "opaque": _opaque,
     "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
-    "side": _side,
-    "share": _share,
-    "samples": _samples,
-    "seconds": lambda value, at: _positive(value, at, "length"),
-    "fps": lambda value, at: _positive(value, at, "frame rate"),
+    "side": lambda value, at: int(_side(value, at)),
+    "share": _within(lambda share: 0.0 <= share <= 1.0, "an opacity of {} is outside 0..1"),
+    "samples": lambda value, at: int(_samples(value, at)),
+    "seconds": lambda value, at: _seconds(value.size if value.__class__ is Time else value, at),
+    "fps": _within(lambda rate: rate > 0.0, "a frame rate of {} is not above 0"),
     "boolean": _boolean,
 }
 """Readers of arguments by their kinds in `words`: the value in base units; each raises Problem."""
@@ -345,7 +320,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         if (name := spec.word.name) in words.PROPERTIES:
             first = out.properties.setdefault(name, (span, node))[0]
             if first is not span:
-                _twice(name, span, first, session.report)
+                given_twice(name, span, first, session.report)
             return
         if out.moved is None:
             out.moved = span  # even by a transform with a mistake: children have their order all the same
@@ -377,9 +352,10 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     return action
 
 
-def _twice(name: str, span: Span, first: Span, report: Reporter) -> None:
+def given_twice(what: str, span: Span, first: Span, report: Reporter, more: str = "") -> None:
     labels = (Label(first, "first given here"),)
-    report.error("E0333", f"`{name}` is given twice", span, labels=labels, help="leave one of them out")
+    help = f"leave one of them out{more}"
+    report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
 
 
 def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:

@@ -69,10 +69,8 @@ def _once(session: Session, what: str, span: Span) -> bool:
     """Test whether a setting is given for the first time, and report a second one."""
     first = session.settings.given.setdefault(what, span)
     if first is not span:
-        labels = (Label(first, "first given here"),)
         more = "; there is one light, and its power says how bright" if what == "light" else ""
-        help = f"leave one of them out{more}"
-        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
+        modifiers.given_twice(what, span, first, session.report, more)
     return first is span
 
 
