@@ -44,19 +44,7 @@ from scenelang.compiler.rewrites import (
     push_transforms,
 )
 from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
-from scenelang.compiler.steps import (
-    Affine,
-    Displace,
-    Grow,
-    Own,
-    Shell,
-    Skin,
-    Step,
-    Twist,
-    Warp,
-    composed,
-    inverted,
-)
+from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span
 from scenelang.language.scene import Scene
 
@@ -71,7 +59,7 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
     manifest = context.manifest
-    own = next((move for move in leaf.moves if isinstance(move.step, Grow | Shell)), None)
+    own = next((move for move in leaf.moves if isinstance(move.step, steps.Grow | steps.Shell)), None)
     if own is not None and manifest.lifting != "exact":
         fact = f"model `{manifest.name}` does not draw `{type(own.step).__name__.lower()}`"
         help = "leave `model` out, or draw with another one"
@@ -115,11 +103,11 @@ def _nothing(skin: Skin, depth: float) -> bool:
 
 
 def _mild(step: Step) -> bool:
-    if isinstance(step, Warp):
+    if isinstance(step, steps.Warp):
         return abs(step.twirl) < REACH and hypot(*step.bend) < REACH
-    if isinstance(step, Twist):
+    if isinstance(step, steps.Twist):
         return abs(step.twist) < REACH
-    return not isinstance(step, Displace) or max(abs(step.amount), abs(step.frequency)) < REACH
+    return not isinstance(step, steps.Displace) or max(abs(step.amount), abs(step.frequency)) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:
@@ -231,14 +219,14 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     if skin.grow or skin.shell:
         result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:
-        if isinstance(step, Warp):
+        if isinstance(step, steps.Warp):
             if step.twirl:
                 result.append(("twirl", step.twirl))
             if step.bend != (0.0, 0.0):
                 result.append(("bend", hypot(*step.bend)))
-        elif isinstance(step, Twist):
+        elif isinstance(step, steps.Twist):
             result.append(("twist", step.twist))
-        elif isinstance(step, Displace):
+        elif isinstance(step, steps.Displace):
             result += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
     return result
 
@@ -313,7 +301,7 @@ def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
             d, leaf = _folded(node, eye, space)
         elif node.geometry in GEOMETRIES:
             d, leaf = _distance(node.geometry, node.steps, eye), node
-            d *= space.stretches(composed(node.steps))[0]
+            d *= space.stretches(steps.composed(node.steps))[0]
         else:
             d, leaf = inf, None
         if link.op in ("subtract", "intersect"):
@@ -336,27 +324,27 @@ def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
     return (d if h == 1.0 else depth + h * (d - depth)) - k * h * (1.0 - h), h
 
 
-def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
+def _distance(geometry: str, chain: Sequence[Step], p: Point) -> float:
     """The leaf's own distance at a world point, with what its steps make of it."""
-    for step in reversed(steps):
+    for step in reversed(chain):
         x, y, z = p
         if isinstance(step, Affine):
-            a, b, c, u, d, e, f, v, g, h, i, w = inverted(step.rows)
+            a, b, c, u, d, e, f, v, g, h, i, w = steps.inverted(step.rows)
             p = a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
-        elif isinstance(step, Twist):
+        elif isinstance(step, steps.Twist):
             s, c = sin(step.twist * y), cos(step.twist * y)
             p = c * x + s * z, y, c * z - s * x
-        elif isinstance(step, Warp):
+        elif isinstance(step, steps.Warp):
             angle = step.twirl * hypot(x, y, z) + step.bend[0] * x + step.bend[1] * y
             s, c = sin(angle), cos(angle)
             p = c * x + s * y, c * y - s * x, z
     depth, (x, y, z) = float(GEOMETRIES[geometry].distance(p)), p
-    for step in steps:
-        if not isinstance(step, Own):
+    for step in chain:
+        if not isinstance(step, steps.Own):
             break
-        if isinstance(step, Grow):
+        if isinstance(step, steps.Grow):
             depth -= step.r
-        elif isinstance(step, Shell):
+        elif isinstance(step, steps.Shell):
             depth = abs(depth) - step.w / 2
         else:
             f = step.frequency

@@ -8,20 +8,11 @@ from typing import Any, Final
 
 from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
-from scenelang.language import advice, nodes, scopes, tree, words
+from scenelang.language import advice, expressions, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
-from scenelang.language.expressions import (
-    POISONED,
-    VARIES,
-    Code,
-    Given,
-    bind,
-    prepare_arguments,
-    value_of,
-    wrong_kind,
-)
+from scenelang.language.expressions import POISONED, Code, Given, bind
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
 from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, singular
@@ -245,7 +236,7 @@ def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
 def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     name, report = stmt.name.text, place.report
-    given = prepare_arguments(stmt.args, place, name)
+    given = expressions.prepare_arguments(stmt.args, place, name)
     spec = _spec(stmt, place)
     if spec is None:
         return None
@@ -331,7 +322,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
             if session.watch is not None:
                 session.watch(stmt.span, node)
 
-    if all(one is None or one.code.value is not VARIES for one in bound):
+    if all(one is None or one.code.value is not expressions.VARIES for one in bound):
         place.file.weight += SAME_MOVE
         constants = [LEFT_OUT if one is None else one.code.value for one in bound]
         created: list[Any] = []
@@ -461,11 +452,11 @@ def _called(name: tree.Name, place: Place) -> str | None:
     if binding is None:
         advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
-        wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
+        expressions.wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
     elif own is not None and own.kind in scopes.VALUES:
         _is_value(name, place)
     elif own is not None:
-        wrong_kind(name, own, place, "a material")
+        expressions.wrong_kind(name, own, place, "a material")
     else:
         advice.unknown_member(name, place, exported, "material")
     return None
@@ -550,7 +541,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
     """``mist;`` or ``mist { hue(0.1turn); }``: the block's operations come after the value's own."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     operations = _operations(stmt.body, place)
-    get = value_of(stmt.name, binding, place).run
+    get = expressions.value_of(stmt.name, binding, place).run
     if stmt.args:
         session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
         return None
