@@ -52,11 +52,7 @@ def prepare_statement(stmt: tree.Stmt, place: Place) -> Action | None:
 
 
 def prepare_block(statements: Sequence[tree.Stmt], place: Place, span: Span) -> Body:
-    """Prepare a block in its own scope, which ``place`` brings along.
-
-    Functions and modules are known in the whole block; their bodies are prepared after it, when all
-    names of the block are known to them.
-    """
+    """Prepare a block in its own scope, which ``place`` brings along; bodies of fns and modules last."""
     file, scope = place.file, place.scope
     file.nesting += 1
     if file.nesting > MAX_NESTING:
@@ -119,11 +115,7 @@ def _unbind(scope: Scope) -> list[Action]:
 def misplaced(
     place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
-    """Report a statement in the wrong place; several in one block with the same ``fact`` are one report.
-
-    Args:
-        fact: the message, with ``{}`` for the name.
-    """
+    """Report a statement in the wrong place by a ``fact`` with ``{}`` for its name, once in a block."""
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
         place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)

@@ -377,6 +377,7 @@ Transform = Annotated[
     Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace | Grow | Shell,
     Field(discriminator="kind"),
 ]
+Moves = Iterable[Transform] | Transform
 Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
 
 
@@ -436,6 +437,7 @@ MaterialOp = Annotated[
     Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue | Stop,
     Field(discriminator="kind"),
 ]
+Inks = Iterable[MaterialOp] | MaterialOp | str
 
 
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
@@ -521,11 +523,7 @@ class Material(Brief):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            name: str,
-            ops: Iterable[MaterialOp] | MaterialOp | str = (),
-            shading: str | None = None,
-            opacity: float = 1.0,
+            self, name: str, ops: Inks = (), shading: str | None = None, opacity: float = 1.0
         ) -> None: ...
 
     @classmethod
@@ -552,10 +550,7 @@ class Object(Frozen):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            geometry: str,
-            transforms: Iterable[Transform] | Transform = (),
-            material: Material | None = None,
+            self, geometry: str, transforms: Moves = (), material: Material | None = None
         ) -> None: ...
 
 
@@ -570,10 +565,7 @@ class Group(Frozen):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            children: Iterable[SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
-            material: Material | None = None,
+            self, children: Nodes = (), transforms: Moves = (), material: Material | None = None
         ) -> None: ...
 
 
@@ -615,8 +607,8 @@ class Boolean(_Joining):
         def __init__(
             self,
             op: Combine,
-            children: Iterable[SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
+            children: Nodes = (),
+            transforms: Moves = (),
             material: Material | None = None,
             k: float | None = None,
         ) -> None: ...
@@ -650,8 +642,8 @@ class Chain(Frozen):
 
         def __init__(
             self,
-            children: Iterable[Link | SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
+            children: Iterable[Link | SceneNode] | Nodes = (),
+            transforms: Moves = (),
             material: Material | None = None,
         ) -> None: ...
 
@@ -674,6 +666,7 @@ class Chain(Frozen):
 
 
 SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
+Nodes = Iterable[SceneNode] | SceneNode
 
 
 class Animation(Frozen):

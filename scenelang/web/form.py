@@ -506,8 +506,7 @@ def form_of(
 ) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
-    Args:
-        elements: those of the Program of that run; they come first among shapes and paints, in their order.
+    The Program's elements come first among shapes and paints, in their order.
     """
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
     with deep_stack():
