@@ -9,20 +9,8 @@ from typing import Any, Final, Protocol
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
-from scenelang.compiler import steps
-from scenelang.compiler.graph import (
-    MOST_STEPS,
-    WHITE,
-    Fold,
-    Graph,
-    Leaf,
-    Link,
-    Look,
-    Move,
-    colour_steps,
-    coloured,
-    normal,
-)
+from scenelang.compiler import graph, steps
+from scenelang.compiler.graph import MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, stage_of
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, compose
@@ -115,7 +103,7 @@ def lower(
     if memory is not None and lowering.created is not None:
         memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
-    background = WHITE if scene.background == "default" else scene.background
+    background = graph.WHITE if scene.background == "default" else scene.background
     return Graph(root, scene.canvas, background, space, stage, brought.geometries, scene.samples)
 
 
@@ -130,7 +118,7 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
         fact = f"a canvas of {width} x {height} pixels; {model} draws only {sizes}"
         help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
         diagnostics.add("E0509", fact, place, help=help)
-    if manifest.white and scene.background not in (WHITE, "default"):
+    if manifest.white and scene.background not in (graph.WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
     if scene.samples != 4 and manifest.lifting != "exact":
@@ -298,8 +286,8 @@ class _Lowering:
             offered = (*manifest.materials, *words.PAINTS) if shading is name else manifest.materials
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
-        colours = colour_steps(map(self.space.inked, material.ops))
-        if len(normal(colours)) > MOST_STEPS and element is not None:
+        colours = graph.colour_steps(map(self.space.inked, material.ops))
+        if len(graph.normal(colours)) > MOST_STEPS and element is not None:
             self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
         if material.opacity != 1.0 and not manifest.translucent:
             fact = f"model `{manifest.name}` has no `opacity`"

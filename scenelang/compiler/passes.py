@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
-from scenelang.compiler import steps
+from scenelang.compiler import rewrites, steps
 from scenelang.compiler.chain import LevelsError, split_levels
 from scenelang.compiler.geometries import GEOMETRIES, Geometry
 from scenelang.compiler.graph import (
@@ -31,18 +31,7 @@ from scenelang.compiler.graph import (
 )
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.rewrites import (
-    Context,
-    cover_of,
-    covered,
-    drop_empty,
-    drop_hidden,
-    drop_unseen,
-    flatten,
-    fold_looks,
-    fold_warps,
-    push_transforms,
-)
+from scenelang.compiler.rewrites import Context, cover_of, covered
 from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
 from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span
@@ -474,16 +463,16 @@ class Pass(NamedTuple):
 
 
 PASSES: tuple[Pass, ...] = (
-    Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
-    Pass(fold_looks, frozenset({Invariant.LOOKS})),
-    Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
-    Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
+    Pass(rewrites.drop_empty, frozenset({Invariant.COMPOSITE})),
+    Pass(rewrites.fold_looks, frozenset({Invariant.LOOKS})),
+    Pass(rewrites.push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
+    Pass(rewrites.fold_warps, frozenset({Invariant.NO_IDENTITIES})),
     Pass(check_levels),
-    Pass(flatten, frozenset({Invariant.STREAM})),
+    Pass(rewrites.flatten, frozenset({Invariant.STREAM})),
     Pass(check_eye),
     Pass(check_seen),
-    Pass(drop_unseen),
-    Pass(drop_hidden),
+    Pass(rewrites.drop_unseen),
+    Pass(rewrites.drop_hidden),
     Pass(check_trained),
 )
 
@@ -524,7 +513,7 @@ def check_scene(
                 verify(graph, step.name, holds, sound)
             after(step.name, graph)
             if diagnostics.errors:
-                if step.run is flatten:
+                if step.run is rewrites.flatten:
                     break  # all mistakes are reported, and the graph is not the scene's
                 # Without sound chains no bound means anything: look for refusals only.
                 context = Context(manifest, diagnostics, whole=False)
