@@ -20,7 +20,7 @@ import numpy.typing as npt
 from scenelang.assets.gradient import Gradient
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
@@ -115,7 +115,7 @@ def _seen(fold: Sequence[Operand]) -> Iterator[Layer]:
 class Shapes:
     """Distances of folds of a Program, by its network or by formulas, in units of the drawing."""
 
-    def __init__(self, program: Program, exact: bool = False) -> None:
+    def __init__(self, program: Program, exact: bool) -> None:
         from scenelang.drawing.closed import field_of
 
         self.program, self.network = program, field_of(program, exact)
@@ -274,8 +274,7 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
 
     before = np.flatnonzero((along * np.roll(along, -1, 0)).sum(1) < np.cos(np.radians(SHARP_DEG)))
     if not len(before):
-        cuts = np.arange(5) * count // 4
-        parts = [np.arange(a, b + 1) % count for a, b in zip(cuts, cuts[1:], strict=False)]
+        parts = [np.arange(count * i // 4, count * (i + 1) // 4 + 1) % count for i in range(4)]
         return [(p[part], along[part]) for part in parts]
     behind = (before + 1) % count
     place = meet(before, behind)
@@ -434,11 +433,11 @@ class Inks:
         return f'<pattern id="%s" patternUnits="userSpaceOnUse" x="{x}" y="{y}" {held}>{picture}</pattern>'
 
 
-def svg_of(program: Program, how: How) -> tuple[str, bool]:
+def svg_of(program: Program, exact: bool) -> tuple[str, bool]:
     """A Program of the plane as SVG, and whether blended colours became the nearer object's; raises
     `RenderError` where there are no outlines.
     """
-    shapes = Shapes(program, how.backend == "exact")
+    shapes = Shapes(program, exact)
     inks, (width, height), body = Inks(shapes), program.canvas, []
     across, down = (f"{side:g}" for side in shapes.size)
     if program.background is not None:
