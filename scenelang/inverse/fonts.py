@@ -30,8 +30,8 @@ _CUBIC: Final = 2e-5  # em: how far quadratic curves may be off a cubic one
 _MOST_CURVES: Final = 1_000_000  # of all letters
 _KERNED: Final = 3000  # letters whose pairs are asked
 _ALPHABETS: Final = 0x2E80  # where those end that fonts kern
-_SAMPLES: Final = 8, 64  # edges of a curve, to see where it runs, and to see where that changes
-_BESIDE: Final = 1e-4  # of a radius: from a curve to where its sides are asked
+_SAMPLES: Final = 8, 64  # edges of a curve, to see whether contours overlap, and where they do
+_BESIDE: Final = 1e-7  # of a radius: from a curve to where its sides are asked
 _MEET: Final = 1e-5  # of a radius: so near each other curves meet
 _CLOSE: Final = 50_000  # pairs of curves of a letter that may meet
 _LEAST: Final = 1e-6  # em: the least radius of what shows
@@ -182,8 +182,8 @@ def _boundary(curves: Curves) -> Curves:
     if (side == 1).all() or (side == -1).all():
         return curves if side[0, 0] == 1 else curves[::-1, ::-1]
     parts, count = _apart(curves, size), _SAMPLES[1]
-    inside = winding(_edges(curves, count).reshape(-1, 2, 2), odd=False)
-    side = _sides(_edges(parts, count + 1)[:, count // 2], inside, size)
+    many = _edges(parts, count)
+    side = _sides(many[:, count // 2], winding(many.reshape(-1, 2, 2), odd=False), size)
     return np.asarray(np.where(side[:, None, None] > 0, parts, parts[:, ::-1])[side != 0])
 
 
