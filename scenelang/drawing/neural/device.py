@@ -30,7 +30,7 @@ from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.draw import Drawing, as_image, halved
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.load import Framed
-from scenelang.drawing.neural.meetings import LEVELS, Closing, Pairs, Raster, meetings_of, nesting, raster
+from scenelang.drawing.neural.meetings import LEVELS, Pairs, Raster, meetings_of, nesting, raster
 from scenelang.drawing.neural.network import RADIUS, Decoder, FramedArrays
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator"
@@ -421,22 +421,16 @@ def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.nda
     Behind the rows of N objects are those of objects that begin a state as they are, and groups'.
     """
     meetings, _ = meetings_of(pairs)
-    nest, count = nesting(meetings, field.groups), len(field.tokens)
+    nest, count, blocks = nesting(meetings, field.groups), len(field.tokens), len(meetings.columns)
     result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
-
-    def close(closings: list[Closing]) -> None:
-        for columns, groups, level in closings:
-            result.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(result))))
-
-    for part, level, fresh, before, after in nest.turns:
-        close(before)
-        rows = meetings.pairs.object[part] + count * fresh
-        result.append((np.arange(len(level)), rows, level, np.full(len(level), len(result))))
-        close(after)
+    for moment, (which, _, at, ending, fresh) in enumerate(nest.turns):
+        objects = 2 * count + which if ending is not None else meetings.pairs.object[which] + count * fresh
+        level, column = np.divmod(np.arange(nest.states)[at], blocks)
+        result.append((column, objects, level, np.full(len(column), moment)))
     columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*result, strict=True))
     block = meetings.columns[columns]
     by = np.lexsort((moments, block))
-    return block[by], rows[by], levels[by], nest.levels
+    return block[by], rows[by], levels[by], 1 + int(levels.max())
 
 
 def _cell_at(field: Field) -> int:
