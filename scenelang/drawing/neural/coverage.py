@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isqrt
 
 import numpy as np
 
 from scenelang.compiler.groups import SMOOTH, UNION
 from scenelang.drawing.arrays import Array
+from scenelang.drawing.image import sample_places
 from scenelang.drawing.neural.field import NO_TEXTURE, Field, Trace
 from scenelang.drawing.neural.meetings import (
     LEVELS,
@@ -38,13 +38,6 @@ from scenelang.drawing.neural.network import RADIUS
 CORNERS = {4: 0.36, 16: 0.54}  # pixels from the centre to the farthest of samples, a little rounded up
 NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change much across the pixel
 LEAST = 1e-4  # of a colour, that counts as part of what a point shows
-
-
-def sample_places(count: int) -> np.ndarray:
-    """Places of a pixel's samples (2, count), pixels from its centre."""
-    side = isqrt(count)
-    axis = (np.arange(side) + 0.5) / side - 0.5
-    return np.stack([np.tile(axis, side), np.repeat(axis, side)]).astype(np.float32)
 
 
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float, corner: float) -> Array:
@@ -161,7 +154,8 @@ class Coverage:
     """
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True, count: int = 4) -> None:
-        self.count, self.places, self.corner = count, sample_places(count), CORNERS[count]
+        self.count, self.corner = count, CORNERS[count]
+        self.places = (sample_places(count) - 0.5).astype(np.float32)  # from the centre
         self.near = NEAR + (self.corner - CORNERS[4])
         self.field, self.xp, self.skip = field, field.xp, skip
         self.prove = prove and field.provable
