@@ -13,7 +13,7 @@ where they do whatever the tiles are, so that tiles and threads change nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -171,19 +171,34 @@ class Coverage:
         picture = np.empty((grid.high, grid.wide, len(nothing)), np.float32)
         picture[:] = nothing
         tile = Tile(picture, background)
-        with self.xp.inference():
-            side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(picture, side)
-            for columns, part, points in self._pixels(grid, side, meetings):
-                inside = grid.inside(columns, side)
-                tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
-                result = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
-                values = tile.over(np.ascontiguousarray(result.transpose(2, 0, 1))).reshape(
-                    len(part.columns), side, side, -1
-                )
-                blocks[columns[1] // side, :, columns[0] // side] = values
+
+        def answer(meetings: Meetings, points: Array, inside: np.ndarray | None) -> np.ndarray:
+            tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
+            result = self.xp.to_numpy(self._points(meetings, points, grid.px, samples, tile, inside))
+            return tile.over(np.ascontiguousarray(result.transpose(2, 0, 1)))
+
+        self._fill(grid, tile, picture, answer)
         tile.picture = picture[: len(rows), : canvas[0]]
         return tile
+
+    def _fill(
+        self,
+        grid: Raster,
+        tile: Tile,
+        pixels: np.ndarray,
+        answer: Callable[[Meetings, Array, np.ndarray | None], np.ndarray],
+    ) -> None:
+        """Fill pixels (high, wide, K) that objects reach by answers (B, groups, K) for columns' meetings,
+        centres (2, groups, B) of their pixels, and a mask (groups, B) of those that are wanted.
+        """
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(pixels, side)
+            for _, part in _portions(meetings, side * side):
+                across, down = at = grid.place(part.columns, side)
+                points = self.xp.array(grid.centres(at, side), self.field.like)
+                values = answer(part, points, grid.inside(at, side))
+                blocks[down // side, :, across // side] = values.reshape(-1, side, side, blocks.shape[-1])
 
     def _points(
         self, meetings: Meetings, p: Array, px: float, samples: str, tile: Tile, wanted: np.ndarray | None
@@ -260,16 +275,14 @@ class Coverage:
         grid = raster(canvas, rows)
         tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
         result = np.zeros((grid.high, grid.wide), np.int32)
-        with self.xp.inference():
-            side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(result[..., None], side)
-            for columns, part, points in self._pixels(grid, side, meetings):
-                trace = Trace()
-                memory = self.ask(part, points, tile, trace)[2]
-                own = self._owners(part, trace)
-                covered = self.xp.to_numpy(memory[:, 0]) * self.field.slope < 0.0
-                values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
-                blocks[columns[1] // side, :, columns[0] // side] = values
+
+        def answer(meetings: Meetings, points: Array, _: np.ndarray | None) -> np.ndarray:
+            trace = Trace()
+            memory = self.ask(meetings, points, tile, trace)[2]
+            covered = self.xp.to_numpy(memory[:, 0]) * self.field.slope < 0.0
+            return np.where(covered, self._owners(meetings, trace), 0).T
+
+        self._fill(grid, tile, result[..., None], answer)
         return result[: len(rows), : canvas[0]]
 
     def _owners(self, meetings: Meetings, trace: Trace) -> np.ndarray:
@@ -289,14 +302,6 @@ class Coverage:
             new = [number + 0.0 * share, share * most]
             own[..., turn.at] = np.where(comes, new, [old[0], left * old[1]])
         return own[0, :, :count].astype(np.int32)
-
-    def _pixels(
-        self, grid: Raster, side: int, meetings: Meetings
-    ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
-        """Corners of blocks, their meetings, and their pixels' centres (2, groups, B), row by row."""
-        for _, part in _portions(meetings, side * side):
-            columns = grid.place(part.columns, side)
-            yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
 
     def _sampled(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
         """Means (groups, 4, B) of all samples of pixels."""

@@ -291,14 +291,19 @@ def shown(
 
 
 class _Gates(NamedTuple):
-    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's; and
-    which lie over what was before, if some are clear, with the slope of coverage.
+    """Gates of n operands: levels (rows, n) by their own distances, inf if open, and slopes by the state's;
+    the first one's line and the rest of the cell; and which lie over what was before, if some are clear, with
+    the slope of coverage.
     """
 
-    cell: Cell
-    own: Interval
+    low: Floats32
+    high: Floats32
     up: Floats32
     down: Floats32
+    line: Floats32  # (2, n)
+    bias: Floats32
+    candidate: Floats32
+    bump: Floats32
     given: Mask
     over: Mask | None
     slope: float
@@ -307,37 +312,24 @@ class _Gates(NamedTuple):
     def of(cls, cell: Cell, d: Interval, given: Mask, over: Mask | None, slope: float) -> _Gates:
         # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
         up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
-        own = Interval(
-            up[:, 0] * d.low + down[:, 0] * d.high + cell.bias,
-            up[:, 0] * d.high + down[:, 0] * d.low + cell.bias,
+        low = up[:, 0] * d.low + down[:, 0] * d.high + cell.bias
+        high = up[:, 0] * d.high + down[:, 0] * d.low + cell.bias
+        low[:, given] = high[:, given] = np.inf
+        rest = cell.lines[0], cell.bias[0], cell.candidate[0, 0], cell.bump[0]
+        return cls(
+            low, high, up[:, 1], down[:, 1], *rest, given, None if over is None else over & ~given, slope
         )
-        own.low[:, given] = own.high[:, given] = np.inf
-        return cls(cell, own, up[:, 1], down[:, 1], given, None if over is None else over & ~given, slope)
 
     def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
-        lines, bias, candidate, bump = self.cell
-        return _Gates(
-            Cell(lines[..., which], bias[:, which], candidate[..., which], bump[:, which]),
-            Interval(self.own.low[:, which], self.own.high[:, which]),
-            self.up[:, which],
-            self.down[:, which],
-            self.given[which],
-            None if self.over is None else self.over[which],
-            self.slope,
-        )
+        over = None if self.over is None else self.over[which]
+        return _Gates(*(part[..., which] for part in self[:-2]), over, self.slope)
 
     def through(self, state: Interval, coverage: Interval) -> Interval | None:
         """How much is seen through operands of a coverage (n,), of states (n,) before them."""
         if self.over is None:
             return None
-        ends = (
-            (0.5 - self.slope * state.high, 1.0 - coverage.high),
-            (
-                0.5 - self.slope * state.low,
-                1.0 - coverage.low,
-            ),
-        )
+        ends = [(0.5 - self.slope * d, 1.0 - c) for d, c in zip(state[::-1], coverage[::-1], strict=True)]
         return Interval(*(inside.clip(0.0, 1.0) * clear * self.over for inside, clear in ends))
 
 
@@ -348,18 +340,18 @@ class _Learned(State):
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
-        cell, own, up, down, given, *_ = gates
+        up, down, line = gates.up, gates.down, gates.line
         through = gates.through(Interval(low, high), Interval(own_colour.low[-1], own_colour.high[-1]))
         past = up * high + down * low
-        least, most = own.low + (up * low + down * high), own.high + past
+        least, most = gates.low + (up * low + down * high), gates.high + past
         paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
         keeps, takes = least[0] < 1, most[0] > 0
         # where the gate is not wide open, or not shut, its line bounds one number by the other
-        kept = _capped(Interval(low, high), cell.lines[0, 1], 1.0 - own.low[0])
-        taken = _capped(d, -cell.lines[0, 0], past[0] + cell.bias[0])
-        taken = Interval(*(np.where(given, *pair) for pair in zip(d, taken, strict=True)))
-        a, b = taken.low * cell.candidate[0, 0], taken.high * cell.candidate[0, 0]
-        dent = cell.bump[0] / 4 * (keeps & takes)
+        kept = _capped(Interval(low, high), line[1], 1.0 - gates.low[0])
+        taken = _capped(d, -line[0], past[0] + gates.bias)
+        taken = Interval(*(np.where(gates.given, *pair) for pair in zip(d, taken, strict=True)))
+        a, b = taken.low * gates.candidate, taken.high * gates.candidate
+        dent = gates.bump / 4 * (keeps & takes)
         self.distance.low[columns] = np.minimum(
             np.where(keeps, kept.low, np.inf), np.where(takes, np.minimum(a, b), np.inf)
         ) - np.maximum(dent, 0.0)
