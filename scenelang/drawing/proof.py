@@ -439,9 +439,7 @@ class Band:
         self._stream, self._behind, self._reach, self._along = stream, behind, stream.reach, along
         width, height = canvas
         self._grid = grid = raster(
-            (along * width, along * height),
-            range(along * rows.start, along * rows.stop),
-            largest=SIDES[0],
+            (along * width, along * height), range(along * rows.start, along * rows.stop), largest=SIDES[0]
         )
         self._every = np.empty((2, grid.high // along, grid.wide // along, len(behind)))
         self._every[:] = behind
