@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from lab.folds import fold
 from lab.training.scenes import sectors
 from scenelang.compiler.geometries import sector_distance
 from scenelang.compiler.lifting import PLANE_LAYOUT, WIDTH
-from scenelang.drawing.exact.field import fold, map_back, warp_back
+from scenelang.drawing.exact.field import map_back, warp_back
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from lab.folds import fold
 from scenelang.compiler.geometries import SECTORS, sector_distance
-from scenelang.drawing.exact.field import fold, map_back, warp_back
+from scenelang.drawing.exact.field import map_back, warp_back
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 FAR = 1e3  # translation of the objects that pad a stream: off every point

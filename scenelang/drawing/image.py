@@ -17,6 +17,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -350,6 +351,13 @@ def image_format(path: str | os.PathLike[str]) -> str:
     if kind is None or kind not in pillow.SAVE:
         raise ValueError(f"no image format has the suffix `{suffix}`")
     return kind
+
+
+def sample_places(count: int) -> npt.NDArray[np.float64]:
+    """Places of samples (2, count) in their pixel, pixels from its upper left corner."""
+    side = isqrt(count)
+    axis = (np.arange(side) + 0.5) / side
+    return np.stack([np.tile(axis, side), np.repeat(axis, side)])
 
 
 def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Image:

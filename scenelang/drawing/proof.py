@@ -173,24 +173,18 @@ def enclosed(
     Distances (P,) and colours (3 or 4, P), as of `State`, of the pairs hold wherever in the region;
     ``behind`` (K,) is shown where nothing is. ``nest`` and ``groups`` are of streams with groups.
     """
-    count, pairs = len(meetings.columns), len(joins.tokens)
-    shut, opened = np.empty((2, pairs), bool)
-    if nest is None:
-        nest = flat_nesting(meetings)
-    channels = len(colour.low)
-    state = _Exact.empty(NOTHING, count * nest.levels, np.float64, channels)
+    count, channels = len(meetings.columns), len(colour.low)
+    nest = nest or flat_nesting(meetings)
+    state = _Exact.empty(NOTHING, nest.states, np.float64, channels)
     operands = State(distance, colour)
 
-    def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
-        return state.join(places, operands.at(turn.part), joins.some(turn.part), turn.fresh)
+    def join(turn: Turn) -> tuple[Mask, Mask]:
+        how = joins if turn.ending is None else groups
+        assert how is not None
+        operand = state.operands(turn, operands, NOTHING)
+        return state.join(turn.at, operand, how.some(turn.which), turn.fresh)
 
-    def group(top: Index | slice, below: Index | slice, ended: Index) -> tuple[Mask, Mask]:
-        assert groups is not None
-        joined = state.join(below, state.at(top), groups.some(ended), np.zeros(len(ended), bool))
-        state.clear(top, NOTHING)
-        return joined
-
-    nest.fold(count, shut, opened, pair, group)
+    shut, _ = nest.fold(len(joins.tokens), join)
     (low, high), (first, last) = (tuple(side[..., :count] for side in pair) for pair in state)
     back = behind[:, None]
     if channels < len(behind):
@@ -445,9 +439,7 @@ class Band:
         self._stream, self._behind, self._reach, self._along = stream, behind, stream.reach, along
         width, height = canvas
         self._grid = grid = raster(
-            (along * width, along * height),
-            range(along * rows.start, along * rows.stop),
-            largest=SIDES[0],
+            (along * width, along * height), range(along * rows.start, along * rows.stop), largest=SIDES[0]
         )
         self._every = np.empty((2, grid.high // along, grid.wide // along, len(behind)))
         self._every[:] = behind

@@ -44,10 +44,7 @@ def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[s
 
 
 def draw_exact(
-    scene: Scene,
-    *,
-    spans: Spans | None = None,
-    progress: Callable[[float], None] | None = None,
+    scene: Scene, *, spans: Spans | None = None, progress: Callable[[float], None] | None = None
 ) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
@@ -63,13 +60,7 @@ def draw_exact(
         raise RenderError(str(error)) from None
 
 
-def draw(
-    program: Program,
-    how: How = DEFAULT,
-    *,
-    place: str | None = None,
-    **run: Unpack[Run],
-) -> Drawing:
+def draw(program: Program, how: How = DEFAULT, *, place: str | None = None, **run: Unpack[Run]) -> Drawing:
     """Draw a Program by the library that fits, as of `Run`; raises as `render`. ``place`` is ``"numpy"`` or a
     torch device; by default numpy for solids and small pictures, else ``how.device``.
     """
@@ -130,9 +121,7 @@ def render(
 
 
 def given(
-    program_or_scene: Program | Scene | str | os.PathLike[str],
-    size: tuple[int, int] | None,
-    backend: Backend,
+    program_or_scene: Program | Scene | str | os.PathLike[str], size: tuple[int, int] | None, backend: Backend
 ) -> tuple[Program | Scene, Spans | None]:
     """Input of a backend: a Scene, and where it was written, for the reference, else a Program."""
     from scenelang.compiler.program import Program
@@ -259,11 +248,7 @@ def render_outputs(
 
 
 def outputs_of(
-    drawn: Program | Scene,
-    wanted: Sequence[Output],
-    how: How,
-    *,
-    spans: Spans | None = None,
+    drawn: Program | Scene, wanted: Sequence[Output], how: How, *, spans: Spans | None = None
 ) -> Outputs:
     """Outputs of what a backend draws, a proof aside; raises as `render_outputs`."""
     wanted = tuple([name for name in wanted if name != "proof"])

@@ -7,11 +7,11 @@ import pytest
 import torch
 from torch import Tensor
 
+from lab.folds import fold
 from lab.sets.plane import SETS, random_scene
 from lab.training.network import Trainee
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
-from scenelang.drawing.exact.field import fold
 from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.load import Model, load_model
@@ -61,7 +61,7 @@ def test_lines_express_the_whole_fold() -> None:
         colours = torch.rand(6, 3, generator=g, dtype=torch.float64)
         tokens = torch.randint(0, TOKENS, (6,), generator=g)
         state, colour = stream(network, d, colours, tokens)
-        steps = fold(d.unbind(0), colours[:, None].unbind(0), tokens.tolist())
+        steps = fold(d.unbind(0), colours[:, None].unbind(0), tokens[:, None])
         depth, exact = list(steps)[-1]
         torch.testing.assert_close(state, depth, rtol=0, atol=1e-6)
         torch.testing.assert_close(colour, exact.expand(500, 3), rtol=0, atol=1e-5)

@@ -22,7 +22,7 @@ from scenelang.compiler.groups import read_groups
 from scenelang.compiler.program import Program
 from scenelang.drawing.neural.coverage import Coverage, Tile, add_textures
 from scenelang.drawing.neural.draw import draw_objects
-from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.field import Field, Trace
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
 from scenelang.drawing.neural.network import RADIUS
@@ -121,7 +121,7 @@ def asked(program: Program, p: np.ndarray) -> np.ndarray:
     meetings, _ = meetings_of(replace(pairs, far=np.ones(count, bool)))
     tile = Tile(np.empty((1, 1, 4), np.float32), None)
     coverage, points = Coverage(field, skip=False), np.ascontiguousarray(p.T)[:, :, None]
-    trace = field.trace(len(p), count)
+    trace = Trace()
     memory = coverage.ask(meetings, points, tile, trace)[2]
     add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool))
     found: np.ndarray = memory[:, :, 0]

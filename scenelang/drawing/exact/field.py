@@ -146,41 +146,21 @@ def worn(steps: Sequence[Step], d: Array, p: Array) -> Array:
     return d
 
 
-def fold(
-    distances: Iterable[Array], colours: Iterable[Array], tokens: Iterable[Array]
-) -> Iterator[tuple[Array, Array]]:
-    """Yield (D, C) after each object, of distances of shape S; colours broadcast against (*S, 3)."""
-    big_d = c_now = None
-    for d, c, token in zip(distances, colours, tokens, strict=True):
-        if big_d is None:
-            big_d, c_now = d, c
-        else:
-            big_d, c_now = combine(big_d, c_now, d, c, token)
-        yield big_d, c_now
-
-
 def combine(
-    big_d: Array, big_c: Array, d: Array, c: Array, token: Array, k: float = 0.0
+    big_d: Array, big_c: Array, d: Array, c: Array, token: int, k: float = 0.0
 ) -> tuple[Array, Array]:
-    """One step of the fold; see `fold` for shapes. k is the width of a blend, 0 for the usual one. Colours of
-    four channels are premultiplied, with the coverage behind.
+    """One step of the fold: (D, C) behind an object, of distances of shape S and colours that broadcast
+    against (*S, 3). k is the width of a blend, 0 for the usual one. Colours of four channels are
+    premultiplied, with the coverage behind.
     """
     xp = namespace(d)
-    if isinstance(token, int):
-        out_d, share, _ = folded(xp, token, k or BLEND * (token == SMOOTH), big_d, d)
-        if share is None:
-            return out_d, big_c
-        share = share[..., None]
-        if token == UNION and c.shape[-1] == 4:
-            c = c + (1.0 - c[..., 3:]) * xp.where((big_d < 0.0)[..., None], big_c, 0.0)
-        return out_d, big_c + (c - big_c) * share if token == SMOOTH else xp.where(share, c, big_c)
-    out_d, out_c = big_d, big_c
-    for value in TOKENS.values():
-        new_d, new_c = combine(big_d, big_c, d, c, value, k)
-        chosen = token == value
-        out_d = xp.where(chosen, new_d, out_d)
-        out_c = xp.where(chosen[..., None], new_c, out_c)
-    return out_d, out_c
+    out_d, share, _ = folded(xp, token, k or BLEND * (token == SMOOTH), big_d, d)
+    if share is None:
+        return out_d, big_c
+    share = share[..., None]
+    if token == UNION and c.shape[-1] == 4:
+        c = c + (1.0 - c[..., 3:]) * xp.where((big_d < 0.0)[..., None], big_c, 0.0)
+    return out_d, big_c + (c - big_c) * share if token == SMOOTH else xp.where(share, c, big_c)
 
 
 def folded(xp: Any, token: int, k: float, big_d: Array, d: Array) -> tuple[Array, Array, Array]:

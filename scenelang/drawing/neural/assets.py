@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -97,13 +97,20 @@ class GridShape(Lattice):
 
     def field(self, q: Array, gradient: bool) -> Array:
         """Distances (1, M), or these with their change over a cell (1 + d, M), which hides edges."""
-        xp, step, rows = self.xp, 0.5 / self.half, [self.distance(q)]
-        for axis in range(self.d) if gradient else ():
-            moved = [*q]
-            moved[axis] = q[axis] + step
-            ahead = self.distance(xp.stack(moved, 0))
-            moved[axis] = q[axis] - step
-            rows.append((ahead - self.distance(xp.stack(moved, 0))) / (2 * step))
+        rows = [self.distance(q)[None], *([self._change(self.distance, q)] if gradient else [])]
+        return self.xp.concat(rows, 0)
+
+    def _change(self, values: Callable[[Array], Array], q: Array, most: float | None = None) -> Array:
+        """Changes (d, M) of values over a cell about points, of coordinates up to ``most``."""
+        xp, step, rows = self.xp, 0.5 / self.half, []
+        for axis in range(self.d):
+            ends = []
+            for way in (step, -step):
+                moved = [*q]
+                moved[axis] = q[axis] + way if most is None else (q[axis] + way).clip(-most, most)
+                ends.append((values(xp.stack(moved, 0)), moved[axis]))
+            (ahead, last), (behind, first) = ends
+            rows.append((ahead - behind) / (2 * step if most is None else last - first))
         return xp.stack(rows, 0)
 
 
@@ -155,17 +162,8 @@ class GrownShape(GridShape):
 
     def _foot(self, q: Array) -> tuple[Array, Array]:
         """Points of the surface (d, M) that are nearest to points of the cube, and unit normals there."""
-        xp, step, rows = self.xp, 0.5 / self.half, []
-        for axis in range(self.d):
-            ends = []
-            for way in (step, -step):
-                moved = [*q]
-                moved[axis] = (q[axis] + way).clip(-1.0, 1.0)
-                ends.append((self.at(xp.stack(moved, 0)), moved[axis]))
-            (ahead, last), (behind, first) = ends
-            rows.append((ahead - behind) / (last - first))
-        slope = xp.stack(rows, 0)
-        normal = slope / xp.sqrt((slope * slope).sum(0)).clip(1e-9)
+        slope = self._change(self.at, q, 1.0)
+        normal = slope / self.xp.sqrt((slope * slope).sum(0)).clip(1e-9)
         return q - self.at(q) * normal, normal
 
 

@@ -13,19 +13,18 @@ where they do whatever the tiles are, so that tiles and threads change nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import isqrt
 
 import numpy as np
 
 from scenelang.compiler.groups import SMOOTH, UNION
 from scenelang.drawing.arrays import Array
+from scenelang.drawing.image import sample_places
 from scenelang.drawing.neural.field import NO_TEXTURE, Field, Trace
 from scenelang.drawing.neural.meetings import (
     LEVELS,
     ROUNDING,
-    Closing,
     Index,
     Meetings,
     Pairs,
@@ -41,72 +40,46 @@ NARROW = 1 / 16  # of a pixel by the width of a blend: above it colours change m
 LEAST = 1e-4  # of a colour, that counts as part of what a point shows
 
 
-def sample_places(count: int) -> np.ndarray:
-    """Places of a pixel's samples (2, count), pixels from its centre."""
-    side = isqrt(count)
-    axis = (np.arange(side) + 0.5) / side - 0.5
-    return np.stack([np.tile(axis, side), np.repeat(axis, side)]).astype(np.float32)
-
-
 def blending(field: Field, meetings: Meetings, trace: Trace, px: float, corner: float) -> Array:
     """A mask of pixels (groups, B), of a side, that may have samples in a narrow blend with a texture;
     ``corner`` is as in `CORNERS`.
     """
-    xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
-    worn = np.zeros(len(meetings.columns), bool)
-    worn[place[field.texture[objects] != NO_TEXTURE]] = True
-    width = field.widths[objects]
-    narrow = (field.tokens[objects] == SMOOTH) & (px > NARROW * width) & ~meetings.pairs.open & worn[place]
-    gap = xp.array((width + corner * px * (1 + field.frames.stretch[objects])).astype(np.float32), field.like)
-    for part in meetings.slots():
-        if narrow[part].any():
-            some = result[:, : part.stop - part.start]
-            some |= (abs(trace.margin[:, part]) < gap[part]) & xp.array(narrow[part], field.like)
-    if trace.joined and worn.any():
-        most = corner * px * (1 + float(field.frames.stretch.max()))
-        for (columns, groups, _), _, margin, *_ in trace.joined:
-            width = field.group_widths[groups]
-            narrow = (field.groups.joins[groups] == SMOOTH) & (px > NARROW * width) & worn[columns]
-            near = abs(margin) < xp.array((width + most).astype(np.float32), field.like)
-            result[:, columns] |= near & xp.array(narrow, field.like)
+    xp, textured = field.xp, field.texture[meetings.pairs.object] != NO_TEXTURE
+    result, worn = trace.none(), np.zeros(len(meetings.columns), bool)
+    worn[meetings.places()[textured]] = True
+    for turn, rows, _, _, margin, _ in trace if worn.any() else ():
+        width, stretch = field.widths[rows], field.stretch[rows]
+        narrow = (field.operators[rows] == SMOOTH) & (px > NARROW * width) & worn[turn.columns]
+        if turn.ending is None:
+            narrow &= ~meetings.pairs.open[turn.which]
+        if narrow.any():
+            gap = xp.array((width + corner * px * (1 + stretch)).astype(np.float32), field.like)
+            result[:, turn.columns] |= (abs(margin) < gap) & xp.array(narrow, field.like)
     return result
 
 
-def beneath(field: Field, meetings: Meetings, trace: Trace, d: Array, width: float) -> Array:
+def beneath(trace: Trace, width: float) -> Array:
     """A mask (groups, B) of pixels within a width, world units, of an outline that lies beneath something."""
-    result = 0.0 * trace.paint[:, : len(meetings.columns)] > 0
-    for part in meetings.slots():
-        outline = abs(trace.margin[:, part] + d[:, 0, part])
-        some = result[:, : part.stop - part.start]
-        some |= (outline < width) & (trace.paint[:, part] > 0)
-    for (columns, *_), paint, margin, _, distance in trace.joined:
-        result[:, columns] |= (abs(margin + distance) < width) & (paint > 0)
+    result = trace.none()
+    for turn, _, distance, paint, margin, _ in trace:
+        result[:, turn.columns] |= (abs(margin + distance) < width) & (paint > 0)
     return result
 
 
-def ties(field: Field, meetings: Meetings, trace: Trace, reach: float) -> Array:
+def ties(field: Field, trace: Trace, reach: float) -> Array:
     """A mask (groups, B) of pixels where one object's colour may tie with another's at a sample, ``reach``
     world units from the centre at most.
     """
-    xp, token = field.xp, field.tokens[meetings.pairs.object]
-    joins, blends = (xp.array(token == kind, field.like) for kind in (UNION, SMOOTH))
-    tied, shown = (0.0 * trace.paint[:, : len(meetings.columns)] > 0 for _ in range(2))
-    for part in meetings.slots():
-        n, paint = part.stop - part.start, trace.paint[:, part]
-        shown[:, :n] |= tied[:, :n] & blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
-        tied[:, :n] |= joins[part] & (abs(trace.margin[:, part]) < 2 * reach)
-    if not trace.joined:
-        return shown
-    blended = 0.0 * tied > 0
-    for part in meetings.slots():
-        n, paint = part.stop - part.start, trace.paint[:, part]
-        blended[:, :n] |= blends[part] & (paint > LEAST) & (paint < 1 - LEAST)
-    for (columns, groups, _), paint, margin, *_ in trace.joined:
-        joins, blends = (xp.array(field.groups.joins[groups] == kind, field.like) for kind in (UNION, SMOOTH))
-        blended[:, columns] |= blends & (paint > LEAST) & (paint < 1 - LEAST)
-        tied[:, columns] |= joins & (abs(margin) < 2 * reach)
-    return shown | (tied & blended)
+    tied, blended, shown = (trace.none() for _ in range(3))
+    for turn, rows, _, paint, margin, _ in trace:
+        operators, at = field.operators[rows], turn.columns
+        joins, blends = (field.xp.array(operators == kind, field.like) for kind in (UNION, SMOOTH))
+        mixed = blends & (paint > LEAST) & (paint < 1 - LEAST)
+        shown[:, at] |= tied[:, at] & mixed
+        blended[:, at] |= mixed
+        tied[:, at] |= joins & (abs(margin) < 2 * reach)
+    nested = any(met.turn.ending is not None for met in trace)
+    return tied & blended if nested else shown
 
 
 def add_textures(
@@ -122,7 +95,7 @@ def add_textures(
     (groups, S + R, B); of pixels they are looked up at several ``places`` (2, n) about the points.
     """
     xp, objects, place = field.xp, meetings.pairs.object, meetings.places()
-    shares = trace.shares(xp, nesting(meetings, field.groups), seen)
+    shares = trace.shares(xp, nesting(meetings, field.groups), seen, len(objects))
     groups, columns = seen.shape
     offsets = None if places is None else xp.array(places, p)[:, :, None]
     total = xp.full((3, groups * columns), 0.0, p)
@@ -181,7 +154,8 @@ class Coverage:
     """
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True, count: int = 4) -> None:
-        self.count, self.places, self.corner = count, sample_places(count), CORNERS[count]
+        self.count, self.corner = count, CORNERS[count]
+        self.places = (sample_places(count) - 0.5).astype(np.float32)  # from the centre
         self.near = NEAR + (self.corner - CORNERS[4])
         self.field, self.xp, self.skip = field, field.xp, skip
         self.prove = prove and field.provable
@@ -197,19 +171,34 @@ class Coverage:
         picture = np.empty((grid.high, grid.wide, len(nothing)), np.float32)
         picture[:] = nothing
         tile = Tile(picture, background)
-        with self.xp.inference():
-            side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(picture, side)
-            for columns, part, points in self._pixels(grid, side, meetings):
-                inside = grid.inside(columns, side)
-                tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
-                result = self.xp.to_numpy(self._points(part, points, grid.px, samples, tile, inside))
-                values = tile.over(np.ascontiguousarray(result.transpose(2, 0, 1))).reshape(
-                    len(part.columns), side, side, -1
-                )
-                blocks[columns[1] // side, :, columns[0] // side] = values
+
+        def answer(meetings: Meetings, points: Array, inside: np.ndarray | None) -> np.ndarray:
+            tile.met += points.shape[1] * points.shape[2] if inside is None else int(inside.sum())
+            result = self.xp.to_numpy(self._points(meetings, points, grid.px, samples, tile, inside))
+            return tile.over(np.ascontiguousarray(result.transpose(2, 0, 1)))
+
+        self._fill(grid, tile, picture, answer)
         tile.picture = picture[: len(rows), : canvas[0]]
         return tile
+
+    def _fill(
+        self,
+        grid: Raster,
+        tile: Tile,
+        pixels: np.ndarray,
+        answer: Callable[[Meetings, Array, np.ndarray | None], np.ndarray],
+    ) -> None:
+        """Fill pixels (high, wide, K) that objects reach by answers (B, groups, K) for columns' meetings,
+        centres (2, groups, B) of their pixels, and a mask (groups, B) of those that are wanted.
+        """
+        with self.xp.inference():
+            side, meetings = self.meetings(grid, tile)
+            blocks = grid.blocks(pixels, side)
+            for _, part in _portions(meetings, side * side):
+                across, down = at = grid.place(part.columns, side)
+                points = self.xp.array(grid.centres(at, side), self.field.like)
+                values = answer(part, points, grid.inside(at, side))
+                blocks[down // side, :, across // side] = values.reshape(-1, side, side, blocks.shape[-1])
 
     def _points(
         self, meetings: Meetings, p: Array, px: float, samples: str, tile: Tile, wanted: np.ndarray | None
@@ -222,7 +211,7 @@ class Coverage:
             return self._picture(meetings, p, tile)
         field = self.field
         traced = field.textured or field.blended or not self._flat
-        trace = field.trace(p.shape[1], len(meetings.pairs)) if traced else None
+        trace = Trace() if traced else None
         q, d, memory = self.ask(meetings, p, tile, trace)
         edge = abs(memory[:, 0]) / field.unit
         rate = self.xp.array((1 / self.field.frames.stretch[meetings.pairs.object]).astype(np.float32), p)
@@ -230,14 +219,15 @@ class Coverage:
         for part in meetings.slots():
             some = edge[:, : part.stop - part.start]
             some[:] = self.xp.minimum(some, near[:, part])
-        for (columns, *_), *_, distance in trace.joined if trace is not None else ():
-            edge[:, columns] = self.xp.minimum(edge[:, columns], abs(distance))
+        for turn, _, distance, *_ in trace or ():
+            if turn.ending is not None:
+                edge[:, turn.columns] = self.xp.minimum(edge[:, turn.columns], abs(distance))
         near = edge < self.near * px
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5
-            near = near | (seen & ties(field, meetings, trace, self.corner * px))
+            near = near | (seen & ties(field, trace, self.corner * px))
             if field.clear and field.rounded:
-                near = near | (seen & beneath(field, meetings, trace, d, self.near * px))
+                near = near | (seen & beneath(trace, self.near * px))
             if field.textured:
                 near = near | (seen & blending(field, meetings, trace, px, self.corner))
                 places = self.places * np.float32(px)
@@ -285,55 +275,33 @@ class Coverage:
         grid = raster(canvas, rows)
         tile = Tile(np.empty((grid.high, grid.wide, 4), np.float32), None)
         result = np.zeros((grid.high, grid.wide), np.int32)
-        with self.xp.inference():
-            side, meetings = self.meetings(grid, tile)
-            blocks = grid.blocks(result[..., None], side)
-            for columns, part, points in self._pixels(grid, side, meetings):
-                trace = self.field.trace(points.shape[1], len(part.pairs))
-                memory = self.ask(part, points, tile, trace)[2]
-                own = self._owners(part, trace)
-                covered = self.xp.to_numpy(memory[:, 0]) * self.field.slope < 0.0
-                values = np.where(covered, own, 0).T.reshape(-1, side, side, 1)
-                blocks[columns[1] // side, :, columns[0] // side] = values
+
+        def answer(meetings: Meetings, points: Array, _: np.ndarray | None) -> np.ndarray:
+            trace = Trace()
+            memory = self.ask(meetings, points, tile, trace)[2]
+            covered = self.xp.to_numpy(memory[:, 0]) * self.field.slope < 0.0
+            return np.where(covered, self._owners(meetings, trace), 0).T
+
+        self._fill(grid, tile, result[..., None], answer)
         return result[: len(rows), : canvas[0]]
 
     def _owners(self, meetings: Meetings, trace: Trace) -> np.ndarray:
         """Numbers (groups, B), from 1, of the objects that show most; 0 for none."""
-        nest, count = nesting(meetings, self.field.groups), len(meetings.columns)
-        objects, host = meetings.pairs.object, self.xp.to_numpy
-        own = np.zeros((2, trace.paint.shape[0], nest.levels * count))  # numbers, and how much they show
-        mine = np.stack([objects + 1, self.field.opacity[objects]])
-        rounds = iter(trace.joined)
-
-        def take(at: Index | slice, given: np.ndarray, paint: Array, through: Array | None) -> None:
+        count, host = len(meetings.columns), self.xp.to_numpy
+        states = nesting(meetings, self.field.groups).states
+        own = np.zeros((2, len(trace[0].paint), states))  # numbers, and how much they show
+        for turn, rows, _, paint, _, through in trace:
             share, clear = host(paint), 0.0 if through is None else host(through)
-            old, left = own[..., at], 1.0 - share * (1.0 - clear)
-            comes = (share > 0.5) & (given[1] >= clear * old[1])
-            own[..., at] = np.where(
-                comes, [given[0] + 0.0 * share, share * given[1]], [old[0], left * old[1]]
-            )
-
-        def close(closings: list[Closing]) -> None:
-            for (columns, _, level), (_, paint, _, through, _) in zip(closings, rounds, strict=False):
-                top, below = level * count + columns, (level - 1) * count + columns
-                take(below, own[..., top], paint, through)
-                own[..., top] = 0.0
-
-        for turn in nest.turns:
-            close(turn.before)
-            part, through = turn.part, trace.through
-            seen = None if through is None else through[:, part]
-            take(nest.places(turn, count), mine[:, None, part], trace.paint[:, part], seen)
-            close(turn.after)
+            if turn.ending is None:
+                number, most = np.stack([rows + 1, self.field.opacity[rows]])[:, None]
+            else:
+                number, most = own[..., turn.ending]
+                own[..., turn.ending] = 0.0
+            old, left = own[..., turn.at], 1.0 - share * (1.0 - clear)
+            comes = (share > 0.5) & (most >= clear * old[1])
+            new = [number + 0.0 * share, share * most]
+            own[..., turn.at] = np.where(comes, new, [old[0], left * old[1]])
         return own[0, :, :count].astype(np.int32)
-
-    def _pixels(
-        self, grid: Raster, side: int, meetings: Meetings
-    ) -> Iterator[tuple[tuple[Index, Index], Meetings, Array]]:
-        """Corners of blocks, their meetings, and their pixels' centres (2, groups, B), row by row."""
-        for _, part in _portions(meetings, side * side):
-            columns = grid.place(part.columns, side)
-            yield columns, part, self.xp.array(grid.centres(columns, side), self.field.like)
 
     def _sampled(self, meetings: Meetings, p: Array, px: float, tile: Tile) -> Array:
         """Means (groups, 4, B) of all samples of pixels."""
@@ -345,7 +313,7 @@ class Coverage:
     def _picture(self, meetings: Meetings, p: Array, tile: Tile) -> Array:
         """Premultiplied colour and coverage (groups, 4, B) at single points (2, groups, B)."""
         field = self.field
-        trace = field.trace(p.shape[1], len(meetings.pairs)) if field.textured else None
+        trace = Trace() if field.textured else None
         memory = self.ask(meetings, p, tile, trace)[2]
         if trace is not None:
             seen = memory[:, 0] * field.slope < 0.5

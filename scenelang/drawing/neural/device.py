@@ -30,7 +30,7 @@ from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.draw import Drawing, as_image, halved
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.load import Framed
-from scenelang.drawing.neural.meetings import LEVELS, Closing, Pairs, Raster, meetings_of, nesting, raster
+from scenelang.drawing.neural.meetings import LEVELS, Pairs, Raster, meetings_of, nesting, raster
 from scenelang.drawing.neural.network import RADIUS, Decoder, FramedArrays
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator"
@@ -204,9 +204,9 @@ def draw_blocks(
     out,  # (height, width, CHANNELS): over a background, else premultiplied colour and coverage
     starts,  # (blocks + 1,): where in `objects` those of each block begin
     objects,  # (pairs,): rows, in the order in which they join; those from N on are groups that end
-    levels,  # (pairs,): of the states that they join, 0 for the stream's own; none in a flat one
-    rows,  # (N + groups, ROW): the way to the leaf, scale, colour, cell
-    parts,  # (N, 6): where in `weights` its shape begins; the side of its grid, 0 for a decoder; where its
+    levels,  # (pairs,): of the states that they join, 0 for the stream's own
+    rows,  # (2 N + groups, ROW): the way to the leaf, scale, colour, cell
+    parts,  # (2 N, 6): where in `weights` its shape begins; the side of its grid, 0 for a decoder; where its
     # texture begins, how many steps that has, and its lines and columns, 0 for none
     weights,
     background,  # (3,)
@@ -228,7 +228,7 @@ def draw_blocks(
     WIDTH: tl.constexpr,  # of decoders
     LINES: tl.constexpr,  # of the gate of colour
     LEVELS: tl.constexpr,  # states, a power of two
-    LEAVES: tl.constexpr,  # N in a stream with groups
+    LEAVES: tl.constexpr,  # rows of objects
 ):
     block = tl.program_id(0)
     pixel = tl.arange(0, SIDE * SIDE * SAMPLES) // SAMPLES
@@ -239,32 +239,24 @@ def draw_blocks(
     world_y = top - (line.to(tl.float32) + off * (2 * (which // 2) - 1).to(tl.float32)) * px
 
     nothing = tl.zeros((SIDE * SIDE * SAMPLES,), tl.float32)
-    state, red, green, blue = nothing + empty, nothing, nothing, nothing
-    if LEVELS > 1:
-        flat = tl.zeros((LEVELS, SIDE * SIDE * SAMPLES), tl.float32)
-        states, reds, greens, blues = flat + empty, flat, flat, flat
-        place = tl.arange(0, LEVELS)[:, None]
+    flat = tl.zeros((LEVELS, SIDE * SIDE * SAMPLES), tl.float32)
+    states, reds, greens, blues = flat + empty, flat, flat, flat
+    place = tl.arange(0, LEVELS)[:, None]
     for pair in range(tl.load(starts + block), tl.load(starts + block + 1)):
         number = tl.load(objects + pair)
         row = rows + number * ROW
         part = parts + number * 6
         cell = row + CELL
-        if LEVELS > 1:
-            at = tl.load(levels + pair)
-            here, above = place == at, place == at + 1
-            state, red = _level(states, here), _level(reds, here)
-            green, blue = _level(greens, here), _level(blues, here)
-            if number >= LEAVES:  # a group joins what it stands in as an object
-                distance = _level(states, above) * tl.load(row)
-                own_red, own_green = _level(reds, above), _level(greens, above)
-                own_blue = _level(blues, above)
-                states = tl.where(above, empty, states)
-                reds, greens = tl.where(above, 0.0, reds), tl.where(above, 0.0, greens)
-                blues = tl.where(above, 0.0, blues)
-            else:
-                distance, own_red, own_green, own_blue = _object(
-                    world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
-                )
+        at = tl.load(levels + pair)
+        here, above = place == at, place == at + 1
+        state, red = _level(states, here), _level(reds, here)
+        green, blue = _level(greens, here), _level(blues, here)
+        if number >= LEAVES:  # a group joins what it stands in as an object
+            distance = _level(states, above) * tl.load(row)
+            own_red, own_green, own_blue = _level(reds, above), _level(greens, above), _level(blues, above)
+            states = tl.where(above, empty, states)
+            reds, greens = tl.where(above, 0.0, reds), tl.where(above, 0.0, greens)
+            blues = tl.where(above, 0.0, blues)
         else:
             distance, own_red, own_green, own_blue = _object(
                 world_x, world_y, row, part, weights, OUTER, INNER, WIDTH
@@ -283,14 +275,12 @@ def draw_blocks(
         red += paint * (own_red - red)
         green += paint * (own_green - green)
         blue += paint * (own_blue - blue)
-        if LEVELS > 1:
-            states, reds = tl.where(here, state, states), tl.where(here, red, reds)
-            greens, blues = tl.where(here, green, greens), tl.where(here, blue, blues)
+        states, reds = tl.where(here, state, states), tl.where(here, red, reds)
+        greens, blues = tl.where(here, green, greens), tl.where(here, blue, blues)
 
-    if LEVELS > 1:
-        bottom = place == 0
-        state, red = _level(states, bottom), _level(reds, bottom)
-        green, blue = _level(greens, bottom), _level(blues, bottom)
+    bottom = place == 0
+    state, red = _level(states, bottom), _level(reds, bottom)
+    green, blue = _level(greens, bottom), _level(blues, bottom)
     alpha = _unit(0.5 - state * slope)
     red, green = _mean(red * alpha, SAMPLES), _mean(green * alpha, SAMPLES)
     blue, alpha = _mean(blue * alpha, SAMPLES), _mean(alpha, SAMPLES)
@@ -359,10 +349,7 @@ def start(
     """
     (width, height), across = grid.canvas, grid.wide // LEVELS[0]
     blocks = across * grid.high // LEVELS[0]
-    objects, levels, deepest = pairs.object, np.zeros(0, int), 1
-    block = pairs.block
-    if field.groups.deepest:
-        block, objects, levels, deepest = _ordered(field, pairs)
+    block, objects, levels = _ordered(field, pairs)
     starts = block.searchsorted(np.arange(blocks + 1))
     config = field.network.config
     rows, wide = _rows(field), WIDTHS[config.decoder_width > WIDTHS[0]]
@@ -379,11 +366,11 @@ def start(
         ROW=rows.shape[1],
         OUTER=field.layout.outer,
         INNER=field.layout.inner,
-        CELL=_cell_at(field),
+        CELL=field.layout.geometry - field.layout.places.frame.start + 4,  # behind scale and colour
         WIDTH=wide,
         LINES=config.paint_lines,
-        LEVELS=1 << (deepest - 1).bit_length(),
-        LEAVES=2 * len(field.tokens) if field.groups.deepest else 0,
+        LEVELS=1 << int(levels.max(initial=0)).bit_length(),
+        LEAVES=2 * len(field.tokens),
     )
     return out
 
@@ -416,50 +403,34 @@ def on_host(network: Framed, versions: tuple[tuple[int, int], ...]) -> FramedArr
     return result
 
 
-def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Blocks, rows and levels of pairs and of the groups that end between them, and how many levels are used.
-    Behind the rows of N objects are those of objects that begin a state as they are, and groups'.
+def _ordered(field: Field, pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Blocks, rows and levels of pairs and of the groups that end between them. Behind the rows of N objects
+    are those of objects that begin a state as they are, and groups'.
     """
+    if not field.groups.deepest:
+        return pairs.block, pairs.object, 0 * pairs.object
     meetings, _ = meetings_of(pairs)
-    nest, count = nesting(meetings, field.groups), len(field.tokens)
+    nest, count, blocks = nesting(meetings, field.groups), len(field.tokens), len(meetings.columns)
     result = list[tuple[np.ndarray, ...]]()  # columns, rows, levels, moments
-
-    def close(closings: list[Closing]) -> None:
-        for columns, groups, level in closings:
-            result.append((columns, 2 * count + groups, level - 1, np.full(len(columns), len(result))))
-
-    for part, level, fresh, before, after in nest.turns:
-        close(before)
-        rows = meetings.pairs.object[part] + count * fresh
-        result.append((np.arange(len(level)), rows, level, np.full(len(level), len(result))))
-        close(after)
+    for moment, (which, _, at, ending, fresh) in enumerate(nest.turns):
+        objects = 2 * count + which if ending is not None else meetings.pairs.object[which] + count * fresh
+        level, column = np.divmod(np.arange(nest.states)[at], blocks)
+        result.append((column, objects, level, np.full(len(column), moment)))
     columns, rows, levels, moments = (np.concatenate(parts) for parts in zip(*result, strict=True))
     block = meetings.columns[columns]
     by = np.lexsort((moments, block))
-    return block[by], rows[by], levels[by], nest.levels
-
-
-def _cell_at(field: Field) -> int:
-    """Place in a row of the kernel at which its cell begins: behind the way to the leaf, scale and colour."""
-    return int(field.layout.geometry - field.layout.places.frame.start + 4)
+    return block[by], rows[by], levels[by]
 
 
 def _rows(field: Field) -> np.ndarray:
-    """Rows of the kernel's table: objects, and with groups these as first in a state, and the groups."""
+    """Rows of the kernel's table: objects, these as first in a state, and groups."""
     count, layout = len(field.tokens), field.layout
-    whole = np.concatenate(
-        [
-            field.vectors[:, layout.places.frame.start : layout.geometry],
-            field.frames.scale[:, None],
-            field.colours.T,
-        ],
-        1,
-    )
-    parts = [(whole, field.cells(np.arange(count)))]
-    if field.groups.deepest:
-        groups = np.zeros((len(field.groups.joins), whole.shape[1]))
-        groups[:, 0] = 1 / field.unit
-        parts += [(whole, field.cells(np.arange(count), opened=True)), (groups, field.joins())]
+    way = field.vectors[:, layout.places.frame.start : layout.geometry]
+    whole = np.concatenate([way, field.frames.scale[:, None], field.colours.T], 1)
+    groups = np.zeros((len(field.groups.joins), whole.shape[1]))
+    groups[:, 0] = 1 / field.unit
+    every = np.arange(count)
+    parts = [(whole, field.cells(every)), (whole, field.cells(every, opened=True)), (groups, field.joins())]
     result = []
     for row, cell in parts:
         lines = np.concatenate([cell.lines, cell.bias[:, None]], 1)  # (1 + L, 3, N)
@@ -469,7 +440,7 @@ def _rows(field: Field) -> np.ndarray:
 
 
 def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
-    """The kernel's ``parts``, of each object (N, 6), and its ``weights``."""
+    """The kernel's ``parts``, of each row of an object (2 N, 6), and its ``weights``."""
     shapes = [s.nodes if isinstance(s, GridShape) else _decoder(s, wide) for s in field.shapes]  # type: ignore[arg-type]
     textures = [_texture_table(texture) for texture in field.textures]
     weights = [np.empty(0, np.float32), *shapes, *textures]
@@ -481,7 +452,7 @@ def _weights(field: Field, wide: int) -> tuple[np.ndarray, np.ndarray]:
     none = np.zeros((1, 4))  # which the last place is, and so that of `NO_TEXTURE`
     parts = [shape[field.shape], np.concatenate([texture, none])[field.texture]]
     whole = np.concatenate(parts, 1).astype(np.int32)
-    return np.concatenate([whole] * (2 if field.groups.deepest else 1)), np.concatenate(weights)
+    return np.concatenate([whole] * 2), np.concatenate(weights)
 
 
 def _texture_table(texture: Texture) -> np.ndarray:

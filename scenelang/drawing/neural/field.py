@@ -8,8 +8,7 @@ objects they are of; then the cell takes a point's objects in one by one. Nothin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
 from scenelang.drawing.neural.frames import FAR, Frames, Skins, read_skins
-from scenelang.drawing.neural.meetings import Closing, Interval, Meetings, Nesting, Shown, nesting, shown
+from scenelang.drawing.neural.meetings import Interval, Meetings, Nesting, Shown, Turn, nesting, shown
 from scenelang.drawing.neural.network import (
     EMPTY,
     EXTENT,
@@ -43,35 +42,32 @@ ROUNDED = 3  # from the index of a cut to that of the same cut with a rounded ed
 _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
 
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """Effect of P pairs on points."""
+class Met(NamedTuple):
+    """A turn and what came of it at points, (groups, n) each."""
 
-    paint: Array  # (groups, P) how far the object's colour came in
-    margin: Array  # (groups, P) by how much what was there before is nearer than the object, world units
-    through: Array | None = None  # (groups, P) how much is seen through the object, None where nothing is
-    # paint, margin and through of groups of the stream that ended, round by round, with their distances
-    joined: list[tuple[Closing, Array, Array, Array | None, Array]] = field(default_factory=list)
+    turn: Turn
+    rows: np.ndarray  # (n,) numbers of the objects, behind these of the groups
+    distance: Array  # world units
+    paint: Array  # how far the colour came in
+    margin: Array  # by how much what was there before is nearer, world units
+    through: Array | None  # how much is seen through it, None where nothing is
 
-    def shares(self, xp: Arrays, nest: Nesting, seen: Array) -> Array:
+
+class Trace(list[Met]):
+    """Effects of the turns of pairs on points."""
+
+    def none(self) -> Array:
+        """A mask of columns (groups, B), all False."""
+        return 0.0 * self[0].paint > 0  # in the first turn all columns meet an object
+
+    def shares(self, xp: Arrays, nest: Nesting, seen: Array, pairs: int) -> Array:
         """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
-        count, result, through = seen.shape[1], 0.0 * self.paint, self.through
-        left = xp.concat([1.0 * seen, *[0.0 * seen] * (nest.levels - 1)], 1)
-        rounds = iter(reversed(self.joined))
-
-        def opened(closings: list[Closing]) -> None:
-            for (columns, _, level), (_, paint, _, clear, _) in zip(reversed(closings), rounds, strict=False):
-                top, below = level * count + columns, (level - 1) * count + columns
-                rest = left[:, below]
-                left[:, top], left[:, below] = rest * paint, rest * _left(paint, clear)
-
-        for turn in reversed(nest.turns):
-            opened(turn.after)
-            at, paint = nest.places(turn, count), self.paint[:, turn.part]
-            rest = left[:, at]
-            clear = None if through is None else through[:, turn.part]
-            result[:, turn.part], left[:, at] = rest * paint, rest * _left(paint, clear)
-            opened(turn.before)
+        result, seen = xp.full((len(seen), pairs), 0.0, self[0].paint), 1.0 * seen
+        left = xp.concat([seen, xp.full((len(seen), nest.states - seen.shape[1]), 0.0, seen)], 1)
+        for turn, *_, paint, _, through in reversed(self):
+            rest = left[:, turn.at]
+            into, at = (result, turn.which) if turn.ending is None else (left, turn.ending)
+            into[:, at], left[:, turn.at] = rest * paint, rest * _left(paint, through)
         return result
 
 
@@ -164,9 +160,13 @@ class Field:
         """Cells by operator and width of the blend; behind them the same with gates that are open."""
         xp, groups = self.xp, self.groups
         widths = widths_of(self._raw, self.parts.width.astype(np.float64))
-        self.widths = np.where(self.tokens == SMOOTH, widths, BLEND)
-        """Widths of the blends by which objects join (N,), world units."""
         self.group_widths = widths[groups.rows]  # Widths of the blends by which groups join (G,), 0 for none
+        # operators of objects and, behind them, of groups (N + G,), widths of their blends, world units, and
+        # stretches
+        self.operators = np.concatenate([self.tokens, groups.joins])
+        self.widths = np.append(np.where(self.tokens == SMOOTH, widths, BLEND), self.group_widths)
+        most = self.frames.stretch.max(initial=1.0)
+        self.stretch = np.append(self.frames.stretch, np.full(len(groups.joins), most))
         seen = felt(groups, widths)
         self.widest = max([BLEND, *seen.widest.tolist()])
         beyond = np.minimum(FARTHER * seen.total, FARTHEST * seen.widest) / self.frames.scale
@@ -174,10 +174,8 @@ class Field:
             beyond = beyond + self.skins.reach
         # in a block a row may hide all before it in its group, and be out of reach in a part of the block
         self.reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + SLACK + beyond)
-        operators = [*self.tokens.tolist(), *groups.joins.tolist()]
         blends = [*np.where(groups.first, 0.0, widths).tolist(), *self.group_widths.tolist()]
-        kinds, which = _numbered(list(zip(operators, blends, strict=True)))
-        self._cell, self._joins = which[: len(self.tokens)], which[len(self.tokens) :]
+        kinds, self._kinds = _numbered(list(zip(self.operators.tolist(), blends, strict=True)))
         cells = Cell(*(np.asarray(xp.to_numpy(part)) for part in self.network.cell_weights()))
         # The fold of s d and s D is s D', so that the cell's own width is that of any other.
         scale = np.array([BLEND / (width or BLEND) for _, width in kinds], np.float32)
@@ -239,11 +237,11 @@ class Field:
 
     def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
         """Cells of objects, which come last, on the host; with gates that are open if asked for."""
-        return Cell(*(part.take(self._cell[objects] + self._opened * opened, -1) for part in self._host))
+        return Cell(*(part.take(self._kinds[objects] + self._opened * opened, -1) for part in self._host))
 
     def joins(self) -> Cell:
         """Cells of all groups, which come last, on the host."""
-        return Cell(*(part.take(self._joins, -1) for part in self._host))
+        return Cell(*(part.take(self._kinds[len(self.tokens) :], -1) for part in self._host))
 
     def empty(self, groups: int, count: int, more: int = 0) -> Array:
         """State and register (groups, S + R, count) of points that have met nothing, with room for more."""
@@ -318,11 +316,12 @@ class Field:
         (groups, F, P) of the pairs; ``trace`` takes down what each object did.
         """
         xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
-        nest, count = nesting(meetings, self.groups), len(meetings.columns)
-        fresh = pairs.open | np.concatenate([pairs.open[:0], *(turn.fresh for turn in nest.turns)])
-        memory = self.empty(features.shape[0], count, int(trace is not None))
-        stack = memory if nest.levels == 1 else xp.concat([memory] * nest.levels, 2)
-        lines, bias, candidate, bump = self._cells_at(self._cell[pairs.object] + self._opened * fresh)
+        nest, count = nesting(meetings, self.groups), len(self.tokens)
+        starts = [turn.fresh for turn in nest.turns if turn.ending is None]
+        fresh = np.concatenate([pairs.open[:0], *starts]) | pairs.open
+        groups, more = features.shape[0], int(trace is not None)
+        stack = self.empty(groups, nest.states, more)
+        every = self._cells_at(self._kinds[pairs.object] + self._opened * fresh)
         colours = xp.take(self.colours, xp.array(pairs.object, self.like))
         if trace is not None:  # a colour of 1 over a register of 0 shows the gate
             colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
@@ -332,38 +331,30 @@ class Field:
             for plane, new in zip(stack, values, strict=True):
                 xp.put(plane, index, new)
 
-        def close(closings: list[Closing]) -> None:
-            """Let groups that end join the states below as objects."""
-            for columns, groups, level in closings:
-                top = xp.array(level * count + columns, self.like)
-                below = xp.array((level - 1) * count + columns, self.like)
-                inner, outer = xp.take(stack, top), xp.take(stack, below)
-                if trace is not None:
-                    inner[:, -1] = 1.0
-                given = self._cells_at(self._joins[groups]), inner[:, :s] / self.unit, inner[:, s:]
-                lies = self._over(self.groups.joins[groups])
-                took = self._took(outer, *given, trace is not None, lies)
-                if trace is not None:
-                    trace.joined.append((Closing(columns, groups, level), *took, given[1][:, 0]))
-                put(below, outer)
-                put(top, xp.take(memory, xp.array(columns, self.like)))
-
         for turn in nest.turns:
-            close(turn.before)
-            part, at = turn.part, nest.places(turn, count)
+            which, at = turn.which, turn.at
             index = at if isinstance(at, slice) else xp.array(at, self.like)
             old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
-            own = Cell(lines[..., part], bias[:, part], candidate[..., part], bump[:, part])
-            lies = None if over is None else over[part]
-            took = self._took(old, own, features[..., part], colours[:, part], trace is not None, lies)
+            if turn.ending is None:
+                rows, d, own = pairs.object[which], features[..., which], colours[:, which]
+                cell, lies = (
+                    Cell(*(part[..., which] for part in every)),
+                    over if over is None else over[which],
+                )
+            else:  # groups that end join as objects
+                top = xp.array(turn.ending, self.like)
+                ended, rows = xp.take(stack, top), count + which
+                if trace is not None:
+                    ended[:, -1] = 1.0
+                d, own = ended[:, :s] / self.unit, ended[:, s:]
+                cell, lies = self._cells_at(self._kinds[rows]), self._over(self.operators[rows])
+                put(top, self.empty(groups, len(ended[0, 0]), more))
+            took = self._took(old, cell, d, own, trace is not None, lies)
             if not isinstance(at, slice):
                 put(index, old)
             if trace is not None:
-                trace.paint[:, part], trace.margin[:, part], through = took
-                if trace.through is not None:
-                    trace.through[:, part] = through
-            close(turn.after)
-        return stack[:, : s + self.register, :count]
+                trace.append(Met(turn, rows, d[:, 0], *took))
+        return stack[:, : s + self.register, : len(meetings.columns)]
 
     def _over(self, operators: np.ndarray, fresh: np.ndarray | None = None) -> Array | None:
         """1 for operands (n,) that lie over what was before, 0 for others; None where none is clear."""
@@ -403,10 +394,6 @@ class Field:
         if traced:
             paint = memory[:, -1] + 0.0
         return paint, margin, through
-
-    def trace(self, groups: int, pairs: int) -> Trace:
-        """Room for a trace."""
-        return Trace(*(self.xp.full((groups, pairs), 0.0, self.like) for _ in range(3 if self.clear else 2)))
 
     def picture(self, memory: Array) -> Array:
         """Premultiplied colour and coverage (groups, 4, B), in [0, 1], of points that met all objects."""

@@ -84,10 +84,7 @@ class Frames:
         reach, moved = _stretches(a, b, c, d)[1], np.hypot(x, y)
         self._stages: list[_Stage] = []
         self.stretch = np.ones(numbers.shape[1])
-        for frame, warps, radius in (
-            (last_at, outer_at, reach + moved),
-            (middle_at, inner_at, 1.0),
-        ):
+        for frame, warps, radius in ((last_at, outer_at, reach + moved), (middle_at, inner_at, 1.0)):
             rows = numbers[frame]
             moves = (rows != np.reshape(layout.identity, (-1, 1))).any(0)
             steep = _stretches(*rows[[0, 1, 3, 4]])[1]

@@ -25,13 +25,7 @@ from scenelang.compiler.weights import (
     shipped_weights,
 )
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.files import (
-    MOST_WIDTH,
-    framed_config,
-    load_levels,
-    load_slopes,
-    solid_config,
-)
+from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_levels, load_slopes, solid_config
 from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes

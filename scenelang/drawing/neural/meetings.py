@@ -105,81 +105,45 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
     return Meetings(block[first], pairs.take(index), lengths), index
 
 
-class Closing(NamedTuple):
-    """Groups (n,) that end, one in each of some ascending columns, and the levels of their states."""
-
-    columns: Index
-    groups: Index
-    level: Index
-
-
 class Turn(NamedTuple):
-    """A slot of nested meetings."""
+    """Pairs of one slot, or groups that end, one in each of some columns; what they join is n states."""
 
-    part: slice  # where its pairs lie
-    level: Index  # (n,) of the states that its pairs join; 0 is the stream's own
+    which: slice | Index  # where the pairs lie, or numbers of the groups
+    columns: slice | Index  # ascending
+    at: slice | Index  # states that they join: level l of column i is state ``l * columns + i``
+    ending: Index | None  # states of groups that end; None of pairs
     fresh: Mask  # (n,) whether an object begins its state as it is
-    before: list[Closing]  # groups that end before the slot, in rounds
-    after: list[Closing]  # those that end behind it where columns end
 
 
 class Nesting(NamedTuple):
     """Nested meetings."""
 
-    turns: list[Turn]  # slot by slot
-    levels: int  # how many states are needed; 1 where all pairs join the stream's own
+    turns: list[Turn]  # in the order in which they join
+    states: int  # how many there are; one a column where all pairs join the stream's own
 
-    def places(self, turn: Turn, blocks: int) -> Index | slice:
-        """States that a turn's pairs join: level l of column i is state ``l * blocks + i``."""
-        count = len(turn.level)
-        return slice(count) if self.levels == 1 else turn.level * blocks + np.arange(count)
+    def fold(self, pairs: int, join: Callable[[Turn], tuple[Mask, Mask]]) -> tuple[Mask, Mask]:
+        """Let turns join; which pairs (P,) change nothing or are hidden, and which hide the rest.
 
-    def fold(
-        self,
-        blocks: int,
-        shut: Mask,
-        opened: Mask,
-        pair: Callable[[Turn, Index | slice], tuple[Mask, Mask]],
-        group: Callable[[Index, Index, Index], tuple[Mask, Mask]],
-    ) -> None:
-        """Fold pairs and groups; fill in which pairs (P,) change nothing or are hidden, and which hide the
-        rest.
-
-        ``pair`` takes a turn's pairs into states (n,) and returns whether each changes nothing, and whether
-        nothing else is left; ``group`` takes states into others, as groups of these numbers end, and empties
-        them.
+        ``join`` takes a turn into its states, empties those of groups that end, and returns of each whether
+        it changes nothing, and whether nothing else is left.
         """
-        done = []  # of groups that ended, round by round: where they join, and what came of it
-
-        def close(closings: list[Closing]) -> None:
-            for columns, ended, level in closings:
-                top, below = level * blocks + columns, (level - 1) * blocks + columns
-                done.append((top, below, group(top, below, ended)))
-
-        for turn in self.turns:
-            close(turn.before)
-            shut[turn.part], opened[turn.part] = pair(turn, self.places(turn, blocks))
-            close(turn.after)
-        hidden = np.zeros(self.levels * blocks, bool)
-
-        def reopen(closings: list[Closing]) -> None:
-            for _ in closings:
-                top, below, (closed, wide) = done.pop()
-                hidden[top] = hidden[below] | closed
-                hidden[below] |= wide
-
-        for turn in reversed(self.turns):
-            reopen(turn.after)
-            at = self.places(turn, blocks)
-            shut[turn.part] |= hidden[at]
-            hidden[at] |= opened[turn.part]
-            reopen(turn.before)
+        shut, opened = np.empty((2, pairs), bool)
+        hidden = np.zeros(self.states, bool)
+        came = [join(turn) for turn in self.turns]
+        for turn, (closed, wide) in zip(reversed(self.turns), reversed(came), strict=True):
+            if turn.ending is None:
+                shut[turn.which], opened[turn.which] = closed | hidden[turn.at], wide
+            else:
+                hidden[turn.ending] = hidden[turn.at] | closed
+            hidden[turn.at] |= wide
+        return shut, opened
 
 
 def flat_nesting(meetings: Meetings) -> Nesting:
     """The nesting of a stream without groups: all pairs join the stream's own state."""
-    sizes = [(part, part.stop - part.start) for part in meetings.slots()]
-    return Nesting([Turn(p, np.zeros(n, np.intp), np.zeros(n, bool), [], []) for p, n in sizes], 1)
+    sizes = [(part, slice(part.stop - part.start)) for part in meetings.slots()]
+    turns = [Turn(part, own, own, None, np.zeros(own.stop, bool)) for part, own in sizes]
+    return Nesting(turns, len(meetings.columns))
 
 
 def nesting(meetings: Meetings, groups: Groups) -> Nesting:
@@ -207,29 +171,25 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting:
     real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
     every = np.arange(count)
     turns, levels = list[Turn](), 1
+
+    def end(columns: Index, kept: Index) -> None:
+        """Let the groups of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
+        for at in reversed(number.tolist() if len(columns) else ()):
+            if len(some := columns[(kept <= at) & real[columns, at]]):
+                top = real[some, : at + 1].sum(1) * count + some
+                turns.append(Turn(last_path[some, at], some, top - count, top, np.zeros(len(some), bool)))
+
     for at, part in enumerate(slots):
         n = part.stop - part.start
-        before = _closings(every[:n], last_path, real, shared[part])
+        end(every[:n], shared[part])
         real[:n] = np.where(begins[part], own[part], real[:n] & (number < shared[part, None]))
         last_path[:n] = paths[part]
         level = real[:n].sum(1)
         levels = max(levels, int(level.max(initial=0)) + 1)
+        turns.append(Turn(part, slice(n), level * count + every[:n], None, fresh[part]))
         left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
-        after = _closings(every[left:n], last_path, real, np.zeros(n - left, np.intp))
-        turns.append(Turn(part, level, fresh[part], before, after))
-    return Nesting(turns, levels)
-
-
-def _closings(columns: Index, open_groups: Index, real: Mask, kept: Index) -> list[Closing]:
-    """Rounds in which the groups (B, D) of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
-    result = list[Closing]()
-    if not len(columns):
-        return result
-    for at in range(open_groups.shape[1] - 1, -1, -1):
-        some = columns[(kept <= at) & real[columns, at]]
-        if len(some):
-            result.append(Closing(some, open_groups[some, at], real[some, : at + 1].sum(1)))
-    return result
+        end(every[left:n], np.zeros(n - left, np.intp))
+    return Nesting(turns, levels * count)
 
 
 Floats32 = npt.NDArray[np.float32]
@@ -260,10 +220,14 @@ class State(NamedTuple):
         """Select some columns."""
         return type(self)(*(Interval(low[..., columns], high[..., columns]) for low, high in self))
 
-    def clear(self, columns: Index | slice, distance: float) -> None:
-        """Empty some columns."""
+    def operands(self, turn: Turn, pairs: State, empty: float) -> State:
+        """Select what joins in a turn, some of the ``pairs``, or states that end; these are emptied."""
+        if turn.ending is None:
+            return pairs.at(turn.which)
+        result = self.at(turn.ending)
         for side, colour in zip(self.distance, self.colour, strict=True):
-            side[columns], colour[:, columns] = distance, 0.0
+            side[turn.ending], colour[:, turn.ending] = empty, 0.0
+        return result
 
     def paint(
         self, columns: Index | slice, colour: Interval, share: Interval, through: Interval | None = None
@@ -305,27 +269,20 @@ def shown(
     world unit; ``lies`` says which pairs and groups lie over what was before, if some are clear.
     """
     blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _Learned.empty(empty, blocks * nest.levels, channels=len(colours.low))
-    shut, wide = np.zeros((2, len(given)), bool)
+    state = _Learned.empty(empty, nest.states, channels=len(colours.low))
     operands = State(distance, colours)
-    fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns)])
-    over, groups_over = lies or (None, None)
-    gates = _Gates.of(cell, distance, given | fresh, over, slope)
+    fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns if turn.ending is None)])
+    gates = _Gates.of(cell, distance, given | fresh, None if lies is None else lies[0], slope)
 
-    def pair(turn: Turn, places: Index | slice) -> tuple[Mask, Mask]:
-        part = turn.part
-        keeps, hides = state.join(places, operands.at(part), gates.some(part))
-        return keeps, hides | given[part]
+    def join(turn: Turn) -> tuple[Mask, Mask]:
+        which, operand = turn.which, state.operands(turn, operands, empty)
+        if turn.ending is None:
+            keeps, hides = state.join(turn.at, operand, gates.some(which))
+            return keeps, hides | given[which]
+        cells, lie = Cell(*(x[..., which] for x in joins)), None if lies is None else lies[1][which]
+        return state.join(turn.at, operand, _Gates.of(cells, operand.distance, turn.fresh, lie, slope))
 
-    def group(top: Index, below: Index, ended: Index) -> tuple[Mask, Mask]:
-        operand, cells = state.at(top), Cell(*(x[..., ended] for x in joins))
-        over = None if groups_over is None else groups_over[ended]
-        given = np.zeros(len(ended), bool)
-        joined = state.join(below, operand, _Gates.of(cells, operand.distance, given, over, slope))
-        state.clear(top, empty)
-        return joined
-
-    nest.fold(blocks, shut, wide, pair, group)
+    shut, wide = nest.fold(len(given), join)
     low, high = (side[:blocks] for side in state.distance)
     covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
     sides = [(c[:, :blocks] * share, share) for c, share in zip(state.colour, covered, strict=True)]
@@ -334,14 +291,19 @@ def shown(
 
 
 class _Gates(NamedTuple):
-    """Gates of n operands: cells, levels by their own distances, inf if open, and slopes by the state's; and
-    which lie over what was before, if some are clear, with the slope of coverage.
+    """Gates of n operands: levels (rows, n) by their own distances, inf if open, and slopes by the state's;
+    the first one's line and the rest of the cell; and which lie over what was before, if some are clear, with
+    the slope of coverage.
     """
 
-    cell: Cell
-    own: Interval
+    low: Floats32
+    high: Floats32
     up: Floats32
     down: Floats32
+    line: Floats32  # (2, n)
+    bias: Floats32
+    candidate: Floats32
+    bump: Floats32
     given: Mask
     over: Mask | None
     slope: float
@@ -350,37 +312,24 @@ class _Gates(NamedTuple):
     def of(cls, cell: Cell, d: Interval, given: Mask, over: Mask | None, slope: float) -> _Gates:
         # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
         up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
-        own = Interval(
-            up[:, 0] * d.low + down[:, 0] * d.high + cell.bias,
-            up[:, 0] * d.high + down[:, 0] * d.low + cell.bias,
+        low = up[:, 0] * d.low + down[:, 0] * d.high + cell.bias
+        high = up[:, 0] * d.high + down[:, 0] * d.low + cell.bias
+        low[:, given] = high[:, given] = np.inf
+        rest = cell.lines[0], cell.bias[0], cell.candidate[0, 0], cell.bump[0]
+        return cls(
+            low, high, up[:, 1], down[:, 1], *rest, given, None if over is None else over & ~given, slope
         )
-        own.low[:, given] = own.high[:, given] = np.inf
-        return cls(cell, own, up[:, 1], down[:, 1], given, None if over is None else over & ~given, slope)
 
     def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
-        lines, bias, candidate, bump = self.cell
-        return _Gates(
-            Cell(lines[..., which], bias[:, which], candidate[..., which], bump[:, which]),
-            Interval(self.own.low[:, which], self.own.high[:, which]),
-            self.up[:, which],
-            self.down[:, which],
-            self.given[which],
-            None if self.over is None else self.over[which],
-            self.slope,
-        )
+        over = None if self.over is None else self.over[which]
+        return _Gates(*(part[..., which] for part in self[:-2]), over, self.slope)
 
     def through(self, state: Interval, coverage: Interval) -> Interval | None:
         """How much is seen through operands of a coverage (n,), of states (n,) before them."""
         if self.over is None:
             return None
-        ends = (
-            (0.5 - self.slope * state.high, 1.0 - coverage.high),
-            (
-                0.5 - self.slope * state.low,
-                1.0 - coverage.low,
-            ),
-        )
+        ends = [(0.5 - self.slope * d, 1.0 - c) for d, c in zip(state[::-1], coverage[::-1], strict=True)]
         return Interval(*(inside.clip(0.0, 1.0) * clear * self.over for inside, clear in ends))
 
 
@@ -391,18 +340,18 @@ class _Learned(State):
         """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
         d, own_colour = operand
         low, high = self.distance.low[columns], self.distance.high[columns]
-        cell, own, up, down, given, *_ = gates
+        up, down, line = gates.up, gates.down, gates.line
         through = gates.through(Interval(low, high), Interval(own_colour.low[-1], own_colour.high[-1]))
         past = up * high + down * low
-        least, most = own.low + (up * low + down * high), own.high + past
+        least, most = gates.low + (up * low + down * high), gates.high + past
         paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
         keeps, takes = least[0] < 1, most[0] > 0
         # where the gate is not wide open, or not shut, its line bounds one number by the other
-        kept = _capped(Interval(low, high), cell.lines[0, 1], 1.0 - own.low[0])
-        taken = _capped(d, -cell.lines[0, 0], past[0] + cell.bias[0])
-        taken = Interval(*(np.where(given, *pair) for pair in zip(d, taken, strict=True)))
-        a, b = taken.low * cell.candidate[0, 0], taken.high * cell.candidate[0, 0]
-        dent = cell.bump[0] / 4 * (keeps & takes)
+        kept = _capped(Interval(low, high), line[1], 1.0 - gates.low[0])
+        taken = _capped(d, -line[0], past[0] + gates.bias)
+        taken = Interval(*(np.where(gates.given, *pair) for pair in zip(d, taken, strict=True)))
+        a, b = taken.low * gates.candidate, taken.high * gates.candidate
+        dent = gates.bump / 4 * (keeps & takes)
         self.distance.low[columns] = np.minimum(
             np.where(keeps, kept.low, np.inf), np.where(takes, np.minimum(a, b), np.inf)
         ) - np.maximum(dent, 0.0)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Camera, Stage
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.image import DEEP, Image, Outputs, from_light
+from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.march import (
     CAREFUL,
@@ -417,13 +416,6 @@ def _length(xp: Arrays, a: Array) -> Array:
 TILE = 1 << 16  # samples at a time
 
 
-def samples_in(count: int) -> np.ndarray:
-    """Places of samples (2, count) in their pixel, pixels from its upper left corner."""
-    side = isqrt(count)
-    axis = (np.arange(side) + 0.5) / side
-    return np.stack([np.tile(axis, side), np.repeat(axis, side)])
-
-
 def draw_solids(
     field: SolidField,
     stage: Stage,
@@ -478,7 +470,7 @@ def _band(
         picture, work = np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
-        across, down = samples_in(count)
+        across, down = sample_places(count)
         every, more = _shade(lighting, canvas, x[:, None] + across, y[:, None] + rows.start + down)
         picture[:, y, x] = every[:4].mean(2)
         work += more + Work(refined=len(x))
@@ -543,7 +535,7 @@ def solid_outputs(
     x_centres = np.arange(width) + 0.5
     field.xp.each(threads, row, range(0, height, every))
     down, across = np.nonzero(rough(result[5:]))
-    right, below = samples_in(count)
+    right, below = sample_places(count)
     field.xp.each(threads, sampled, range(0, len(down), TILE // count))
     return Outputs(result[0], np.moveaxis(result[1:4], 0, 2), result[4].astype(np.int32), result[5])
 

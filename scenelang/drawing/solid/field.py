@@ -59,6 +59,10 @@ class Closing(NamedTuple):
     which: Array  # numbers of the groups, behind those of the objects
 
 
+# what happens at points in turn: a group ends, or the points (k,) meet an object, all where they are None
+Steps = list[Closing | Array | None]
+
+
 class Stacks:
     """The groups that are open at each object, as bits: the outermost is 1, one in that 2, and so on."""
 
@@ -76,17 +80,16 @@ class Stacks:
         self._states = placed(np.array([bin(i).count("1") for i in range(2 << groups.deepest)]))
 
     def followed(
-        self, places: list[Array | None], rays: Array, objects: Array, every: Array
-    ) -> tuple[list[Array | None], list[list[Closing]], int]:
-        """Places, closings and depth of `Pairs`, by places without states and all points' numbers."""
+        self, places: Sequence[Array | None], rays: Array, objects: Array, every: Array
+    ) -> tuple[Steps, int]:
+        """Steps and depth of `Pairs`, by places without states and all points' numbers."""
         xp, count = self._xp, len(every)
         ways, begun = xp.take(self._ways, objects), 0 * every
         met = count if places[0] is None else len(places[0])
         xp.put(begun, rays[:met], ways[:met])
         if (ways == xp.take(begun, rays)).all() and not xp.take(self._cuts, objects).any():
-            return places, [[]] * (len(places) + 1), 1  # each point meets one group alone
-        result: list[Array | None] = []
-        closings: list[list[Closing]] = []
+            return [*places], 1  # each point meets one group alone
+        result: Steps = []
         stacks, paths = 0 * every, xp.take(self._path, 0 * every)
         start, deepest = 0, 1
         for place in places:
@@ -100,34 +103,32 @@ class Stacks:
                 common = common + same * (1 << depth)
             # what begins in what is not empty, or cuts it, has a state of its own
             begun = opened & ~common & (xp.take(self._cuts, which) | (common + 1) * (start > 0))
-            closing, stack = self._closed(points, stack, common, last, count)
-            stack = stack | begun
+            stack = self._closed(result, points, stack, common, last, count) | begun
             states = xp.take(self._states, stack)
             deepest = max(deepest, 1 + int(states.max())) if len(points) else deepest
-            closings.append(closing)
             result.append(place if place is None and not start else points + count * states)
             xp.put(stacks, points, stack)
             xp.put(paths, points, path)
             start += len(points)
-        closings.append(self._closed(every, stacks, 0 * every, paths, count)[0])
+        self._closed(result, every, stacks, 0 * every, paths, count)
         if deepest > 1 and result[0] is None:
             result[0] = every
-        return result, closings, deepest
+        return result, deepest
 
     def _closed(
-        self, points: Array, stack: Array, common: Array, path: Array, count: int
-    ) -> tuple[list[Closing], Array]:
-        """End the groups of stacks (k,) but for what they have in common with what follows."""
-        xp, result = self._xp, list[Closing]()
+        self, steps: Steps, points: Array, stack: Array, common: Array, path: Array, count: int
+    ) -> Array:
+        """End the groups of stacks (k,) but for what they have in common with what follows; those left."""
+        xp = self._xp
         ending = stack & ~common
         for depth in reversed(range(self._groups)):
             bit = 1 << depth
             some = xp.where((ending & bit) > 0)
             if len(some):
                 inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
-                result.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                steps.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
                 stack = stack - (ending & bit)
-        return result, stack
+        return stack
 
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
@@ -149,14 +150,13 @@ class Meeting(NamedTuple):
 class Pairs(NamedTuple):
     """Points of M rays and the objects that they meet: P pairs."""
 
-    # the points (k,) that meet an object, those that meet a second, and so on; None where all do. Of points
-    # in groups they are those of their states, as `Closing` has them
-    places: list[Array | None]
+    # points that meet an object, those that meet a second, and so on; of points in groups they are those of
+    # their states, as `Closing` has them
+    steps: Steps
     rays: Array  # (P,), place by place
     objects: Array  # their numbers (P,)
     at: Array  # where the rays begin behind the objects' maps (3, P)
     way: Array  # how that changes along the rays (3, P)
-    closings: list[list[Closing]]  # of the groups that end before each place, and behind the last
     depth: int = 1  # how many states a point has
 
 
@@ -499,7 +499,7 @@ class SolidField:
         """
         xp, count = self.xp, len(t)
         pairs = self.pairs(passes, t) if isinstance(passes, Passes) else passes
-        places, rays, objects, at, way, closings, depth = pairs
+        steps, rays, objects, at, way, depth = pairs
         size = depth * count
         if p is None:
             at = way * xp.take(t, rays) + at
@@ -516,9 +516,10 @@ class SolidField:
         )
         states.memory[0] = EMPTY
         stop = 0
-        for index, ending in zip(places, closings, strict=False):
-            for closing in ending:
-                self._close(states, closing, wanted)
+        for index in steps:
+            if isinstance(index, Closing):
+                self._close(states, index, wanted)
+                continue
             start, stop = stop, stop + (count if index is None else len(index))
             pair = slice(start, stop)
             which, near, look = objects[pair], d[pair], self.looks
@@ -538,8 +539,6 @@ class SolidField:
                 continue
             number = which + 1 + 0 * near if owners else None
             self._join(states, index, Meeting(near, look, slope, None, number), which, wanted)
-        for closing in closings[-1]:
-            self._close(states, closing, wanted)
         parts = states.memory, states.slope, states.bound, states.owner
         first: list[Any] = [part if part is None else part[..., :count] for part in parts]
         memory, slope, bound, owner = first
@@ -567,11 +566,11 @@ class SolidField:
         objects = xp.whole(pairs[OBJECT])
         if not self.draws:
             objects = xp.select(objects < 0, -1 - objects, objects)
-        result = Pairs(places, rays, objects, xp.take(passes.origins, objects), pairs[WAY], [[]] * (most + 1))
-        if most < 2 or self.stacks is None:
-            return result
-        places, closings, depth = self.stacks.followed(places, rays, objects, every)
-        return result._replace(places=places, closings=closings, depth=depth)
+        steps: Steps = [*places]
+        depth = 1
+        if most > 1 and self.stacks is not None:
+            steps, depth = self.stacks.followed(places, rays, objects, every)
+        return Pairs(steps, rays, objects, xp.take(passes.origins, objects), pairs[WAY], depth)
 
     def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""

@@ -41,21 +41,16 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)), np.float32).T[:, None] 
 
 
 @lru_cache(maxsize=64)
-def norms_box(numbers: bytes, shape: tuple[int, int], *rest: Any) -> np.ndarray:
-    """The box (2, 3) of a decoder of norm units: its lines and radius, their shape, and the rest of it."""
-    flat = np.frombuffer(numbers, np.float32)
-    layers = Norms(flat[: shape[0] * shape[1]].reshape(shape), flat[-shape[0] - 1 : -1], flat[-1], *rest)
-    return surrounding(lambda q: answers(NUMPY, q, layers, False)[0])
-
-
-@lru_cache(maxsize=64)
-def decoder_box(shapes: tuple[tuple[int, ...], ...], numbers: bytes) -> np.ndarray:
-    """The box (2, 3) of a decoder with weights and biases of such shapes, one after the other."""
+def decoder_box(shapes: tuple[tuple[int, ...], ...], numbers: bytes, *rest: Any) -> np.ndarray:
+    """The box (2, 3) of a decoder whose arrays have such shapes, one after the other; of one of norm units
+    the ``rest`` is given.
+    """
     ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)])
     flat = np.frombuffer(numbers, np.float32)
     parts = [flat[a:b].reshape(shape) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)]
-    layers = Smooth(zip(parts[::2], parts[1::2], strict=True))
-    return surrounding(lambda q: NUMPY.smooth(q, layers)[0])
+    if rest:
+        return surrounding(lambda q: answers(NUMPY, q, Norms(*parts, *rest), False)[0])
+    return surrounding(lambda q: NUMPY.smooth(q, Smooth(zip(parts[::2], parts[1::2], strict=True)))[0])
 
 
 @lru_cache(maxsize=8)
@@ -224,11 +219,12 @@ class SolidNetwork:
 
     def box(self, layers: Smooth | Norms) -> np.ndarray:
         """The least and the greatest leaf coordinates (2, 3) of what a decoder shows."""
-        if isinstance(layers, Norms):
-            held = [np.asarray(self.xp.to_numpy(part), np.float32) for part in layers[:3]]
-            return norms_box(b"".join(part.tobytes() for part in held), held[0].shape, *layers[3:])
-        parts = [np.asarray(self.xp.to_numpy(part)) for layer in layers for part in layer]
-        return decoder_box(tuple(part.shape for part in parts), b"".join(part.tobytes() for part in parts))
+        normed = isinstance(layers, Norms)
+        arrays = layers[:3] if normed else [part for layer in layers for part in layer]
+        parts = [np.asarray(self.xp.to_numpy(part), np.float32) for part in arrays]
+        return decoder_box(
+            tuple(p.shape for p in parts), b"".join(p.tobytes() for p in parts), *layers[3:] if normed else ()
+        )
 
     def edged(self, layers: Smooth | Norms) -> bool:
         """Whether a decoder shows edges, which lines inside make; rays may clip them."""
