@@ -379,8 +379,7 @@ class Plane(Space):
         if isinstance(transform, scene.Matrix) and (rows[2] or rows[6] or rows[8] or rows[9]):
             help = "for a 2D model the third row and column are those of the identity"
             return Refusal("E0505", "`matrix` mixes z with x and y", help)
-        a, b, _, x, c, d, _, y, *_ = rows  # z is left alone
-        return (a, b, 0.0, x, c, d, 0.0, y, 0.0, 0.0, 1.0, 0.0)
+        return flattened(rows)
 
     def idle(self, transform: scene.Transform) -> str | None:
         if not isinstance(transform, scene.Scale) or transform.z in (1.0, transform.x):
@@ -441,6 +440,11 @@ class Plane(Space):
 
     def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
         return self.box(geometry, steps, level)[:4]
+
+
+def flattened(rows: Rows) -> Rows:
+    """The same map of the plane with z left alone."""
+    return (rows[0], rows[1], 0.0, rows[3], rows[4], rows[5], 0.0, rows[7], 0.0, 0.0, 1.0, 0.0)
 
 
 def stretches(a: float, b: float, c: float, d: float) -> tuple[float, float]:
