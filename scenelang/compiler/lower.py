@@ -45,6 +45,7 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
             fact = f"`{transform.kind}` leaves the plane"
             return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
         return step(transform)
+    assert not isinstance(transform, schema.Flip)  # which `_STEPS` has
     fitted = space.fitted(transform, _MAPS[type(transform)](transform))
     if isinstance(fitted, Refusal):
         return fitted

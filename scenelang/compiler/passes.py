@@ -13,7 +13,7 @@ from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
 from scenelang.compiler import rewrites, steps
 from scenelang.compiler.chain import LevelsError, split_levels
-from scenelang.compiler.geometries import GEOMETRIES, Geometry
+from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import (
     Fold,
     Graph,
@@ -204,7 +204,9 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         result.append(("thin", largest / smallest))
     skin, row = Skin.of(leaf.steps), GEOMETRIES.get(leaf.geometry)
     if leaf.look.material == "diffuse":
-        result.append(("thickness", smallest * _thickness(skin, row)))
+        grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
+        least = skin.shell or (row.thickness if row else inf)
+        result.append(("thickness", smallest * (least + 2 * grown)))
     if skin.grow or skin.shell:
         result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:
@@ -218,12 +220,6 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         elif isinstance(step, steps.Displace):
             result += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
     return result
-
-
-def _thickness(skin: Skin, row: Geometry | None) -> float:
-    """The least thickness of a leaf with a skin, leaf units."""
-    grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
-    return (skin.shell or (row.thickness if row else inf)) + 2 * grown
 
 
 def _texels(leaf: Leaf, graph: Graph) -> Measures:

@@ -25,7 +25,7 @@ from scenelang.compiler.spaces import Stage, stage_data
 from scenelang.language import scene, words
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
-from scenelang.language.evaluation import Evaluation
+from scenelang.language.evaluation import Evaluation, is_colour
 from scenelang.language.expressions import prepare
 from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
@@ -560,9 +560,7 @@ def _stage() -> Json:
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
     """The data of a param for its control on a page."""
     value = file.env[file.scope.names[stmt.name.text].slot]
-    default = stmt.default
-    coloured = isinstance(default, nodes.CallExpr) and default.name.text in ("rgb", "hsv")
-    colour = "color" if coloured or isinstance(default, nodes.Color) else "vector"
+    colour = "color" if is_colour(stmt.default) else "vector"
     kind = colour if isinstance(value, Vec) else _KINDS[value.__class__]
     data: dict[str, Any] = {"name": name, "kind": kind, "value": _json(value)}
     if stmt.range is not None:
