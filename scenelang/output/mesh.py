@@ -164,15 +164,6 @@ def sheets() -> Sheets:
     return table
 
 
-def _others(numbers: Index, known: Index) -> Index:
-    """The different numbers that are not among known ones, both in order; four times as fast as numpy's."""
-    numbers = np.sort(numbers)
-    fresh = np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]
-    if len(known):
-        fresh &= known[np.searchsorted(known, numbers).clip(0, len(known) - 1)] != numbers
-    return np.asarray(numbers[fresh])
-
-
 class Grid:
     """Cells of one size, by numbers, with the field's values at their corners."""
 
@@ -196,12 +187,12 @@ class Grid:
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values, self.holed = np.zeros(0, np.intp), np.zeros(0), False
         while True:
-            fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
+            fresh = np.setdiff1d(self.cells[:, None] + self.bits, self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
             order = np.argsort(nodes)
             self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
             self.nodes, self.cells = nodes[order], np.sort(self.cells)
-            left = _others(self._around(), self.cells)  # the field may be steeper than it should be
+            left = np.setdiff1d(self._around(), self.cells)  # the field may be steeper than it should be
             if len(left):
                 self.cells = np.concatenate([self.cells, left])
             elif len(taken := self._pinched()):
@@ -296,7 +287,7 @@ def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
     low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
-    zero, _, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
+    zero, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
     p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
