@@ -431,6 +431,9 @@ class Layout:
     def if_item(self, word: int, opening: int, inside: Part, closing: int, item: Part) -> Part:
         return sequence([self.word(word), " ", self.parenthesised(opening, inside, closing), " ", item])
 
+    def name_ref(self, name: Part) -> Part:
+        return name
+
     def number(self, token: int) -> Part:
         text = self.text[self.starts[token] : self.ends[token]]
         if len(text) > _SURE_DIGITS or "E" in text or "e" in text.rstrip(_UNIT_LETTERS):
@@ -445,10 +448,9 @@ class Layout:
     color = true = false = word
 
     def callbacks(self) -> list[Callable[..., Any] | None]:
-        """The callback of every rule, as `run` takes them; names, and what only recovery uses, have none."""
+        """The callback of every rule, as `run` takes them; rules that only recovery uses have none."""
         names = (name for _, _, name in tables().rules)
-        none = re.compile("(bad_.*|name_ref)?")
-        return [None if none.fullmatch(name) else getattr(self, name) for name in names]
+        return [None if not name or name.startswith("bad_") else getattr(self, name) for name in names]
 
     def file(self, statements: list[Item] | None = None) -> Part:
         last = self.notes.get(len(self.tokens.kinds) - 1)
