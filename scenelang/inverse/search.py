@@ -305,7 +305,7 @@ def central(
 ) -> Matrix | None:
     """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
     columns: dict[int, Point] = {}
-    for axis in np.flatnonzero(free):
+    for axis in np.flatnonzero(free).tolist():
         move = step * (np.arange(len(u)) == axis)
         low, high = space.inside(u - move), space.inside(u + move)
         one, other = residuals(low), residuals(high)
