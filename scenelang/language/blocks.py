@@ -138,13 +138,10 @@ def prepare_let(stmt: tree.Let, place: Place) -> Action | None:
 
     def action(env: Env, out: Builder) -> None:
         env[slot] = get(env)
-
-    def watched(env: Env, out: Builder) -> None:
-        env[slot] = get(env)
         if watch is not None:
             watch(name, env[slot])
 
-    return action if watch is None else watched
+    return action
 
 
 def _declare(stmt: tree.Fn | tree.Module, place: Place) -> Callable[[], None] | None:

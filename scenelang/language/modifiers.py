@@ -427,12 +427,11 @@ def _check_stops(material: Material, where: Written, session: Session) -> None:
     ):
         return  # a stop was refused already
     span = (session.spans.span(stop) if stop is not None else None) or where.name
+    code, help = "E0330", "stops stand in the block of material linear or material radial"
     if material.name in words.GRADIENTS:
+        code = "E0360"
         help = "as in material linear { stop(0, #d33); stop(0.5, #fff); stop(1, #33d); }: 2 to 8, in order"
-        report.error("E0360", message, span, help=help)
-    else:
-        help = "stops stand in the block of material linear or material radial"
-        report.error("E0330", message, span, help=help)
+    report.error(code, message, span, help=help)
 
 
 def _called(name: tree.Name, place: Place) -> str | None:
