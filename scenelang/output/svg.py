@@ -394,7 +394,7 @@ class Inks:
         if abs(p @ way - there).max() > 1e-4 or not abs(np.linalg.det(way[:2])) > 1e-12:
             return None
         back = np.linalg.inv(np.concatenate([way, [[0], [0], [1]]], 1))[:, :2]
-        moved = " ".join(f"{value:.6g}" for value in back.ravel())
+        moved = " ".join(f"{round(value, 6) + 0.0:.6g}" for value in back.ravel())
         texture, stops = whole.textures[self.looks[row][2]], np.array(gradient.stops)
         if any(step[0] == "hue" for step in texture.steps):  # which bends the way from colour to colour
             more = np.linspace(0, 1, 17)

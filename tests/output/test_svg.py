@@ -120,6 +120,11 @@ def test_holes_and_colours_and_what_lies_behind() -> None:
     assert re.search(r'<pattern id="p1".*data:image/png;base64', text)
     assert 'fill="url(#p1)"' in text
     assert scenelang.to_svg(scenelang.loads("")).count("<path") == 0
+    ramp = scenelang.loads("square { material linear { stop(0, #f00); stop(1, #00f); opacity(0.5); } }")
+    text = scenelang.to_svg(ramp)
+    assert '<linearGradient id="p1"' in text
+    assert 'gradientTransform="matrix(128 0 0 -128 128 128)"' in text
+    assert 'fill="url(#p1)" fill-opacity="0.5"' in text
 
 
 def test_options_of_pictures_are_refused(tmp_path: Path) -> None:
