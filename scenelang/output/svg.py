@@ -181,14 +181,19 @@ class Region:
         self.step = float(np.clip(fine.min() * shapes.unit, FINEST, 0.5))
 
     def at(self, p: Floats, half_px: float = 0.0) -> Floats:
-        """Values (G, B) at points (2, G, B)."""
-        shapes = self.shapes
-        off = abs(p - shapes.half) - shapes.half - BORDER
-        result = np.maximum(shapes.ask(self.bound, p, half_px), off.max(0))
-        for one, other, floor in self.wins:
-            rest = shapes.ask(other, p, half_px)
-            result = np.maximum(result, shapes.ask(one, p, half_px) - (rest.clip(0.0) if floor else rest))
-        return np.asarray(result)
+        """Values (G, B) at points (2, G, B), some columns at a time."""
+        shapes, result = self.shapes, np.empty(p.shape[1:])
+        each = max(1, (1 << 16) // (p.shape[1] * len(self.bound.tokens)))
+        for some in (slice(i, i + each) for i in range(0, p.shape[2], each)):
+            q = p[..., some]
+            value = np.maximum(
+                shapes.ask(self.bound, q, half_px), (abs(q - shapes.half) - shapes.half).max(0) - BORDER
+            )
+            for one, other, floor in self.wins:
+                rest = shapes.ask(other, q, half_px)
+                value = np.maximum(value, shapes.ask(one, q, half_px) - (rest.clip(0.0) if floor else rest))
+            result[:, some] = value
+        return result
 
     def grid(self) -> tuple[Floats, Floats, float]:
         """Values (rows, columns) at nodes, the first of these (2,), and the way between two."""
@@ -198,19 +203,13 @@ class Region:
         place = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), 0).reshape(2, 1, -1) * BLOCK
         middle = first[:, None, None] + (place + (BLOCK - 1) / 2) * step
         reach = BLOCK * step / 2**0.5
-        value = self._parts(middle, BLOCK * step / 2)
+        value = self.at(middle, BLOCK * step / 2)
         near = np.flatnonzero(abs(value[0]) < self.steep * reach * (1 + bool(self.wins)))
         values = np.repeat(value, BLOCK * BLOCK, 0)
         inner = np.stack(np.divmod(np.arange(BLOCK * BLOCK), BLOCK)[::-1])[:, :, None]
-        values[:, near] = self._parts(first[:, None, None] + (place[:, :, near] + inner) * step)
+        values[:, near] = self.at(first[:, None, None] + (place[:, :, near] + inner) * step)
         grid = values.T.reshape(rows, columns, BLOCK, BLOCK).swapaxes(1, 2)
         return np.pad(grid.reshape(rows * BLOCK, -1), 1, constant_values=1.0), first - step, step
-
-    def _parts(self, p: Floats, half_px: float = 0.0) -> Floats:
-        """As `at`, some blocks at a time."""
-        each = max(1, (1 << 16) // (p.shape[1] * len(self.bound.tokens)))
-        parts = [self.at(p[..., i : i + each], half_px) for i in range(0, p.shape[2], each)]
-        return np.concatenate([np.empty((p.shape[1], 0)), *parts], 1)
 
     def outlines(self) -> list[tuple[Floats, Floats]]:
         """Closed outlines with the inside on one hand: points (2, n), and unit normals there (2, n)."""
@@ -222,9 +221,9 @@ class Region:
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
         a, b = (first[:, None] + node * step for node in (inside, outside))
         f, g = (grid[node[1], node[0]] for node in (inside, outside))
-        points, *_ = zeros(lambda p: self._parts(p[:, None])[0], a, b, f, g, STEPS)
+        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS)
         off = 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
-        around = self._parts(points[:, None] + off)
+        around = self.at(points[:, None] + off)
         normals = np.stack([around[0] - around[1], around[2] - around[3]])
         normals /= np.hypot(*normals).clip(1e-9)
         cuts = np.cumsum([len(loop) for loop in loops])[:-1]
@@ -395,7 +394,7 @@ class Inks:
         if abs(p @ way - there).max() > 1e-4 or not abs(np.linalg.det(way[:2])) > 1e-12:
             return None
         back = np.linalg.inv(np.concatenate([way, [[0], [0], [1]]], 1))[:, :2]
-        moved = " ".join(f"{value:.6g}" for value in back.ravel())
+        moved = " ".join(f"{round(value, 6) + 0.0:.6g}" for value in back.ravel())
         texture, stops = whole.textures[self.looks[row][2]], np.array(gradient.stops)
         if any(step[0] == "hue" for step in texture.steps):  # which bends the way from colour to colour
             more = np.linspace(0, 1, 17)
