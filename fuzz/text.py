@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from scenelang.language.lexer import FOREIGN, UNIT_ALIASES
+from scenelang.language.foreign import SIGNS, UNIT_NAMES
 from scenelang.language.tables import tables
 from scenelang.language.values import CONSTANTS, FUNCTIONS
 from scenelang.language.words import ANIMATED, LANGUAGE
@@ -162,8 +162,8 @@ def seeds() -> list[bytes]:
 def words() -> tuple[str, ...]:
     """Names and signs of the language."""
     own = ["square", "triangle", "star", "pentagon", "flat", "sphere", "diffuse", "shapes2d", "loop", "axis"]
-    units = ["deg", "rad", "turn", "s", "ms", *UNIT_ALIASES]
-    signs = [*tables().literals, *FOREIGN]
+    units = ["deg", "rad", "turn", "s", "ms", *UNIT_NAMES]
+    signs = [*tables().literals, *SIGNS]
     found = [*signs, *FUNCTIONS, *CONSTANTS, *ANIMATED, *sorted(LANGUAGE), *own, *units, *NUMBERS, *ODD]
     return tuple(dict.fromkeys(word for word in found if word))
 

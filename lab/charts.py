@@ -6,6 +6,8 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from scenelang.drawing.metrics import MOST_DB
 
 INK, FAINT, LINE, WARN = "#22303c", "#c9d1d8", "#1f77b4", "#c8452f"
@@ -57,6 +59,39 @@ def _probe(axis: Any, curves: Sequence[Mapping[str, Any]]) -> None:
     axis.set_ylabel("PSNR, dB", fontsize=8)
     axis.tick_params(labelsize=7)
     axis.grid(axis="y", color=FAINT, linewidth=0.5)
+
+
+def budget_chart(curves: Mapping[str, Sequence[Sequence[float]]], white: float, hours: float) -> bytes:
+    """PSNR over core-hours of long trainings, by name, and lines of their last third drawn on to ``hours``.
+
+    A point is steps, seconds, side and PSNR. Where a training began with the weights of another, the points
+    that both have are drawn once. The error is taken to fall by a power of the time, which is a guess.
+    """
+    plt = pyplot()
+    figure, axis = plt.subplots(figsize=(WIDE_IN, 3.6))
+    seen: set[tuple[float, ...]] = set()
+    for name, points in curves.items():
+        own = [p for p in points if tuple(p) not in seen]
+        seen |= {tuple(p) for p in points}
+        x, y = np.array([p[1] / 3600 for p in own]), np.array([p[3] for p in own])
+        (line,) = axis.plot(x, y, linewidth=1.5, label=name)
+        tail = len(x) - max(3, len(x) // 3)
+        rise, level = np.polyfit(np.log10(x[tail:]), y[tail:], 1)
+        on = np.geomspace(x[-1], hours)
+        axis.plot(on, rise * np.log10(on) + level, ":", color=line.get_color(), linewidth=1)
+    axis.axhline(white, color=FAINT, linewidth=1)
+    axis.annotate(
+        "a white picture", (hours, white), (0, 3), textcoords="offset points", ha="right", fontsize=7
+    )
+    axis.set_xscale("log")
+    axis.set_ylim(white - 1, MOST_DB)
+    axis.set_xlabel("core-hours", fontsize=8)
+    axis.set_ylabel("PSNR, dB", fontsize=8)
+    axis.tick_params(labelsize=7)
+    axis.grid(color=FAINT, linewidth=0.5)
+    axis.legend(fontsize=7, frameon=False)
+    figure.tight_layout()
+    return figure_png(figure, dpi=120)
 
 
 def pyplot() -> Any:

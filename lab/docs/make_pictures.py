@@ -34,7 +34,7 @@ from PIL import ImageDraw, ImageFont
 
 import scenelang as nsg
 from lab import DOCS
-from lab.charts import stability_chart
+from lab.charts import budget_chart, stability_chart
 from lab.docs import solid_rivals
 from lab.docs.blocks import pictured
 from lab.evaluate import Case, sheet
@@ -42,6 +42,7 @@ from lab.frontier.chart import frontier_chart
 from lab.frontier.record import Frontier
 from lab.shadows import measure_shadows
 from scenelang.compiler.manifest import load_manifest
+from scenelang.compiler.weights import read_facts
 from scenelang.drawing.neural.load import load_model
 from scenelang.inverse.search import Blur, blurred
 from scenelang.language.diagnostics import SourceFile
@@ -63,6 +64,8 @@ RECORDED = {
     *(f"experiments/{name}.png" for name in ("codes-meshes-strips", "codes-textures-strips", "compare")),
     *(f"experiments/{name}-strips.png" for name in ("compare", "overfit", "table3")),
 }
+WHITE_DB = 19.27  # PSNR of a white picture on the scenes of long trainings
+LONGEST_HOURS = 100  # to which their curves are drawn on
 GAP_PX = 8
 LOUDER = 20  # factor on the difference of two pictures
 SHARPER = 2  # strips and the gallery are drawn larger by this and made smaller again, for screens' sake
@@ -241,6 +244,15 @@ def _few_colours(chart: bytes) -> bytes:
         return png(picture.convert("RGB").quantize(64, pillow.Quantize.MAXCOVERAGE))  # keeps rare colours
 
 
+def budgets() -> bytes:
+    """The curves of the paper's renderers, from the headers of their weights."""
+    names = {"": "streaming, exact lifting", "-learned": "streaming, learned lifting"}
+    names = {f"shapes2d-streaming{end}": name for end, name in names.items()}
+    names["shapes2d-reading"] = "reading, learned lifting"
+    curves = {name: read_facts(model)["training"]["curve"] for model, name in names.items()}
+    return _few_colours(budget_chart(curves, WHITE_DB, LONGEST_HOURS))
+
+
 def frontier(model: str) -> bytes:
     """The charts of a shipped frontier."""
     return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
@@ -335,6 +347,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
     made["solid-rivals.png"] = lambda: _few_colours(solid_rivals.chart())
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     made["shadows.png"] = shadows
+    made["budgets.png"] = budgets
     made["worst-solids.png"] = lambda: worst_cases("booleans", 6, "solids3d", "solids3d")
     return made
 

@@ -134,7 +134,7 @@ def mark_of(point: Point) -> str:
     """The entry of `MARKS` for a point."""
     if point.renderer in ("framed", "exact field") and not point.skip:
         return "unskipped four" if point.samples == "four" else "unskipped"
-    return point.samples
+    return str(point.samples)
 
 
 def short_name(point: Point, base: str) -> str:

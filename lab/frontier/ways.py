@@ -16,7 +16,7 @@ from scenelang.compiler.manifest import Manifest, available, load_manifest
 from scenelang.compiler.weights import read_facts
 from scenelang.drawing.closed import closed_forms
 from scenelang.drawing.exact.picture import reference_image
-from scenelang.drawing.how import Samples
+from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image, from_samples
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.neural.files import load_arrays
@@ -27,14 +27,14 @@ from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 
 FULL = 256  # pixels along a side at which the paper's renderer is timed
-TITLES: dict[Samples, str] = {
+TITLES: dict[Sampling, str] = {
     "adaptive": "",
     "four": ", four samples",
     "one": ", one sample",
     "draft": ", draft",
     "quick": ", quick",
 }
-UNSKIPPED: tuple[Samples, ...] = ("adaptive", "four")
+UNSKIPPED: tuple[Sampling, ...] = ("adaptive", "four")
 FIELD, REFERENCE, PAPER = "exact field", "exact reference", "the paper's streaming"
 Draw = Callable[[], Image]
 Prepare = Callable[[Scene], Draw]
@@ -50,7 +50,7 @@ class Way:
     backend: Literal["neural", "reference"] = "neural"
     model: str | None = None
     renderer: str = "reference"
-    samples: Samples = "adaptive"
+    samples: Sampling = "adaptive"
     skip: bool = True
     spp: int = 0
     side: int = 0
@@ -102,7 +102,7 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
             **options,
         )
 
-    known: dict[str, tuple[Samples, ...]] = {
+    known: dict[str, tuple[Sampling, ...]] = {
         "framed": ("adaptive", "four", "one", "draft"),
         "solid": ("adaptive", "four", "one", "draft", "quick"),
     }
@@ -117,7 +117,7 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
             samples=samples,
             skip=False,
         )
-    fields: list[tuple[Samples, bool]] = [
+    fields: list[tuple[Sampling, bool]] = [
         (samples, True) for samples in known.get(manifest.renderer, ()) if samples != "draft"
     ]
     fields += [(samples, False) for samples in UNSKIPPED] if manifest.renderer == "framed" else []
@@ -132,7 +132,7 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
         )
 
 
-def _neural(name: str, side: int, threads: int, samples: Samples = "adaptive", skip: bool = True) -> Prepare:
+def _neural(name: str, side: int, threads: int, samples: Sampling = "adaptive", skip: bool = True) -> Prepare:
     """By the library that `render` draws a picture with."""
 
     def prepare(scene: Scene) -> Draw:
@@ -149,7 +149,7 @@ def _neural(name: str, side: int, threads: int, samples: Samples = "adaptive", s
     return prepare
 
 
-def _formulas(name: str, threads: int, samples: Samples, skip: bool) -> Prepare:
+def _formulas(name: str, threads: int, samples: Sampling, skip: bool) -> Prepare:
     def prepare(scene: Scene) -> Draw:
         program, field = compile_scene(scene, model=name), closed_forms(name)
         return lambda: draw_objects(field, program, threads=threads, samples=samples, skip=skip).image

@@ -45,12 +45,15 @@ def coverage(scene: Scene, manifest: Manifest) -> float:
 
 
 def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
-    """Generators of random scenes, by set, for models of a dimension."""
+    """Generators of random scenes, by set, of what a model draws."""
     if manifest.dimension == 3:
         return {name: partial(random_solid, config=config) for name, config in SOLID_SETS.items()}
-    plain = {name: config for name, config in SETS.items() if not (config.textures or config.skins)}
-    known = SETS if manifest.elements else plain
-    return {name: partial(random_scene, config=config) for name, config in known.items()}
+    return {
+        name: partial(random_scene, config=config)
+        for name, config in SETS.items()
+        if {*config.geometries} <= {*manifest.geometries}
+        and (manifest.elements or not (config.textures or config.skins))
+    }
 
 
 def usual_set(manifest: Manifest) -> str:

@@ -108,13 +108,11 @@ class Element:
 
     def told(self) -> str:
         """Kind, sizes and facts of the element, a line each."""
-        if self.form == "outline":
-            lines = [f"{self.kind}: {self.sizes[0]} curves, {len(self.data):,} bytes"]
-            return "\n".join([*lines, *(f"{key}: {value}" for key, value in self.about.items())])
-        sides = self.sizes[::-1] if self.form == "picture" else (self.sides[-1],) * self.dimension
-        what = "colours" if self.material else "distances"
-        lines = [f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"]
-        return "\n".join([*lines, *(f"{key}: {value}" for key, value in self.about.items())])
+        what = "curves" if self.form == "outline" else "colours" if self.material else "distances"
+        plain = self.form in ("outline", "picture")
+        sides = self.sizes[::-1] if plain else (self.sides[-1],) * self.dimension
+        first = f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"
+        return "\n".join([first, *(f"{key}: {value}" for key, value in self.about.items())])
 
     @property
     def sides(self) -> tuple[int, ...]:

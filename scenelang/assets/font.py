@@ -101,7 +101,7 @@ class Font:
 
     def line(self, text: str) -> tuple[list[Placed], float]:
         """The letters of a line that begins at the origin, and its width, em; raises `FontError`."""
-        pen, placed, last = 0.0, list[Placed](), -1
+        pen, placed = 0.0, list[Placed]()
         for place, character in enumerate(text):
             at = self.letters.get(character, -1)
             if character in "\n\r\v\f\x85\u2028\u2029":
@@ -110,9 +110,9 @@ class Font:
                 code = f"U+{ord(character):04X}"
                 shown = f"`{character}` ({code})" if character.isprintable() else code
                 raise FontError(f"the font has no {shown}", place)
-            if last >= 0:
-                pen += self._kern(last, at)
-            letter, last = self.metrics[at], at
+            if place:
+                pen += self.kerning(text[place - 1], character)
+            letter = self.metrics[at]
             if letter.radius > _SMALL:
                 placed.append(Placed(name_of(character), pen + letter.x, letter.y, letter.radius))
             pen += letter.advance
@@ -120,10 +120,8 @@ class Font:
 
     def kerning(self, left: str, right: str) -> float:
         """By how much a letter goes farther from another than that advances, em."""
-        return self._kern(self.letters[left], self.letters[right])
-
-    def _kern(self, left: int, right: int) -> float:
-        return float(self._kerning[self._left[left] * self.columns + self._right[right]]) / UNIT
+        row, column = self._left[self.letters[left]], self._right[self.letters[right]]
+        return float(self._kerning[row * self.columns + column]) / UNIT
 
 
 def name_of(character: str) -> str:

@@ -69,13 +69,9 @@ def _stepped(expected: Grid, steps: npt.NDArray[np.int8], finer: bool) -> Grid:
 def refine(
     grid: Grid | None, side: int, dimension: int, true: Callable[[Grid], Grid], finer: bool = False
 ) -> tuple[Grid, npt.NDArray[np.int8]]:
-    """The next grid of a pyramid and its steps.
+    """The grid of ``side`` nodes along an axis after another one, if any, and its steps.
 
-    Args:
-        grid: the one before, None for the first.
-        side: nodes along an axis.
-        true: gives the true distances at the nodes from the expected ones.
-        finer: true for a last grid with finer steps near the surface.
+    ``true`` gives the true distances at the nodes from the expected ones; a last grid may be ``finer``.
     """
     expected = np.zeros((side,) * dimension, np.float32) if grid is None else between(grid)
     steps = np.rint((true(expected) - expected) / _widths(expected, finer))

@@ -21,11 +21,7 @@ _register: Callable[[type], type] = dataclass(init=False, repr=False, eq=False, 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class _RecordType(type):
-    """Makes the slots and `__init__` of a record from its annotations.
-
-    Args:
-        frozen: one that may change is equal to itself alone.
-    """
+    """Makes slots and `__init__` of a record from its annotations; one not ``frozen`` equals itself alone."""
 
     def __new__(
         cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], frozen: bool = True

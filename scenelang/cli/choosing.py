@@ -13,8 +13,6 @@ from scenelang.drawing.small import load_of
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.reports import SceneError
 from scenelang.output.frontier import (
-    Choice,
-    Frontier,
     Limits,
     NothingFits,
     Point,
@@ -48,51 +46,38 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Inp
 
 
 def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
-    """Choose how to draw a job and compile it for the chosen model; raises `NothingFits`."""
-    assert job.program is not None
-    name = job.program.model
+    """The best choice whose model draws a job's scene without further warnings; raises `NothingFits`."""
+    program = job.program
+    assert program is not None
     try:
-        frontier = load_frontier(name)
+        frontier = load_frontier(program.model)
     except ValueError as error:
-        raise NothingFits(f"the frontier of `{name}` is damaged: {error}") from None
+        raise NothingFits(f"the frontier of `{program.model}` is damaged: {error}") from None
     if frontier is None:
-        raise NothingFits(f"model `{name}` ships no frontier to choose from")
+        raise NothingFits(f"model `{program.model}` ships no frontier to choose from")
+    reasons = {point.name: refusal(point, job.scene, program, model) for point in frontier.points}
+    # those that are not offered are for charts only
+    refused = {p.name: why for p in frontier.points if (why := reasons[p.name]) is not None and p.offered}
+    able = [point for point in frontier.points if reasons[point.name] is None]
     scale = machine_scale(frontier, here_ms)
-    choice, job.program = _chosen(frontier, job, job.program, limits, model, scale)
-    point = choice.offer.point
+    result = offers(able, load_of(program), program.canvas, scale)
+    while True:
+        offer, notes = choose(result, limits, refused)
+        point, compiled = offer.point, _compiled(job, program, offer.point)
+        if not isinstance(compiled, str):
+            break
+        refused |= {o.point.name: compiled for o in result if o.point.model == point.model}
+        result = [offer for offer in result if offer.point.model != point.model]
     # as it was measured
-    device: Device = "cpu" if job.program.stage is None and point.backend == "neural" else "auto"
+    device: Device = "cpu" if compiled.stage is None and point.backend == "neural" else "auto"
     samples = point.samples if point.backend == "neural" else "adaptive"
-    job.how = How(point.backend, device, job.how.threads, samples)
+    job.program, job.how = compiled, How(point.backend, device, job.how.threads, samples)
     speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
     like = f"errors are promised for scenes like those of the set `{frontier.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""
-    refused = [f"not in question: {name}: {why}" for name, why in choice.refused.items()]
-    notes = program_notes(job.program, "chosen by the frontier") if point.backend == "neural" else []
-    job.notes = [*choice.notes, f"times are for one thread; {speed}", like, *refused, *notes]
-
-
-def _chosen(
-    frontier: Frontier, job: Input, program: Program, limits: Limits, model: str | None, scale: float
-) -> tuple[Choice, Program]:
-    """The best choice whose model draws the scene without further warnings, and its Program."""
-    refused: dict[str, str] = {}
-    able = []
-    for point in frontier.points:
-        why = refusal(point, job.scene, program, model)
-        if why is None:
-            able.append(point)
-        elif point.offered:  # the others are for charts only
-            refused[point.name] = why
-    result = offers(able, load_of(program), program.canvas, scale)
-    while True:
-        choice = choose(result, limits, refused)
-        point = choice.offer.point
-        compiled = _compiled(job, program, point)
-        if not isinstance(compiled, str):
-            return choice, compiled
-        refused |= {o.point.name: compiled for o in result if o.point.model == point.model}
-        result = [offer for offer in result if offer.point.model != point.model]
+    others = [f"not in question: {name}: {why}" for name, why in refused.items()]
+    own = program_notes(compiled, "chosen by the frontier") if point.backend == "neural" else []
+    job.notes = [*notes, f"times are for one thread; {speed}", like, *others, *own]
 
 
 def _compiled(job: Input, program: Program, point: Point) -> Program | str:

@@ -77,18 +77,15 @@ def show_difference(name: str, before: str, after: str, color: str = "auto") -> 
     from difflib import unified_diff
 
     painted = wants_color(sys.stdout, color)
-    for line in unified_diff(_lines(before), _lines(after), name, name):
+    # text after the last line feed is a line unless it is empty
+    one, other = (re.findall(r"[^\n]*\n|[^\n]+", text) for text in (before, after))
+    for line in unified_diff(one, other, name, name):
         style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
         text = line.removesuffix("\n")
         safe = printable(text) if painted or sys.stdout.isatty() else text
         click.echo(paint(style, safe, painted), color=True)
         if text == line:
             click.echo("\\ No newline at end of file")
-
-
-def _lines(text: str) -> list[str]:
-    """Lines with their ends; text after the last line feed is a line unless it is empty."""
-    return re.findall(r"[^\n]*\n|[^\n]+", text)
 
 
 PATIENCE_S = 1.0

@@ -2,80 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
-from scenelang.compiler.graph import (
-    MOST_STEPS,
-    WHITE,
-    Fold,
-    Graph,
-    Leaf,
-    Link,
-    Look,
-    Move,
-    colour_steps,
-    coloured,
-    normal,
-)
+from scenelang.compiler import graph, steps
+from scenelang.compiler.graph import MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, stage_of
-from scenelang.compiler.steps import (
-    IDENTITY,
-    Affine,
-    Displace,
-    Grow,
-    Rows,
-    Shell,
-    Step,
-    Twist,
-    Warp,
-    compose,
-    rotation,
-    scaling,
-    shearing,
-    translation,
-)
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, compose
 from scenelang.language import nodes as schema
+from scenelang.language import words
 from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
 from scenelang.language.scene import Brought, Scene
-from scenelang.language.words import (
-    BLEND,
-    GRADIENTS,
-    OWN_TRANSFORMS,
-    PAINTS,
-    SCENES,
-    STAGE,
-    TEXTURES,
-    Combine,
-    dimension_of,
-)
+from scenelang.language.words import SCENES, Combine
+
+_STEPS: Final[dict[type, Callable[[Any], Step]]] = {
+    schema.Flip: lambda flip: Affine(steps.scaling(-1.0, 1.0)),
+    schema.Twirl: lambda twirl: steps.Warp(twirl.k, (0.0, 0.0)),
+    schema.Bend: lambda bend: steps.Warp(0.0, (bend.k, 0.0)),
+    schema.Twist: lambda twist: steps.Twist(twist.k),
+    schema.Displace: lambda displace: steps.Displace(displace.amount, displace.frequency),
+    schema.Grow: lambda grow: steps.Grow(grow.r),
+    schema.Shell: lambda shell: steps.Shell(shell.w),
+}
+_MAPS: Final[dict[type, Callable[[Any], Rows]]] = {
+    schema.Translate: lambda move: steps.translation(move.x, move.y, move.z),
+    schema.Scale: lambda scale: steps.scaling(scale.x, scale.y, scale.z),
+    schema.Rotate: lambda turn: steps.rotation(turn.angle, turn.axis),
+    schema.Shear: lambda shear: steps.shearing(shear.axes, shear.k),
+    schema.Matrix: lambda matrix: tuple([number for row in matrix.rows[:3] for number in row]),
+}
 
 
 def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | Refusal:
     """The step of a transform, or the reason why there is none; in the plane scales along z drop out."""
-    if isinstance(transform, schema.Flip):
-        return Affine(scaling(-1.0, 1.0))
-    if isinstance(transform, schema.Twirl):
-        return Warp(transform.k, (0.0, 0.0))
-    if isinstance(transform, schema.Bend):
-        return Warp(0.0, (transform.k, 0.0))
-    if isinstance(transform, schema.Grow):
-        return Grow(transform.r)
-    if isinstance(transform, schema.Shell):
-        return Shell(transform.w)
-    if isinstance(transform, (schema.Twist, schema.Displace)):
-        if space.dimension == 2:
+    if (step := _STEPS.get(type(transform))) is not None:
+        if transform.kind in words.SOLID_TRANSFORMS and space.dimension == 2:
             fact = f"`{transform.kind}` leaves the plane"
             return Refusal("E0505", fact, "bend the shape with `twirl` or `bend` instead")
-        if isinstance(transform, schema.Twist):
-            return Twist(transform.k)
-        return Displace(transform.amount, transform.frequency)
-    fitted = space.fitted(transform, _rows(transform))
+        return step(transform)
+    assert not isinstance(transform, schema.Flip)  # which `_STEPS` has
+    fitted = space.fitted(transform, _MAPS[type(transform)](transform))
     if isinstance(fitted, Refusal):
         return fitted
     if space.usable(fitted):
@@ -86,20 +57,6 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
         return Refusal("E0312", fact, "use factors other than 0")
     fact = f"{singular} in float32: it stretches by {smallest:.3g} to {largest:.3g}"
     return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
-
-
-def _rows(transform: schema.Transform) -> Rows:
-    if isinstance(transform, schema.Translate):
-        return translation(transform.x, transform.y, transform.z)
-    if isinstance(transform, schema.Scale):
-        return scaling(transform.x, transform.y, transform.z)
-    if isinstance(transform, schema.Rotate):
-        return rotation(transform.angle, transform.axis)
-    if isinstance(transform, schema.Shear):
-        return shearing(transform.axes, transform.k)
-    assert isinstance(transform, schema.Matrix)
-    first, second, third, _ = transform.rows
-    return (*first, *second, *third)
 
 
 MAX_OBJECTS = 100_000
@@ -134,7 +91,7 @@ def lower(
 ) -> Graph:
     """The graph of a scene for one model, without what the model does not have, which is reported."""
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
-    for word in STAGE if manifest.dimension == 2 else ():
+    for word in words.STAGE if manifest.dimension == 2 else ():
         if (stated := getattr(scene, word)) != "default":
             place = None if spans is None else spans.span(stated) or spans.span(scene)
             fact = f"model `{manifest.name}` is flat and has no {word}"
@@ -147,7 +104,7 @@ def lower(
     if memory is not None and lowering.created is not None:
         memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
-    background = WHITE if scene.background == "default" else scene.background
+    background = graph.WHITE if scene.background == "default" else scene.background
     return Graph(root, scene.canvas, background, space, stage, brought.geometries, scene.samples)
 
 
@@ -162,10 +119,10 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
         fact = f"a canvas of {width} x {height} pixels; {model} draws only {sizes}"
         help = "give that size with `canvas(w, h)` or `--size`, or draw with another model"
         diagnostics.add("E0509", fact, place, help=help)
-    if manifest.white and scene.background not in (WHITE, "default"):
+    if manifest.white and scene.background not in (graph.WHITE, "default"):
         help = "leave `background` out, or draw with another model"
         diagnostics.add("E0510", f"{model} draws only over white", place, help=help)
-    if scene.samples != 4 and manifest.lifting != "exact":
+    if scene.samples != 4 and not manifest.framed:
         help = "leave `samples` out, or draw with another model"
         diagnostics.add("E0381", f"{model} takes four samples of a pixel and no others", place, help=help)
 
@@ -197,7 +154,7 @@ def _children(node: Composite) -> Iterator[tuple[Combine, float, schema.SceneNod
 
 def _width(node: schema.Boolean | schema.Link) -> float:
     """The width of a blend where it is not the usual one, else 0."""
-    return 0.0 if node.k is None or (node.op == "smooth" and node.k == BLEND) else node.k
+    return 0.0 if node.k is None or (node.op == "smooth" and node.k == words.BLEND) else node.k
 
 
 @dataclass(slots=True)
@@ -233,7 +190,7 @@ class _Lowering:
             if not here.links:
                 op, k = "union", 0.0
             elif k and op == "smooth" and not self.manifest.any_blend:
-                fact = f"model `{self.manifest.name}` blends over {BLEND} and no other width"
+                fact = f"model `{self.manifest.name}` blends over {words.BLEND} and no other width"
                 joined = here.node if isinstance(here.node, schema.Boolean) else node
                 self.say("E0512", fact, joined, "leave k out, or draw with another model")
             material = node.material or here.material
@@ -261,7 +218,7 @@ class _Lowering:
                 self.element(node.geometry, self.brought.geometries, node, "E0501")
             elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
-                if dimension_of(node.geometry) not in (None, self.space.dimension):
+                if words.dimension_of(node.geometry) not in (None, self.space.dimension):
                     material = None  # which is of the other kind of scene, too
             look = Look(self.manifest.materials[0]) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.created is None else {}
@@ -287,7 +244,7 @@ class _Lowering:
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         result, own, first = [], set[str](), isinstance(node, schema.Object)
         for transform in node.transforms:
-            if (kind := transform.kind) not in OWN_TRANSFORMS:
+            if (kind := transform.kind) not in words.OWN_TRANSFORMS:
                 first = False
             else:
                 if not first or kind in own:
@@ -318,20 +275,20 @@ class _Lowering:
         shading = material.shading or manifest.materials[0]
         if "." in name:
             element = self.element(name, self.brought.materials, material, "E0502")
-        elif name in TEXTURES:
+        elif name in words.TEXTURES:
             element = self.element(name, load_textures(), material, "E0502")
-        elif name in GRADIENTS:
+        elif name in words.GRADIENTS:
             element = self.gradient(material)
         else:
             shading = name
             if material.shading is not None:
                 self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
         if shading not in manifest.materials:
-            offered = (*manifest.materials, *PAINTS) if shading is name else manifest.materials
+            offered = (*manifest.materials, *words.PAINTS) if shading is name else manifest.materials
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
-        colours = colour_steps(map(self.space.inked, material.ops))
-        if len(normal(colours)) > MOST_STEPS and element is not None:
+        colours = graph.colour_steps(map(self.space.inked, material.ops))
+        if len(graph.normal(colours)) > MOST_STEPS and element is not None:
             self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
         if material.opacity != 1.0 and not manifest.translucent:
             fact = f"model `{manifest.name}` has no `opacity`"
@@ -377,7 +334,7 @@ class _Lowering:
         """Report a geometry or material that the model does not have, or that is of the other dimension."""
         from difflib import get_close_matches
 
-        here, other = self.space.dimension, dimension_of(name)
+        here, other = self.space.dimension, words.dimension_of(name)
         listed = listing(f"`{k}`" for k in known)
         if other not in (None, here):
             fact = f"{what} `{name}` belongs to {SCENES[other]} scenes, and this one is {SCENES[here]}"

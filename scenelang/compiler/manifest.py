@@ -15,8 +15,8 @@ ALIASES: Final = {"textures2d": "shapes2d"}
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 """The model of scenes of a dimension that name none."""
 _DRAWN: Final = {
-    "framed": ("element of the plane", "texture"),
-    "solid": ("element of space", "texture", "colouring of space"),
+    2: ("element of the plane", "texture"),
+    3: ("element of space", "texture", "colouring of space"),
 }
 """Kinds of users' elements that renderers draw, for models of the exact lifting."""
 
@@ -79,12 +79,17 @@ class Manifest:
     @property
     def elements(self) -> tuple[str, ...]:
         """Kinds of users' elements that it draws."""
-        return _DRAWN.get(self.renderer, ()) if self.lifting == "exact" else ()
+        return _DRAWN[self.dimension] if self.framed else ()
+
+    @property
+    def framed(self) -> bool:
+        """True where objects are met in exact frames, so that whatever their vectors have is drawn."""
+        return self.renderer in ("framed", "solid") and self.lifting == "exact"
 
     @property
     def translucent(self) -> bool:
         """True where it draws objects of any opacity."""
-        return self.renderer == "framed" and self.lifting == "exact"
+        return self.framed and self.dimension == 2
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
@@ -92,7 +97,7 @@ class Manifest:
         return float(value)
 
 
-_FILE: Final = "manifest.json"
+MANIFEST: Final = "manifest.json"
 _READ: Final[dict[Path, tuple[tuple[int, int, int], Manifest]]] = {}
 """A cache: manifests with their files' times, sizes and identities when they were read."""
 
@@ -105,7 +110,7 @@ def model_folder(name: str) -> Path:
 def available() -> list[str]:
     """Names of the shipped models, sorted."""
     # a page asks with each key: a glob takes a millisecond, this a fiftieth of one
-    return sorted(name for name in os.listdir(ROOT) if os.path.exists(os.path.join(ROOT, name, _FILE)))
+    return sorted(name for name in os.listdir(ROOT) if os.path.exists(os.path.join(ROOT, name, MANIFEST)))
 
 
 def load_manifest(name: str) -> Manifest:
@@ -113,7 +118,7 @@ def load_manifest(name: str) -> Manifest:
     name = ALIASES.get(name, name)
     if name not in available():
         raise KeyError(name)
-    path = ROOT / name / _FILE
+    path = ROOT / name / MANIFEST
     stat = path.stat()
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
     known = _READ.get(path)

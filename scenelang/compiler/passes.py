@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 
 from scenelang.assets.element import Element
 from scenelang.assets.records import deep_stack
-from scenelang.compiler import steps
+from scenelang.compiler import rewrites, steps
 from scenelang.compiler.chain import LevelsError, split_levels
-from scenelang.compiler.geometries import GEOMETRIES, Geometry
+from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import (
     Fold,
     Graph,
@@ -31,32 +31,9 @@ from scenelang.compiler.graph import (
 )
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.rewrites import (
-    Context,
-    cover_of,
-    covered,
-    drop_empty,
-    drop_hidden,
-    drop_unseen,
-    flatten,
-    fold_looks,
-    fold_warps,
-    push_transforms,
-)
+from scenelang.compiler.rewrites import Context, cover_of, covered
 from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
-from scenelang.compiler.steps import (
-    Affine,
-    Displace,
-    Grow,
-    Own,
-    Shell,
-    Skin,
-    Step,
-    Twist,
-    Warp,
-    composed,
-    inverted,
-)
+from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span
 from scenelang.language.scene import Scene
 
@@ -71,8 +48,8 @@ def check_levels(graph: Graph, context: Context) -> Graph:
 
 def _check(leaf: Leaf, space: Space, context: Context) -> None:
     manifest = context.manifest
-    own = next((move for move in leaf.moves if isinstance(move.step, Grow | Shell)), None)
-    if own is not None and manifest.lifting != "exact":
+    own = next((move for move in leaf.moves if isinstance(move.step, steps.Grow | steps.Shell)), None)
+    if own is not None and not manifest.framed:
         fact = f"model `{manifest.name}` does not draw `{type(own.step).__name__.lower()}`"
         help = "leave `model` out, or draw with another one"
         context.diagnostics.add("E0506", fact, own.span or leaf.span, help=help)
@@ -115,11 +92,11 @@ def _nothing(skin: Skin, depth: float) -> bool:
 
 
 def _mild(step: Step) -> bool:
-    if isinstance(step, Warp):
+    if isinstance(step, steps.Warp):
         return abs(step.twirl) < REACH and hypot(*step.bend) < REACH
-    if isinstance(step, Twist):
+    if isinstance(step, steps.Twist):
         return abs(step.twist) < REACH
-    return not isinstance(step, Displace) or max(abs(step.amount), abs(step.frequency)) < REACH
+    return not isinstance(step, steps.Displace) or max(abs(step.amount), abs(step.frequency)) < REACH
 
 
 def _places(leaf: Leaf) -> list[Label]:
@@ -135,35 +112,19 @@ def _places(leaf: Leaf) -> list[Label]:
 
 Measures = list[tuple[str, float]]
 
-_CODES = {
-    "objects": "W0501",
-    "twirl": "W0502",
-    "bend": "W0503",
-    "scale": "W0504",
-    "smooth": "W0505",
-    "thin": "W0506",
-    "thickness": "W0506",
-    "blend": "W0507",
-    "twist": "W0509",
-    "displace": "W0510",
-    "frequency": "W0510",
-    "texels": "W0511",
-    "width": "W0512",
-    "level": "W0513",
-}
 _SUBJECTS = {
-    "twirl": "a `twirl` of {value} on {name}",
-    "bend": "a `bend` of {value} on {name}",
-    "twist": "a `twist` of {value} on {name}",
-    "displace": "a displacement of {value} of {name}",
-    "frequency": "a displacement of frequency {value} of {name}",
-    "scale": "a scale of {value} of {name}",
-    "thin": "{name}, {value} times as long as wide,",
-    "thickness": "{name}, {value} thick,",
-    "texels": "a texture of {value} texels to a pixel on {name}",
-    "level": "an edge of {name} at {value} from that of its leaf",
+    "twirl": ("W0502", "a `twirl` of {value} on {name}"),
+    "bend": ("W0503", "a `bend` of {value} on {name}"),
+    "twist": ("W0509", "a `twist` of {value} on {name}"),
+    "displace": ("W0510", "a displacement of {value} of {name}"),
+    "frequency": ("W0510", "a displacement of frequency {value} of {name}"),
+    "scale": ("W0504", "a scale of {value} of {name}"),
+    "thin": ("W0506", "{name}, {value} times as long as wide,"),
+    "thickness": ("W0506", "{name}, {value} thick,"),
+    "texels": ("W0511", "a texture of {value} texels to a pixel on {name}"),
+    "level": ("W0513", "an edge of {name} at {value} from that of its leaf"),
 }
-"""Subjects of warnings about an object, in the order of the warnings."""
+"""Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
 _TOLERANCE = 1e-9
@@ -191,27 +152,24 @@ def check_trained(graph: Graph, context: Context) -> Graph:
                 excess = max(low - value, above) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
-    for quantity, subject in _SUBJECTS.items():
+    for quantity, (code, subject) in _SUBJECTS.items():
         if result := outside.get(quantity):
             _, value, leaf = max(result, key=itemgetter(0))
             more = len({id(leaf) for *_, leaf in result}) - 1
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
-            _warn(context, quantity, f"{said} is outside the measured range {{}}{others}", leaf, value)
+            _warn(context, code, quantity, f"{said} is", leaf, value, others)
     widest = max((row for row in rows if row.op != "union"), key=attrgetter("k"), default=None)
     if widest is not None and "width" in trained and widest.k > trained["width"][1]:
-        fact = f"a `{widest.op}` of width {widest.k:.3g} is outside the measured range {{}}"
-        _warn(context, "width", fact, widest.leaf)
+        _warn(context, "W0512", "width", f"a `{widest.op}` of width {widest.k:.3g} is", widest.leaf)
     smooth = [row.leaf for row in rows if row.op == "smooth"]
     if "smooth" in trained and len(smooth) > trained["smooth"][1]:
-        fact = f"{len(smooth):,} smooth unions are outside the measured range {{}}"
-        _warn(context, "smooth", fact, smooth[-1])
+        _warn(context, "W0505", "smooth", f"{len(smooth):,} smooth unions are", smooth[-1])
     if smooth and "blend" in trained:
         _check_blends(rows, measures, context)
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
-        fact = f"{count:,} objects are outside the measured range {{}}"
-        _warn(context, "objects", fact, rows[-1].leaf)
+        _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
     return graph
 
 
@@ -236,7 +194,7 @@ def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context
     if worst is not None and worst[0] > context.manifest.trained["blend"][1]:
         product, contrast, scale, leaf = worst
         said = f"a `smooth` of colours {contrast:.2g} apart at a scale of {scale:.3g}"
-        _warn(context, "blend", f"{said}: the product {product:.3g} is outside the measured range {{}}", leaf)
+        _warn(context, "W0507", "blend", f"{said}: the product {product:.3g} is", leaf)
 
 
 def _measures(leaf: Leaf, space: Space) -> Measures:
@@ -246,26 +204,22 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         result.append(("thin", largest / smallest))
     skin, row = Skin.of(leaf.steps), GEOMETRIES.get(leaf.geometry)
     if leaf.look.material == "diffuse":
-        result.append(("thickness", smallest * _thickness(skin, row)))
+        grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
+        least = skin.shell or (row.thickness if row else inf)
+        result.append(("thickness", smallest * (least + 2 * grown)))
     if skin.grow or skin.shell:
         result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:
-        if isinstance(step, Warp):
+        if isinstance(step, steps.Warp):
             if step.twirl:
                 result.append(("twirl", step.twirl))
             if step.bend != (0.0, 0.0):
                 result.append(("bend", hypot(*step.bend)))
-        elif isinstance(step, Twist):
+        elif isinstance(step, steps.Twist):
             result.append(("twist", step.twist))
-        elif isinstance(step, Displace):
+        elif isinstance(step, steps.Displace):
             result += [("displace", abs(step.amount)), ("frequency", abs(step.frequency))]
     return result
-
-
-def _thickness(skin: Skin, row: Geometry | None) -> float:
-    """The least thickness of a leaf with a skin, leaf units."""
-    grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
-    return (skin.shell or (row.thickness if row else inf)) + 2 * grown
 
 
 def _texels(leaf: Leaf, graph: Graph) -> Measures:
@@ -283,15 +237,17 @@ def _texels(leaf: Leaf, graph: Graph) -> Measures:
     return [("texels", texels * pixel)]
 
 
-def _warn(context: Context, quantity: str, message: str, leaf: Leaf, value: float = 0.0) -> None:
+def _warn(
+    context: Context, code: str, quantity: str, said: str, leaf: Leaf, value: float = 0.0, others: str = ""
+) -> None:
     low, high = context.manifest.trained[quantity]
     figures = context.manifest.measured.get("stability", {}).get(quantity)
     doubt = "the picture may be less exact than the model's figures"
-    fact = message.format(f"{low:g} to {high:g} of model `{context.manifest.name}`")
+    fact = f"{said} outside the measured range {low:g} to {high:g} of model `{context.manifest.name}`{others}"
     help = f"measured there: {figures}" if figures else doubt
     if quantity in _WRONG and abs(value) > WILD * high:
         help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
-    context.diagnostics.add(_CODES[quantity], fact, leaf.span, help=help)
+    context.diagnostics.add(code, fact, leaf.span, help=help)
 
 
 Point = tuple[float, float, float]
@@ -330,7 +286,7 @@ def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
             d, leaf = _folded(node, eye, space)
         elif node.geometry in GEOMETRIES:
             d, leaf = _distance(node.geometry, node.steps, eye), node
-            d *= space.stretches(composed(node.steps))[0]
+            d *= space.stretches(steps.composed(node.steps))[0]
         else:
             d, leaf = inf, None
         if link.op in ("subtract", "intersect"):
@@ -353,27 +309,27 @@ def _smooth(depth: float, d: float, k: float) -> tuple[float, float]:
     return (d if h == 1.0 else depth + h * (d - depth)) - k * h * (1.0 - h), h
 
 
-def _distance(geometry: str, steps: Sequence[Step], p: Point) -> float:
+def _distance(geometry: str, chain: Sequence[Step], p: Point) -> float:
     """The leaf's own distance at a world point, with what its steps make of it."""
-    for step in reversed(steps):
+    for step in reversed(chain):
         x, y, z = p
         if isinstance(step, Affine):
-            a, b, c, u, d, e, f, v, g, h, i, w = inverted(step.rows)
+            a, b, c, u, d, e, f, v, g, h, i, w = steps.inverted(step.rows)
             p = a * x + b * y + c * z + u, d * x + e * y + f * z + v, g * x + h * y + i * z + w
-        elif isinstance(step, Twist):
+        elif isinstance(step, steps.Twist):
             s, c = sin(step.twist * y), cos(step.twist * y)
             p = c * x + s * z, y, c * z - s * x
-        elif isinstance(step, Warp):
+        elif isinstance(step, steps.Warp):
             angle = step.twirl * hypot(x, y, z) + step.bend[0] * x + step.bend[1] * y
             s, c = sin(angle), cos(angle)
             p = c * x + s * y, c * y - s * x, z
     depth, (x, y, z) = float(GEOMETRIES[geometry].distance(p)), p
-    for step in steps:
-        if not isinstance(step, Own):
+    for step in chain:
+        if not isinstance(step, steps.Own):
             break
-        if isinstance(step, Grow):
+        if isinstance(step, steps.Grow):
             depth -= step.r
-        elif isinstance(step, Shell):
+        elif isinstance(step, steps.Shell):
             depth = abs(depth) - step.w / 2
         else:
             f = step.frequency
@@ -503,16 +459,16 @@ class Pass(NamedTuple):
 
 
 PASSES: tuple[Pass, ...] = (
-    Pass(drop_empty, frozenset({Invariant.COMPOSITE})),
-    Pass(fold_looks, frozenset({Invariant.LOOKS})),
-    Pass(push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
-    Pass(fold_warps, frozenset({Invariant.NO_IDENTITIES})),
+    Pass(rewrites.drop_empty, frozenset({Invariant.COMPOSITE})),
+    Pass(rewrites.fold_looks, frozenset({Invariant.LOOKS})),
+    Pass(rewrites.push_transforms, frozenset({Invariant.AT_LEAVES, Invariant.MERGED})),
+    Pass(rewrites.fold_warps, frozenset({Invariant.NO_IDENTITIES})),
     Pass(check_levels),
-    Pass(flatten, frozenset({Invariant.STREAM})),
+    Pass(rewrites.flatten, frozenset({Invariant.STREAM})),
     Pass(check_eye),
     Pass(check_seen),
-    Pass(drop_unseen),
-    Pass(drop_hidden),
+    Pass(rewrites.drop_unseen),
+    Pass(rewrites.drop_hidden),
     Pass(check_trained),
 )
 
@@ -553,7 +509,7 @@ def check_scene(
                 verify(graph, step.name, holds, sound)
             after(step.name, graph)
             if diagnostics.errors:
-                if step.run is flatten:
+                if step.run is rewrites.flatten:
                     break  # all mistakes are reported, and the graph is not the scene's
                 # Without sound chains no bound means anything: look for refusals only.
                 context = Context(manifest, diagnostics, whole=False)

@@ -60,28 +60,16 @@ def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> d
     """
     kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
     graded = {name: at for at, name in _GRADED.items()}
-    table = [
-        (
-            graded[paint.element.name] if isinstance(paint.element, Gradient) else index[paint.element],
-            len(paint.steps),
-        )
-        for paint in paints
-    ]
-    steps = [
-        (kinds.index(kind), *numbers, *[0.0] * (3 - len(numbers)))
-        for paint in paints
-        for kind, *numbers in paint.steps
-    ]
+    table, steps, stops = list[Any](), list[Any](), list[Any]()
+    for at, (element, own) in enumerate(paints):
+        listed = graded[element.name] if isinstance(element, Gradient) else index[element]
+        table.append((listed, len(own)))
+        steps += [(kinds.index(kind), *numbers, *[0.0] * (3 - len(numbers))) for kind, *numbers in own]
+        stops += [(at, *stop) for stop in element.stops] if isinstance(element, Gradient) else []
     tensors = {
         "paints": np.array(table, np.int32).reshape(-1, 2),
         "steps": np.array(steps, np.float32).reshape(-1, 4),
     }
-    stops = [
-        (at, *stop)
-        for at, p in enumerate(paints)
-        if isinstance(p.element, Gradient)
-        for stop in p.element.stops
-    ]
     return tensors | ({"stops": np.array(stops, np.float32)} if stops else {})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import os
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from scenelang.assets.files import read_regular
 from scenelang.assets.tensors import TensorError, read_tensors
-from scenelang.compiler.manifest import ROOT, Manifest, load_manifest, model_folder
+from scenelang.compiler.manifest import MANIFEST, ROOT, Manifest, load_manifest, model_folder
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -62,12 +61,16 @@ def weights_path(name: str, digest: str = "") -> Path:
 
 
 def manifest_of(name: str, digest: str = "") -> Manifest:
-    """A model's manifest; of weights `replaced` since, with the first of its geometries, which these know."""
-    manifest = load_manifest(name)
+    """A model's manifest, or that of its weights `replaced` since; raises as `load_manifest`, `ModelError`
+    for weights of another model.
+    """
+    current = load_manifest(name)
     if not replaced(digest):
-        return manifest
-    known = len(open_weights(shipped_weights(name, digest)).arrays["codes"])
-    return dataclasses.replace(manifest, geometries=manifest.geometries[:known])
+        return current
+    result = Manifest.from_json((REPLACED / digest / MANIFEST).read_bytes())
+    if result.name != current.name:
+        raise ModelError(f"weights of model `{result.name}`")
+    return result
 
 
 def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> bytes:

@@ -180,7 +180,7 @@ class ClosedSolids(SolidArrays):
 def closed_forms(model: str) -> ClosedPlane | ClosedSolids:
     """The exact field of a model's Programs; raises `RenderError` where it has none."""
     manifest = load_manifest(model)
-    if manifest.renderer not in ("framed", "solid") or manifest.lifting != "exact":
+    if not manifest.framed:
         raise RenderError(f"model `{model}` has no frames that formulas could answer in")
     return (ClosedPlane if manifest.dimension == 2 else ClosedSolids)(model)
 

@@ -568,7 +568,7 @@ def known_errors(manifest: Manifest) -> dict[str, Errors]:
     """Proved errors of the distances of geometries; raises as `prove_image`."""
     if manifest.dimension != 2:
         raise ProofError("pictures of solids are not proved, those of the plane are")
-    if manifest.lifting != "exact":
+    if not manifest.framed:
         raise ProofError(f"pictures of `{manifest.name}` are not proved, as it learned where points lie too")
     if not (known := load_errors()):
         raise ProofError(f"no proof comes with these weights of `{PROVER}`")

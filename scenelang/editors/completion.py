@@ -54,15 +54,17 @@ _ROLES: Final = {
     "model": ("string", 0),
     "path": ("string", 0),
 }
+Kind = types.CompletionItemKind
 _KINDS: Final = {
-    "let": ("variable", 2),
-    "param": ("property", 2),
-    "argument": ("parameter", 0),
-    "loop": ("variable", 0),
-    "fn": ("function", 0),
-    "module": ("class", 0),
-    "import": ("namespace", 0),
+    "let": ("variable", 2, Kind.Variable),
+    "param": ("property", 2, Kind.Property),
+    "argument": ("parameter", 0, Kind.Variable),
+    "loop": ("variable", 0, Kind.Variable),
+    "fn": ("function", 0, Kind.Function),
+    "module": ("class", 0, Kind.Module),
+    "import": ("namespace", 0, Kind.File),
 }
+"""Of each kind of definition, the type and the modifiers of its tokens, and the kind of its proposals."""
 
 
 def semantic_tokens(
@@ -124,7 +126,7 @@ def _named(docs: Workspace, document: Document, use: Use) -> tuple[str, int]:
         target = docs.definition(document, use)
         symbol = target[1] if target is not None else None
     if use.role in ("name", "member") and symbol is not None:
-        kind, modifiers = _KINDS[symbol.kind]
+        kind, modifiers, _ = _KINDS[symbol.kind]
         return kind, modifiers | int(use.defines)
     return _ROLES.get(use.role, ("variable", 0))
 
@@ -269,7 +271,6 @@ def show_steps(steps: Iterable[Step], space: Space) -> Iterator[str]:
             yield f"p → R({angle or '0'}) p"
 
 
-Kind = types.CompletionItemKind
 _MOST_PATHS: Final = 200
 _MOST_FILES: Final = 2000
 
@@ -287,15 +288,6 @@ class Item(Record):
 
 
 _HEADS: Final = ("let", "fn", "module", "for", "if", *words.NODES)
-_SYMBOLS: Final = {
-    "let": Kind.Variable,
-    "param": Kind.Property,
-    "argument": Kind.Variable,
-    "loop": Kind.Variable,
-    "fn": Kind.Function,
-    "module": Kind.Module,
-    "import": Kind.File,
-}
 
 
 def complete(docs: Workspace, document: Document, offset: int, snippets: bool) -> types.CompletionList:
@@ -470,7 +462,7 @@ class _Maker:
             text = symbol.name
         rank = "b" if symbol.scope.parent is not None else "d"
         word = word_of(symbol)
-        return Item(symbol.name, _SYMBOLS[symbol.kind], text, rank, word.head, word.text, snippet)
+        return Item(symbol.name, _KINDS[symbol.kind][2], text, rank, word.head, word.text, snippet)
 
     def _expressions(self) -> Iterator[Item]:
         callee = find_callee(self.docs, self.document, self.cursor)

@@ -13,7 +13,6 @@ from scenelang.editors.workspace import Document, Workspace, width
 from scenelang.language import tree
 from scenelang.language.definitions import Symbol
 from scenelang.language.lexer import Tokens
-from scenelang.language.tables import tables
 from scenelang.language.tree import children
 from scenelang.language.words import COMBINE, LETTERS, NODES, Word, word_for_call
 
@@ -67,79 +66,44 @@ class Cursor(Record):
     block: Block
 
 
-class _Reader:
-    """Tokens read backwards."""
-
-    def __init__(self, tokens: Tokens) -> None:
-        self.kinds, self.starts, self.ends = tokens.kinds, tokens.starts, tokens.ends
-        self.source_text = tokens.source.text
-        self.names = tables().kinds
-
-    def text(self, index: int) -> str:
-        return self.source_text[self.starts[index] : self.ends[index]]
-
-    def kind(self, index: int) -> str:
-        return self.names[self.kinds[index]]
-
-    def head(self, index: int) -> int:
-        """Index of the first token of the statement that holds the token before ``index``."""
-        at = index
-        while at and self.kind(at - 1) not in (";", "{", "}"):
-            at -= 1
-        return at
-
-    def opening(self, index: int) -> int | None:
-        """Index of the `{` that is open before a token."""
-        depth = 0
-        for at in range(index - 1, -1, -1):
-            kind = self.kind(at)
-            if kind == "}":
-                depth += 1
-            elif kind == "{":
-                if depth == 0:
-                    return at
-                depth -= 1
-        return None
-
-
 def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
     """The cursor at an offset; ``values`` are visible names that may be materials."""
-    read = _Reader(tokens)
-    count = len(read.kinds) - 1
-    index = min(bisect_left(read.starts, offset), count)  # tokens before this one begin before the cursor
+    count = len(tokens.kinds) - 1
+    index = min(bisect_left(tokens.starts, offset), count)  # tokens before this one begin before the cursor
     start = end = offset
     inside: Literal["comment", "string", "number", "colour", "code"] = "code"
-    if index and read.ends[index - 1] >= offset:
+    if index and tokens.end_before(index) >= offset:
         token = index - 1
-        kind, text = read.kind(token), read.text(token)
+        kind, text = tokens.name(token), tokens.text(token)
         if kind == "STRING":
-            closed = len(text) > 1 and text.endswith('"') and read.ends[token] == offset
+            closed = len(text) > 1 and text.endswith('"') and tokens.ends[token] == offset
             inside = "code" if closed else "string"
         elif kind == "NUMBER":
             inside = "number"
         elif kind == "COLOR":
             inside = "colour"
         if inside != "code" or text[:1].isalpha() or text[:1] == "_":
-            start, end, index = read.starts[token], read.ends[token], token
+            (start, end), index = tokens.place(token), token
     else:
-        gap = read.source_text[read.ends[index - 1] if index else 0 : offset]
+        gap = tokens.source.text[tokens.end_before(index) : offset]
         *_, last = [None, *_COMMENTS.finditer(gap)]
         closes = "\n" if last is not None and last[0][1] == "/" else "*/"
         if last is not None and last.end() == len(gap) and not last[0][2:].endswith(closes):
             inside = "comment"
-    head = read.head(index)
-    before = tuple(read.text(at) for at in range(head, index))
-    return Cursor(offset, start, end, inside, before, _call(read, head, index), _block(read, index, values))
+    head = tokens.head(index)
+    before = tuple(tokens.text(at) for at in range(head, index))
+    block = _block(tokens, index, values)
+    return Cursor(offset, start, end, inside, before, _call(tokens, head, index), block)
 
 
-def _call(read: _Reader, head: int, index: int) -> Call | None:
+def _call(tokens: Tokens, head: int, index: int) -> Call | None:
     """The innermost call whose parentheses are open before a token."""
     depth = commas = 0
     given: set[str] = set()
     named: str | None = None
     fresh = True  # still in the argument that the cursor is in
     for at in range(index - 1, head - 1, -1):
-        kind = read.kind(at)
+        kind = tokens.name(at)
         if kind in (")", "]"):
             depth += 1
         elif kind in ("(", "["):
@@ -150,41 +114,37 @@ def _call(read: _Reader, head: int, index: int) -> Call | None:
                 commas, fresh, named = 0, True, None
                 given.clear()
                 continue
-            name, start = _callee(read, head, at)
+            name, start = _callee(tokens, head, at)
             return Call(name, start, commas, named, frozenset(given)) if name else None
         elif depth == 0 and kind == ",":
             commas += 1
             fresh = False
-        elif depth == 0 and kind == "=" and at > head and read.kind(at - 1) in ("NAME", "step", "as"):
+        elif depth == 0 and kind == "=" and at > head and tokens.name(at - 1) in ("NAME", "step", "as"):
             if fresh:
-                named = read.text(at - 1)
+                named = tokens.text(at - 1)
             else:
-                given.add(read.text(at - 1))
+                given.add(tokens.text(at - 1))
     return None
 
 
-def _callee(read: _Reader, head: int, opening: int) -> tuple[str, int]:
+def _callee(tokens: Tokens, head: int, opening: int) -> tuple[str, int]:
     """The name before a `(`, and where it begins; empty for a parenthesis of another kind."""
     at = opening - 1
-    if at < head or read.kind(at) not in ("NAME", "step", "as", "smooth", "subtract", "intersect"):
+    if at < head or tokens.name(at) not in ("NAME", "step", "as", "smooth", "subtract", "intersect"):
         return "", 0
-    if at > head and read.kind(at - 1) in ("fn", "module"):
+    if at > head and tokens.name(at - 1) in ("fn", "module"):
         return "", 0
-    name, start = read.text(at), read.starts[at]
-    while at - 2 >= head and read.kind(at - 1) == "." and read.kind(at - 2) == "NAME":
+    name, start = tokens.text(at), tokens.starts[at]
+    while at - 2 >= head and tokens.name(at - 1) == "." and tokens.name(at - 2) == "NAME":
         at -= 2
-        name, start = f"{read.text(at)}.{name}", read.starts[at]
+        name, start = f"{tokens.text(at)}.{name}", tokens.starts[at]
     return name, start
 
 
-def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
+def _block(tokens: Tokens, index: int, values: frozenset[str]) -> Block:
     nested = False
-    while True:
-        brace = read.opening(index)
-        if brace is None:
-            return Block("file", "", nested)
-        head = read.head(brace)
-        words = [read.text(at) for at in range(head, brace)]
+    for brace in reversed(tokens.unmatched(index)[0]):
+        words = [tokens.text(at) for at in range(tokens.head(brace), brace)]
         while words[1:] and words[0] in COMBINE:
             rest = words[1:]
             if rest[0] == "(" and ")" in rest:  # the width of a blend
@@ -192,7 +152,7 @@ def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
             words = rest or words[:1]
         first = words[0] if words else ""
         if first in ("for", "if", "else"):
-            nested, index = True, head
+            nested = True
             continue
         if first in _HOLDERS:
             kind: BlockKind = "chain" if first == "chain" else "group"
@@ -200,6 +160,7 @@ def _block(read: _Reader, index: int, values: frozenset[str]) -> Block:
         if "material" in words[-2:] or "material" in words[-4:-1] or (first in values and len(words) == 1):
             return Block("material", first, nested)
         return Block("object", first, nested)
+    return Block("file", "", nested)
 
 
 _LINE: Final = re.compile(r"^[ \t]*//(.*)$")

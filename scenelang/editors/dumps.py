@@ -31,7 +31,7 @@ from scenelang.compiler.spaces import (
 from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Twist, Warp
 from scenelang.language import scene as schema
 from scenelang.language import tree
-from scenelang.language.diagnostics import Diagnostics, Span, plural
+from scenelang.language.diagnostics import Diagnostics, Span, common_start, plural
 from scenelang.language.scene import Scene
 from scenelang.language.scene_text import material, transform
 
@@ -269,12 +269,6 @@ def token_names(program: Program) -> list[str]:
     from scenelang.compiler.groups import token_name
 
     return [token_name(token) for token in program.tokens.tolist()]
-
-
-def common_start(left: Sequence[str], right: Sequence[str]) -> int:
-    """Number of items with which both sequences begin."""
-    pairs = enumerate(zip(left, right, strict=False))
-    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
 
 def changes(before: str, after: str, old: str, new: str) -> str:

@@ -25,10 +25,9 @@ from scenelang.assets.tensors import TensorError
 from scenelang.compiler.check import check_compiles, check_frames
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.manifest import Manifest
-from scenelang.editors.dumps import common_start
 from scenelang.language import library, tree
 from scenelang.language.definitions import Names, Symbol, Use, find_unused
-from scenelang.language.diagnostics import Diagnostic, Diagnostics, Fix, Label, SourceFile, Span
+from scenelang.language.diagnostics import Diagnostic, Diagnostics, Fix, Label, SourceFile, Span, common_start
 from scenelang.language.diagnostics import Edit as Change
 from scenelang.language.evaluation import Source, in_file_order
 from scenelang.language.lexer import Report, Tokens, scan

@@ -19,10 +19,10 @@ import numpy as np
 
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.exact.mesh import FitError
-from scenelang.drawing.how import Samples
+from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
-from scenelang.inverse.problem import LEVELS, Moment, Problem, Together
+from scenelang.inverse.problem import LEVELS, Moment, Problem
 from scenelang.inverse.search import (
     ALIKE,
     NEAR,
@@ -56,20 +56,16 @@ MOST_TARGETS: Final = 64
 
 def problems_of(
     moments: Sequence[Moment], goals: Sequence[Target], space: SearchBox, canvas: tuple[int, int]
-) -> list[Together]:
+) -> list[Problem]:
     """Comparisons of frames with their targets, from small to large; the last is of the final pictures."""
     values = space.values(space.point({}))
     solid = True in {_is_solid(each, values, canvas) for each in moments}
     smallest = min(min(goal.weights.shape) for goal in goals)
     short = min(MOST_SOLID if solid else SIDES[-1], *canvas, smallest)
 
-    def compared(side: int, samples: Samples, levels: int, soft: bool) -> Together:
+    def compared(side: int, samples: Sampling, levels: int, soft: bool) -> Problem:
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
-        parts = (
-            Problem(each, space, goal, size, light=solid, soft=soft, samples=samples, levels=levels)
-            for each, goal in zip(moments, goals, strict=True)
-        )
-        return Together(tuple(parts))
+        return Problem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
 
     result = [
         compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
@@ -97,7 +93,7 @@ ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the err
 class Lens:
     """Blur of a target, fitted with the values as one more number of the search of the last size."""
 
-    def __init__(self, problem: Together, space: SearchBox, until: float) -> None:
+    def __init__(self, problem: Problem, space: SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
         self.finer = problem.finer()
         self._last: tuple[Found, Found, Blur] | None = None
@@ -262,7 +258,7 @@ def hindrances(
     worst: tuple[str, Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
-    """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `Together`."""
+    """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `Problem`."""
     notes = []
     if not done:
         notes.append("not converged: the last rounds still found nearer pictures, or time was out")
@@ -388,7 +384,7 @@ def fit(
         frames=sum(problem.frames for problem in (*problems, lens.finer)),
         before=_image(after if before is None else before),
         after=_image(after),
-        target=_image([part.colours for part in last.parts]),
+        target=_image(last.colours),
         way=tuple(_scenes(moments[0], space, [first, *places[0].way, best])),
     )
 
@@ -399,7 +395,7 @@ def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[
             yield moment.evaluated(space.values(u))[1]
 
 
-def _db(problem: Together, pictures: Sequence[Picture]) -> float:
+def _db(problem: Problem, pictures: Sequence[Picture]) -> float:
     """PSNR over the pixels that count."""
     off = problem.residuals(pictures)
     error = float(off @ off)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Callable
+from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 from unicodedata import category
 
@@ -28,9 +30,10 @@ _CUBIC: Final = 2e-5  # em: how far quadratic curves may be off a cubic one
 _MOST_CURVES: Final = 1_000_000  # of all letters
 _KERNED: Final = 3000  # letters whose pairs are asked
 _ALPHABETS: Final = 0x2E80  # where those end that fonts kern
-_SAMPLES: Final = 8, 64  # edges of a curve, to see where it runs, and to see where that changes
-_BESIDE: Final = 1e-4  # of a radius: from a curve to where its sides are asked
-_ASKED: Final = 400  # points at which a finished letter is compared with its contours
+_SAMPLES: Final = 8, 64  # edges of a curve, to see whether contours overlap, and where they do
+_BESIDE: Final = 1e-7  # of a radius: from a curve to where its sides are asked
+_MEET: Final = 1e-5  # of a radius: so near each other curves meet
+_CLOSE: Final = 50_000  # pairs of curves of a letter that may meet
 _LEAST: Final = 1e-6  # em: the least radius of what shows
 Curves = npt.NDArray[np.float64]  # (n, 3, 2) start, control point, end
 
@@ -60,22 +63,21 @@ def read_font(
     if not face.glyph_count or not 16 <= face.upem <= 1 << 14:
         raise FitError("damaged or not a TrueType or OpenType font")
     font = uharfbuzz.Font(face)
-    held = {int(code): font.get_nominal_glyph(code) for code in face.unicodes}
-    held = {code: glyph for code, glyph in held.items() if glyph and _is_letter(code)}
+    codes = [int(code) for code in face.unicodes if category(chr(code)) not in ("Cc", "Cs")]
+    held = {code: glyph for code in codes if (glyph := font.get_nominal_glyph(code))}
     if letters is not None:
         ranges = ranges_of(letters)
         held = {code: glyph for code, glyph in held.items() if any(code in some for some in ranges)}
     if not 0 < len(held) <= MOST_LETTERS:
         raise FitError(f"{len(held):,} letters, where 1 to {MOST_LETTERS:,} are allowed")
     say(plural(len(held), "letter"))
-    pen = _Pen(uharfbuzz)
-    codes, numbers, ends, left_out = list[int](), list[float](), list[int](), list[str]()
-    parts, count = list[bytes](), 0
+    codes, numbers, ends, parts = list[int](), list[float](), list[int](), list[bytes]()
+    left_out, count = list[str](), 0
     for code, glyph in sorted(held.items()):
         advance = font.get_glyph_h_advance(glyph) / face.upem
-        curves = pen.curves(font, glyph) / face.upem
+        curves = _contours(font, glyph) / face.upem
         disc, outline = _outline(curves)
-        if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _sound(outline, curves, disc):
+        if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _closed(outline):
             left_out.append(f"U+{code:04X}")
             continue
         count += len(outline)
@@ -111,58 +113,34 @@ def ranges_of(text: str) -> list[range]:
     return result
 
 
-def _is_letter(code: int) -> bool:
-    return code >= 0x20 and not 0x7F <= code < 0xA0 and not 0xD800 <= code < 0xE000 and code < 0x110000
+def _contours(font: Any, glyph: int) -> Curves:
+    """Closed contours of a glyph, in font units; cubic curves as quadratic ones that are near enough."""
+    drawn, begin = list[tuple[Any, ...]](), (0.0, 0.0)
+    draw = dict.fromkeys(("lineTo", "qCurveTo", "curveTo"), lambda *points: drawn.append(points))
+    end = dict.fromkeys(("closePath", "endPath"), lambda: None)
+    pen = SimpleNamespace(moveTo=lambda point: drawn.append((None, point)), **draw, **end)
+    font.draw_glyph_with_pen(glyph, pen)
+    found, at = [np.zeros((0, 3, 2))], begin
+    for first, *rest in [*drawn[: 4 * MOST_CURVES], (None, begin)]:
+        closes = first is None
+        points = np.array([at, begin] if closes else [at, first, *rest], float)
+        at = (first, *rest)[-1]
+        begin = at if closes else begin
+        if len(points) == 2:
+            points = np.stack([points[0], points.mean(0), points[1]])
+        found.append(_quadratics(points, _CUBIC * font.face.upem) if len(points) == 4 else points[None])
+    result = np.concatenate(found)
+    return np.asarray(result[(result != result[:, :1]).any((1, 2))])
 
 
-class _Pen:
-    """Curves of glyphs, in font units; cubic ones as quadratic ones that are near enough."""
-
-    def __init__(self, uharfbuzz: Any) -> None:
-        self._found: list[Any] = []
-        self._begin = self._at = (0.0, 0.0)
-        self._near = 0.0
-        self._funcs = uharfbuzz.DrawFuncs()
-        self._funcs.set_move_to_func(lambda x, y, _: self._move((x, y)))
-        self._funcs.set_line_to_func(lambda x, y, _: self._line((x, y)))
-        self._funcs.set_quadratic_to_func(lambda a, b, x, y, _: self._quadratic((a, b), (x, y)))
-        self._funcs.set_cubic_to_func(lambda a, b, c, d, x, y, _: self._cubic((a, b), (c, d), (x, y)))
-        self._funcs.set_close_path_func(lambda _: self._line(self._begin))
-
-    def curves(self, font: Any, glyph: int) -> Curves:
-        """Closed contours of a glyph."""
-        self._found = []
-        self._begin = self._at = (0.0, 0.0)
-        self._near = _CUBIC * font.face.upem
-        font.draw_glyph(glyph, self._funcs, None)
-        self._line(self._begin)
-        return np.array(self._found, float).reshape(-1, 3, 2)
-
-    def _move(self, to: tuple[float, float]) -> None:
-        self._line(self._begin)
-        self._begin = self._at = to
-
-    def _line(self, to: tuple[float, float]) -> None:
-        if to != self._at:
-            self._quadratic(((self._at[0] + to[0]) / 2, (self._at[1] + to[1]) / 2), to)
-
-    def _quadratic(self, by: tuple[float, float], to: tuple[float, float]) -> None:
-        self._found.append((self._at, by, to))
-        self._at = to
-        if len(self._found) > 4 * MOST_CURVES:
-            raise FitError(f"a letter of more than {4 * MOST_CURVES:,} curves")
-
-    def _cubic(self, b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]) -> None:
-        p = np.array([self._at, b, c, d], float)
-        off = np.hypot(*(p[3] - 3 * p[2] + 3 * p[1] - p[0])) * 3**0.5 / 36
-        n = int(np.clip(np.ceil((off / self._near) ** (1 / 3)), 1, 32))
-        w = p[0], 3 * (p[1] - p[0]), 3 * (p[2] - 2 * p[1] + p[0]), p[3] - 3 * p[2] + 3 * p[1] - p[0]
-        for k in range(n):
-            s, e = k / n, (k + 1) / n
-            start, end = (w[0] + t * (w[1] + t * (w[2] + t * w[3])) for t in (s, e))
-            go, come = (w[1] + t * (2 * w[2] + 3 * t * w[3]) for t in (s, e))
-            by = (start + end) / 2 + (go - come) * (e - s) / 4
-            self._quadratic(tuple(by.tolist()), d if k == n - 1 else tuple(end.tolist()))
+def _quadratics(p: Curves, near: float) -> Curves:
+    """Curves (n, 3, 2) that are near enough to a cubic one (4, 2)."""
+    a, u, v, w = p[0], 3 * (p[1] - p[0]), 3 * (p[2] - 2 * p[1] + p[0]), p[3] - 3 * p[2] + 3 * p[1] - p[0]
+    n = int(np.clip(np.ceil((np.hypot(*w) * 3**0.5 / 36 / near) ** (1 / 3)), 1, 32))
+    t = np.linspace(0, 1, n + 1)[:, None]
+    point, way = a + t * (u + t * (v + t * w)), u + t * (2 * v + 3 * t * w)
+    by = (point[:-1] + point[1:]) / 2 + (way[:-1] - way[1:]) / (4 * n)
+    return np.stack([point[:-1], by, point[1:]], 1)
 
 
 def _edges(curves: Curves, count: int) -> Curves:
@@ -199,62 +177,53 @@ def _outline(curves: Curves) -> tuple[tuple[float, float, float], npt.NDArray[np
 
 def _boundary(curves: Curves) -> Curves:
     """Parts of closed contours that have the inside on one side alone, turned to have it on their left."""
-    size = abs(curves - curves.mean((0, 1))).max()
-    few, many = (_edges(curves, n) for n in _SAMPLES)
+    size, few = abs(curves - curves.mean((0, 1))).max(), _edges(curves, _SAMPLES[0])
     side = _sides(few, winding(few.reshape(-1, 2, 2), odd=False), size)
     if (side == 1).all() or (side == -1).all():
         return curves if side[0, 0] == 1 else curves[::-1, ::-1]
-    fine = winding(many.reshape(-1, 2, 2), odd=False)
-    side = _sides(many, fine, size)
-    parts, crossings = list[list[Any]](), list[tuple[list[Any], int]]()
-    for curve, own in zip(curves, side, strict=True):
-        turns = (np.flatnonzero(own[1:] != own[:-1]) + 1).tolist()
-        cuts = [0.0, *(_change(curve, at, own, fine, size) for at in turns), 1.0]
-        for s, e, kind in zip(cuts, cuts[1:], own[[0, *turns]].tolist(), strict=False):
-            if kind:
-                parts.append([curve, s, e, kind])
-                crossings += [(parts[-1], at) for at, t in ((1, s), (2, e)) if 0 < t < 1]
-    _cross(crossings, size)
-    pieces = np.array([_part(curve, s, e)[::kind] for curve, s, e, kind in parts if e > s]).reshape(-1, 3, 2)
-    if not len(pieces):
-        return pieces
-    starts, ends = pieces[:, 0], pieces[:, 2]
-    starts, ends = starts[_gaps(starts, ends) > 1e-6 * size], ends[_gaps(ends, starts) > 1e-6 * size]
-    if not len(starts) or not len(ends):
-        return pieces
-    near = [starts[np.hypot(*(starts - end).T).argmin()] for end in ends]  # of contours that touch
-    bridges = [((end, (end + start) / 2, start)) for end, start in zip(ends, near, strict=True)]
-    return np.concatenate([pieces, np.array(bridges)])
+    parts, count = _apart(curves, size), _SAMPLES[1]
+    many = _edges(parts, count)
+    side = _sides(many[:, count // 2], winding(many.reshape(-1, 2, 2), odd=False), size)
+    return np.asarray(np.where(side[:, None, None] > 0, parts, parts[:, ::-1])[side != 0])
 
 
-def _gaps(points: Curves, others: Curves) -> Curves:
-    """Distances (n,) of points from the nearest of others."""
-    from scipy.spatial import cKDTree
+def _apart(curves: Curves, size: float) -> Curves:
+    """Parts of curves, cut where they cross others or end on them; whole ones where that is too much work."""
+    low, high, n = curves.min(1) - _MEET * size, curves.max(1) + _MEET * size, _SAMPLES[0]
+    close = (low[:, None] <= high).all(2) & (low <= high[:, None]).all(2)
+    pairs = np.nonzero(np.triu(close, 1))
+    if len(pairs[0]) > _CLOSE:
+        return curves
+    edges = _edges(curves, n)
+    start, way = edges[:, :, 0], edges[:, :, 1] - edges[:, :, 0]
+    between = start[pairs[1]][:, None] - start[pairs[0]][:, :, None]  # (pairs, n, n, 2)
+    one, other = way[pairs[0]][:, :, None], way[pairs[1]][:, None]
+    turn = _crossed(one, other)
+    shares = [_crossed(between, w) / np.where(turn, turn, 1e-30) for w in (other, one)]
+    pair, *place = np.nonzero((abs(np.array(shares) - 0.5) < 0.6).all(0))
+    curve = np.array(pairs)[:, pair]
+    t = np.array([(k + share[pair, *place]) / n for k, share in zip(place, shares, strict=True)])
+    for _ in range(8):  # Newton's method
+        (a, u), (b, v) = (_moving(curves[which], x) for which, x in zip(curve, t, strict=True))
+        turn = _crossed(u, v)
+        t = t + np.stack([_crossed(b - a, v), _crossed(b - a, u)]) / np.where(turn, turn, np.inf)
+        t = t.clip(-0.1, 1.1)
+    met = (abs(t - 0.5) <= 0.5 + _MEET).all(0) & (np.hypot(*(a - b).T) < _MEET * size)
+    result = []
+    for at, one in enumerate(curves):
+        cuts = np.unique([0, *np.round(t[:, met][curve[:, met] == at].clip(0, 1), 6), 1])
+        result += [_part(one, s, e) for s, e in pairwise(cuts)]
+    return np.array(result)
 
-    return np.asarray(cKDTree(others).query(points)[0])
+
+def _crossed(a: Curves, b: Curves) -> Curves:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _cross(crossings: list[tuple[list[Any], int]], size: float) -> None:
-    """Move ends of parts, each (curve, from, to, …), to where their curves cross, by Newton's method."""
-    points = np.array([_part(part[0], part[at], part[at])[0] for part, at in crossings]).reshape(-1, 2)
-    for (part, at), point in zip(crossings, points, strict=True):
-        others = np.array([other[0] is not part[0] for other, _ in crossings])
-        gaps = np.where(others, np.hypot(*(points - point).T), np.inf)
-        if not gaps.min(initial=np.inf) < 0.05 * size:
-            continue
-        other, its = crossings[int(gaps.argmin())]
-        t = np.array([part[at], other[its]])
-        for _ in range(6):
-            (p, u), (q, v) = (_moving(curve, x) for curve, x in zip((part[0], other[0]), t, strict=True))
-            t = t - np.linalg.lstsq(np.stack([u, -v], 1), p - q, rcond=None)[0]
-        if abs(t[0] - part[at]) < 0.1 and 0 <= t[0] <= 1:
-            part[at] = float(t[0])
-
-
-def _moving(curve: Curves, t: float) -> tuple[Curves, Curves]:
-    """Point and derivative of a curve (3, 2)."""
-    u, w = 2 * (curve[1] - curve[0]), curve[0] - 2 * curve[1] + curve[2]
-    return curve[0] + t * (u + t * w), u + 2 * t * w
+def _moving(curves: Curves, t: Curves) -> tuple[Curves, Curves]:
+    """Points and derivatives (n, 2) of curves at parameters."""
+    u, w, t = 2 * (curves[:, 1] - curves[:, 0]), curves[:, 0] - 2 * curves[:, 1] + curves[:, 2], t[:, None]
+    return curves[:, 0] + t * (u + t * w), u + 2 * t * w
 
 
 def _sides(edges: Curves, inside: Any, size: float) -> npt.NDArray[np.int8]:
@@ -267,30 +236,12 @@ def _sides(edges: Curves, inside: Any, size: float) -> npt.NDArray[np.int8]:
     return np.asarray((left - right).reshape(edges.shape[:-2]))
 
 
-def _change(curve: Curves, at: int, own: Any, inside: Any, size: float) -> float:
-    """The parameter between two edges of a curve where what lies beside it changes."""
-    count = len(own)
-    low, high, first = (at - 0.5) / count, (at + 0.5) / count, own[at - 1]
-    for _ in range(14):
-        half = (low + high) / 2
-        edge = _part(curve, half - 1e-4, half + 1e-4)[None, ::2]
-        same = _sides(edge, inside, size)[0] == first
-        low, high = (half, high) if same else (low, half)
-    return (low + high) / 2
+def _closed(outline: npt.NDArray[np.int16]) -> bool:
+    """Return whether every curve of an outline ends where one begins."""
+    from scipy.spatial import cKDTree
 
-
-def _sound(outline: npt.NDArray[np.int16], curves: Curves, disc: tuple[float, float, float]) -> bool:
-    """True where an outline is closed and covers what its contours do at almost all of some points."""
-    if not len(outline):
-        return True
     starts, ends = outline[:, 0].astype(float), outline[:, 2].astype(float)
-    gaps = _gaps(ends, starts)
-    p = np.random.default_rng(1).uniform(-1, 1, (_ASKED, 2))
-    before = winding(_edges(curves, _SAMPLES[1]).reshape(-1, 2, 2), odd=False)(
-        p * disc[2] + np.array(disc[:2])
-    )
-    after = winding(_edges(outline / GRAIN, _SAMPLES[1]).reshape(-1, 2, 2), odd=False)(p)
-    return bool(gaps.max() <= MEET * GRAIN and (before != after).sum() <= _ASKED // 100)
+    return not len(outline) or bool(cKDTree(starts).query(ends)[0].max() <= MEET * GRAIN)
 
 
 def _kerning(

@@ -235,11 +235,10 @@ def numbers_of(program: Program) -> Floats:
 
 def alike(a: Program, b: Program) -> bool:
     """Return whether two Programs differ in their numbers alone."""
+    alone = ("model", "objects", "elements", "palette", "samples")
+    same = all(getattr(a, name) == getattr(b, name) for name in alone)
     tables = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("tokens", "forms", "worn"))
-    plain = (a.background is None) == (b.background is None)
-    named = (a.model, a.objects, a.elements, a.palette) == (b.model, b.objects, b.elements, b.palette)
-    plain = plain and a.samples == b.samples
-    return tables and plain and named
+    return same and tables and (a.background is None) == (b.background is None)
 
 
 class Rates:

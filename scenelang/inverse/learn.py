@@ -95,7 +95,9 @@ class LearnOptions:
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
-        known = element.material or element.size is not None  # early files do not say
+        known = (
+            isinstance(element, Font) or element.material or element.size is not None
+        )  # early ones do not say
         ended = not cut_short or said.get("steps") == self.steps
         return known and ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 

@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from scenelang.assets.records import Record
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import Samples
+from scenelang.drawing.how import Sampling
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.small import draw_small
 from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
@@ -26,6 +27,10 @@ from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 
 LEVELS: Final = 4  # of a pyramid: pixels, and means of 2, 4 and 8 pixels along each side
+EDGE: Final = 2 ** (LEVELS - 1)  # side in pixels of the squares whose means the last level has
+GRAIN: Final = 2.0  # most times the expected variance of means at which a difference counts as noise
+BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # standard deviations that are tried, pixels
+SOFTER: Final = 0.98  # most of the error that a blur may leave to count as one
 
 
 class Moment(Record, frozen=False):
@@ -66,7 +71,7 @@ class Moment(Record, frozen=False):
 
 
 class Problem:
-    """Residuals of pictures of one size (width, height) against the target.
+    """Residuals of the pictures of frames, all of one size (width, height), against their targets.
 
     With ``light`` pixels are means of linear light, as those of solids are. ``soft`` outlines of the plane
     are as wide as a pixel, and take one sample. One level of the pyramid compares pixels alone; more also
@@ -75,30 +80,46 @@ class Problem:
 
     def __init__(
         self,
-        moment: Moment,
+        moments: Sequence[Moment],
         space: SearchBox,
-        target: Target,
+        targets: Sequence[Target],
         canvas: tuple[int, int],
         *,
         light: bool = False,
         soft: bool = False,
-        samples: Samples = "four",
+        samples: Sampling = "four",
         levels: int = LEVELS,
     ) -> None:
-        self.moment, self.space, self.under = moment, space, target.under
+        self.moments, self.space, self.under = moments, space, targets[0].under
         self.canvas, self.light, self.samples, self.levels = canvas, light, samples, levels
         self.soft = soft and not light
         self.frames = 0  # drawn so far
-        self.colours, weights = target.sized(canvas, light)
-        self.root = np.sqrt(weights / max(1e-9, weights.mean()))[..., None]
-        self._rates = Rates(self.program, space)
-        self._last: tuple[bytes, Program | None] = b"", None
+        # colours (H, W, 3), and roots of the weights (H, W, 1), of each frame
+        self.colours, weights = zip(*(target.sized(canvas, light) for target in targets), strict=True)
+        self.roots = [np.sqrt(each / max(1e-9, each.mean()))[..., None] for each in weights]
+        self._rates = [Rates(partial(self._program, at), space) for at in range(len(moments))]
+        self._last: tuple[bytes, list[Program | None]] = b"", []
 
-    def drawn(self, program: Program | None) -> Picture | None:
-        """The picture (H, W, 3) of a Program of this canvas; None of none."""
-        self.frames += 1
-        if program is None:
-            return None
+    def __call__(self, u: Point) -> Point | None:
+        """Residuals (R,) of a point, whose squares sum to the mean of the sums of the frames."""
+        result = self.pictures(u)
+        return None if result is None else self.residuals(result, self.levels)
+
+    def pixels(self, u: Point) -> Point | None:
+        result = self.pictures(u)
+        return None if result is None else self.residuals(result)
+
+    def pictures(self, u: Point) -> list[Picture] | None:
+        """The picture of each frame; None where values give no scene."""
+        return self.drawn(self.programs(u))
+
+    def drawn(self, programs: Sequence[Program | None]) -> list[Picture] | None:
+        """The pictures (H, W, 3) of a Program of this canvas for each frame; None where one is None."""
+        self.frames += len(programs)
+        known = [program for program in programs if program is not None]
+        return [self._drawn(program) for program in known] if len(known) == len(programs) else None
+
+    def _drawn(self, program: Program) -> Picture:
         if self.soft:
             network = softened(program.model, 2 / min(self.canvas))
             return over(draw_objects(network, program, samples="one").image, self.under)
@@ -109,37 +130,73 @@ class Problem:
         larger = copy.copy(self)
         larger.frames = 0
         if not self.light:
-            larger.canvas, larger._last = (2 * self.canvas[0], 2 * self.canvas[1]), (b"", None)
+            larger.canvas, larger._last = (2 * self.canvas[0], 2 * self.canvas[1]), (b"", [])
         return larger
 
-    def program(self, u: Point) -> Program | None:
-        """Compile the scene of a point; the last Program is cached."""
+    def programs(self, u: Point) -> list[Program | None]:
+        """Compile the scene of a point for each frame; the last Programs are cached."""
         if self._last[0] != u.tobytes():
-            self._last = u.tobytes(), self.moment.program(self.space.values(u), self.canvas)
+            self._last = u.tobytes(), [self._program(at, u) for at in range(len(self.moments))]
         return self._last[1]
 
-    def picture(self, u: Point) -> Picture | None:
-        """The picture of a point, None where its values give no scene."""
-        return self.drawn(self.program(u))
+    def _program(self, at: int, u: Point) -> Program | None:
+        return self.moments[at].program(self.space.values(u), self.canvas)
 
-    def residuals(self, picture: Picture, levels: int = 1) -> Point:
-        """Residuals (R,), whose squares sum to the mean square errors of so many levels of the pyramid."""
-        return _pyramid((picture - self.colours) * self.root, levels)[:, 0]
+    def residuals(self, pictures: Sequence[Picture], levels: int = 1) -> Point:
+        """Residuals (R,) of pictures, at so many levels of the pyramid."""
+        return np.asarray(np.concatenate(self._gaps(pictures, levels)) / np.sqrt(len(pictures)))
+
+    def _gaps(self, pictures: Sequence[Picture], levels: int) -> list[Point]:
+        """Residuals of each frame, whose squares sum to the mean square errors of the levels."""
+        every = zip(pictures, self.colours, self.roots, strict=False)
+        return [_pyramid((picture - colours) * root, levels)[:, 0] for picture, colours, root in every]
 
     def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
         """Derivatives (R, n) of the residuals, and of which axes (n,) there are; None where of none.
 
-        A few compilations and one soft picture give them, however many params there are. Elements, textures,
-        trees, solids, and axes along which objects come or go are left to differences.
+        A few compilations and one soft picture of each frame give them, however many params there are.
+        Elements, textures, trees, solids, and axes along which objects come or go are left to differences.
         """
-        program = self.program(u) if self.soft else None
-        if program is None or not len(program) or program.elements or program.palette or program.extended:
-            return None
-        rates, known = self._rates.at(u, program)
-        change = SoftPlane(program, self.under)(numbers_of(program), rates)[1].astype(np.float64)
-        self.frames += 1
-        height, width = change.shape[:2]
-        return _pyramid((change * self.root[..., None]).reshape(height, width, -1), self.levels), known
+        rows, known = [], np.ones(len(u), bool)
+        for program, given, root in zip(
+            self.programs(u) if self.soft else (), self._rates, self.roots, strict=False
+        ):
+            if program is None or not len(program) or program.elements or program.palette or program.extended:
+                return None
+            rates, axes = given.at(u, program)
+            change = SoftPlane(program, self.under)(numbers_of(program), rates)[1].astype(np.float64)
+            self.frames += 1
+            height, width = change.shape[:2]
+            rows.append(_pyramid((change * root[..., None]).reshape(height, width, -1), self.levels))
+            known &= axes
+        return (np.concatenate(rows) / np.sqrt(len(rows)), known) if rows else None
+
+    def worst(self, pictures: Sequence[Picture]) -> tuple[str, Picture]:
+        """Label of the frame whose picture is farthest off, empty of a single one, and its errors (H, W)."""
+        every = zip(pictures, self.colours, self.roots, strict=True)
+        gaps = [np.square((picture - colours) * root).sum(2) for picture, colours, root in every]
+        at = int(np.argmax([gap.sum() for gap in gaps]))
+        return f" of frame {self.moments[at].frame}" * (len(gaps) > 1), gaps[at]
+
+    def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
+        """Test for noise alone after a blur: its means over 8 x 8 pixels have a 64th of its variance."""
+        pixels = means = 0.0
+        pictures = [blurred(picture, blur) for picture in self.pictures(u) or ()]
+        for picture, gap in zip(pictures, self._gaps(pictures, LEVELS), strict=True):
+            left = np.square(gap)
+            pixels += float(left[: picture.size].sum())
+            means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
+        return bool(means * EDGE**2 <= GRAIN * pixels)
+
+    def blur(self, pictures: Sequence[Picture]) -> float:
+        """Standard deviation in pixels of the blur that brings pictures nearest; 0 where none helps."""
+        best, result = SOFTER, 0.0
+        for sigma in BLURS:
+            left = self.residuals([blurred(one, Blur(sigma)) for one in pictures])
+            share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
+            if share < best:
+                best, result = share, sigma
+        return result
 
 
 def _pyramid(gap: Picture, levels: int) -> Matrix:
@@ -152,88 +209,3 @@ def _pyramid(gap: Picture, levels: int) -> Matrix:
         rows = gap.reshape(gap.shape[0] * gap.shape[1] * 3, -1)
         parts.append(rows / np.sqrt(len(rows)))
     return np.concatenate(parts)
-
-
-EDGE: Final = 2 ** (LEVELS - 1)  # side in pixels of the squares whose means the last level has
-GRAIN: Final = 2.0  # most times the expected variance of means at which a difference counts as noise
-BLURS: Final = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # standard deviations that are tried, pixels
-SOFTER: Final = 0.98  # most of the error that a blur may leave to count as one
-
-
-class Together:
-    """Residuals of the pictures of several frames of one size against their targets."""
-
-    def __init__(self, parts: Sequence[Problem]) -> None:
-        self.parts, self.canvas = tuple(parts), parts[0].canvas
-
-    def __call__(self, u: Point) -> Point | None:
-        """Residuals (R,), whose squares sum to the mean of the sums of the frames."""
-        result = self.pictures(u)
-        return None if result is None else self.residuals(result, self.parts[0].levels)
-
-    def pixels(self, u: Point) -> Point | None:
-        result = self.pictures(u)
-        return None if result is None else self.residuals(result)
-
-    def pictures(self, u: Point) -> list[Picture] | None:
-        """The picture of each frame; None where values give no scene."""
-        return _known([part.picture(u) for part in self.parts])
-
-    def drawn(self, programs: Sequence[Program | None]) -> list[Picture] | None:
-        """The pictures of a Program for each frame."""
-        return _known([part.drawn(one) for part, one in zip(self.parts, programs, strict=True)])
-
-    def residuals(self, pictures: Sequence[Picture], levels: int = 1) -> Point:
-        """Residuals of pictures, at so many levels of the pyramid."""
-        gaps = [part.residuals(one, levels) for part, one in zip(self.parts, pictures, strict=True)]
-        return np.asarray(np.concatenate(gaps) / np.sqrt(len(gaps)))
-
-    def slopes(self, u: Point) -> tuple[Matrix, npt.NDArray[np.bool_]] | None:
-        """Derivatives as of `Problem.slopes`, of the axes for which all frames have them."""
-        result = [part.slopes(u) for part in self.parts]
-        known = [one for one in result if one is not None]
-        if len(known) < len(result):
-            return None
-        rows = np.concatenate([slopes for slopes, _ in known]) / np.sqrt(len(known))
-        return rows, np.all([axes for _, axes in known], 0)
-
-    def worst(self, pictures: Sequence[Picture]) -> tuple[str, Picture]:
-        """Label of the frame whose picture is farthest off, empty of a single one, and its errors (H, W)."""
-        gaps = [
-            np.square((one - part.colours) * part.root).sum(2)
-            for part, one in zip(self.parts, pictures, strict=True)
-        ]
-        at = int(np.argmax([gap.sum() for gap in gaps]))
-        return f" of frame {self.parts[at].moment.frame}" * (len(gaps) > 1), gaps[at]
-
-    def noise(self, u: Point, blur: Blur = Blur()) -> bool:  # noqa: B008
-        """Test for noise alone after a blur: its means over 8 x 8 pixels have a 64th of its variance."""
-        pixels = means = 0.0
-        for part, picture in zip(self.parts, self.pictures(u) or (), strict=False):
-            left = np.square(part.residuals(blurred(picture, blur), LEVELS))
-            pixels += float(left[: picture.size].sum())
-            means += float(left[-3 * math.prod(-(-side // EDGE) for side in self.canvas) :].sum())
-        return bool(means * EDGE**2 <= GRAIN * pixels)
-
-    def finer(self) -> Together:
-        """The same with pictures whose light can be averaged: twice as large in the plane."""
-        return Together([part.finer() for part in self.parts])
-
-    def blur(self, pictures: Sequence[Picture]) -> float:
-        """Standard deviation in pixels of the blur that brings pictures nearest; 0 where none helps."""
-        best, result = SOFTER, 0.0
-        for sigma in BLURS:
-            left = self.residuals([blurred(one, Blur(sigma)) for one in pictures])
-            share = float(left @ left) / max(1e-12, float(np.square(self.residuals(pictures)).sum()))
-            if share < best:
-                best, result = share, sigma
-        return result
-
-    @property
-    def frames(self) -> int:  # drawn so far
-        return sum(part.frames for part in self.parts)
-
-
-def _known(pictures: Sequence[Picture | None]) -> list[Picture] | None:
-    known = [one for one in pictures if one is not None]
-    return known if len(known) == len(pictures) else None

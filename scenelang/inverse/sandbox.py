@@ -215,20 +215,16 @@ def files_beside(data: bytes, suffix: str, folder: Path) -> dict[str, bytes]:
             if held is not None:
                 result[name] = held
                 left -= len(held)
-                if kind == ".obj":
-                    waiting.append((held, ".mtl"))
+                waiting += [(held, ".mtl")] * (kind == ".obj")
     return result
 
 
 def _names(data: bytes, suffix: str) -> Iterator[str]:
     ends = {".ply": data.find(b"end_header"), ".glb": 20 + int.from_bytes(data[12:16], "little")}
-    pattern = _NAMES.get(suffix)
-    for match in pattern.finditer(data, 0, ends.get(suffix, len(data))) if pattern else ():
+    for match in _NAMES[suffix].finditer(data, 0, ends.get(suffix, len(data))) if suffix in _NAMES else ():
         name = match[1].decode(errors="replace").strip()
-        try:
+        with suppress(ValueError):
             yield json.loads(f'"{name}"') if suffix == ".glb" else name
-        except ValueError:
-            continue
 
 
 def _read(folder: Path, name: str, most: int) -> bytes | None:

@@ -304,19 +304,16 @@ def central(
     residuals: Residuals, space: SearchBox, u: Point, step: float, free: npt.NDArray[np.bool_]
 ) -> Matrix | None:
     """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
-    columns = np.zeros((0, 0))
+    columns: dict[int, Point] = {}
     for axis in np.flatnonzero(free):
-        ends = [u.copy(), u.copy()]
-        ends[0][axis], ends[1][axis] = u[axis] - step, u[axis] + step
-        low, high = map(space.inside, ends)
-        width = 2 * step if space.wraps[axis] else high[axis] - low[axis]
+        move = step * (np.arange(len(u)) == axis)
+        low, high = space.inside(u - move), space.inside(u + move)
         one, other = residuals(low), residuals(high)
         if one is None or other is None:
             return None
-        if not columns.size:
-            columns = np.zeros((len(one), len(u)))
-        columns[:, axis] = (other - one) / width
-    return columns
+        columns[axis] = (other - one) / (2 * step if space.wraps[axis] else high[axis] - low[axis])
+    none = np.zeros_like(next(iter(columns.values()), np.zeros(0)))
+    return np.stack([columns.get(axis, none) for axis in range(len(u))], 1) if columns else np.zeros((0, 0))
 
 
 def descend(

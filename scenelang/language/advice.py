@@ -59,9 +59,11 @@ def member_advice(name: tree.Name) -> str | None:
 
 
 def in_library(stmt: tree.Call, place: Place) -> str | None:
-    """Help for a statement whose name is that of a shape of the library."""
-    shape = foreign.SHAPES.get(stmt.name.text.lower())
-    if shape is None or likely_dimensions(place.session, stmt.span.source) == (3,):
+    """Help for a statement whose name is that of a shape of the library, unless more is known of it."""
+    name = stmt.name.text.lower()
+    shape = foreign.SHAPES.get(name)
+    solid = likely_dimensions(place.session, stmt.span.source) == (3,)
+    if shape is None or solid or name in foreign.STATEMENTS:
         return None
     for alias, binding in place.scope.visible():
         value = binding.value
@@ -111,9 +113,6 @@ def drawn(place: Place) -> str:
     if len(said) == 1:
         return f"there is {said[dimensions[0]]}" + (f", and what is {_MESHES}" if dimensions == (3,) else "")
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"
-
-
-"""Kinds of bindings that are values."""
 
 
 def report_unknown(

@@ -6,21 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
 from scenelang.assets.records import Record
-from scenelang.language import library, tree
+from scenelang.language import expressions, library, tree
 from scenelang.language.builder import Action, Builder, ChainBuilder, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span, did_you_mean, listing
-from scenelang.language.expressions import (
-    VARIES,
-    Code,
-    bind,
-    computed,
-    condition,
-    entering,
-    guarded,
-    lookup,
-    prepare,
-    prepare_arguments,
-)
+from scenelang.language.expressions import Code, bind, condition, guarded, prepare
 from scenelang.language.library import SpanMap, Written
 from scenelang.language.limits import CALL_STEPS, HALF_STEPS, MAX_NESTING, MODULE_CALL, OBJECT
 from scenelang.language.nodes import blend_width
@@ -52,11 +41,7 @@ def prepare_statement(stmt: tree.Stmt, place: Place) -> Action | None:
 
 
 def prepare_block(statements: Sequence[tree.Stmt], place: Place, span: Span) -> Body:
-    """Prepare a block in its own scope, which ``place`` brings along.
-
-    Functions and modules are known in the whole block; their bodies are prepared after it, when all
-    names of the block are known to them.
-    """
+    """Prepare a block in its own scope, which ``place`` brings along; bodies of fns and modules last."""
     file, scope = place.file, place.scope
     file.nesting += 1
     if file.nesting > MAX_NESTING:
@@ -119,11 +104,7 @@ def _unbind(scope: Scope) -> list[Action]:
 def misplaced(
     place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
-    """Report a statement in the wrong place; several in one block with the same ``fact`` are one report.
-
-    Args:
-        fact: the message, with ``{}`` for the name.
-    """
+    """Report a statement in the wrong place by a ``fact`` with ``{}`` for its name, once in a block."""
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
         place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
@@ -150,7 +131,7 @@ def define(name: tree.Name, binding: Binding, place: Place) -> bool:
 def prepare_let(stmt: tree.Let, place: Place) -> Action | None:
     code = prepare(stmt.value, place)
     name, session, slots = stmt.name.span, place.session, place.scope.slots
-    slot, known = slots.add(), code.value is not VARIES
+    slot, known = slots.add(), code.value is not expressions.VARIES
     value = code.value if known else None
     define(stmt.name, Binding("let", name, slots, slot, value, known, session.needs), place)
     get, watch = code.run, session.watch
@@ -237,7 +218,7 @@ def _prepare_loop(stmt: tree.For | tree.ForItem, place: Place) -> tuple[Callable
 def prepare_vector(expr: tree.Vector, place: Place) -> Code:
     """Prepare a vector; with loops in it the items of each run are counted before it is made."""
     if not any(isinstance(item, tree.ForItem | tree.IfItem) for item in expr.items):
-        return computed(place, _vector, expr.span, expr.items, item_steps=0)
+        return expressions.computed(place, _vector, expr.span, expr.items, item_steps=0)
     fills = [_prepare_item(item, place) for item in expr.items]
     make = guarded(place, lambda items: Vec(tuple(items)), expr.span, (), item_steps=0)
 
@@ -429,7 +410,7 @@ def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -
     fits = holds_children(place, where.name, "object `{}`", name)
     body = prepare_inner(stmt.body, place.inner("object"))
     if stmt.args:
-        prepare_arguments(stmt.args, place)
+        expressions.prepare_arguments(stmt.args, place)
         if fits:
             help = f"size it in its block: {name} {{ scale(0.5); }}"
             sides, written, path = _SIDES.get(name, ("", "", ""))
@@ -496,7 +477,7 @@ def _width(stmt: tree.Node | tree.Combined, place: Place) -> Callable[[Env], flo
     """The k of a word that joins, None where none is written."""
     op = stmt.op if isinstance(stmt, tree.Combined) else stmt.kind
     word = KEYWORDS[op]
-    given = prepare_arguments(stmt.args, place)
+    given = expressions.prepare_arguments(stmt.args, place)
     bound = bind(place.report, tree.Name(stmt.keyword, word.name), word.params, word.required, given)
     if not bound or bound[0] is None:
         return lambda env: None
@@ -551,7 +532,7 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
         return None
     child, makes = stmt.child, isinstance(stmt.child, tree.Node)
     if isinstance(child, tree.Call):
-        binding = lookup(child.name, place)
+        binding = expressions.lookup(child.name, place)
         head = head_of(child, binding, place.kind)
         makes = head == "leaf" or (head == "own" and binding is not None and binding.kind not in VALUES)
     if not makes:
@@ -579,9 +560,9 @@ def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -
     """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
     session, where = place.session, Written(stmt.name.span, stmt.span)
     fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
-    given = prepare_arguments(stmt.args, place)
+    given = expressions.prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
-    enter = entering(stmt.name, given, definition, place)
+    enter = expressions.entering(stmt.name, given, definition, place)
     if enter is None or not fits:
         return None
     place.file.weight += MODULE_CALL
@@ -640,7 +621,7 @@ def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None
         _missing(stmt, place, "group", [*groups], f"its geometry is {stmt.name.text} {{ … }}")
         return None
     if stmt.args:
-        prepare_arguments(stmt.args, place)
+        expressions.prepare_arguments(stmt.args, place)
         help = f"move it in its block: {stmt.name.text}() {{ scale(0.5); }}"
         message = f"group `{stmt.name.text}` takes no arguments"
         place.report.error("E0308", message, stmt.args[0].span, help=help)

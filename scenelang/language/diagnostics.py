@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right, insort_left
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from heapq import nsmallest
 from operator import attrgetter
@@ -304,6 +304,12 @@ def listing(known: Iterable[str], limit: int = 12) -> str:
     names = nsmallest(limit + 1, known)
     shown = ", ".join(names[:limit])
     return shown + (", …" if len(names) > limit else "")
+
+
+def common_start(left: Sequence[str], right: Sequence[str]) -> int:
+    """Number of items with which both sequences begin."""
+    pairs = enumerate(zip(left, right, strict=False))
+    return next((at for at, (a, b) in pairs if a != b), min(len(left), len(right)))
 
 
 def plural(count: int, noun: str) -> str:

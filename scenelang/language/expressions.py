@@ -17,22 +17,7 @@ from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX
 from scenelang.language.reporter import Reporter
 from scenelang.language.scopes import VALUES
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs
-from scenelang.language.values import (
-    COMPONENTS,
-    CONSTANTS,
-    FUNCTIONS,
-    POISON,
-    UNITS,
-    Angle,
-    Problem,
-    RangeValue,
-    Time,
-    Vec,
-    describe,
-    number,
-    unexpected,
-    unpack,
-)
+from scenelang.language.values import POISON, Problem, RangeValue, Vec, number
 from scenelang.language.words import ANIMATED
 
 Run = Callable[[Env], Any]
@@ -169,11 +154,11 @@ def computed(
 
 
 _LITERALS: Final[dict[str, Callable[[float], Any]]] = {
-    "deg": lambda value: Angle(math.radians(value)),
-    "rad": Angle,
-    "turn": lambda value: Angle(value * math.tau),
-    "s": Time,
-    "ms": lambda value: Time(value / 1000.0),
+    "deg": lambda value: values.Angle(math.radians(value)),
+    "rad": values.Angle,
+    "turn": lambda value: values.Angle(value * math.tau),
+    "s": values.Time,
+    "ms": lambda value: values.Time(value / 1000.0),
 }
 
 
@@ -188,9 +173,9 @@ def prepare_number(expr: tree.Number, place: Place) -> Code:
 def prepare_range(expr: tree.Range, place: Place) -> Code:
     def make(start: Any, stop: Any, step: Any = 1.0) -> RangeValue:
         for index, value in enumerate((start, stop, step)):
-            if value.__class__ not in UNITS:
-                raise unexpected("a number", value, operand=index)
-        (a, ua), (b, ub), (s, us) = unpack(start), unpack(stop), unpack(step)
+            if value.__class__ not in values.UNITS:
+                raise values.unexpected("a number", value, operand=index)
+        (a, ua), (b, ub), (s, us) = values.unpack(start), values.unpack(stop), values.unpack(step)
         kind = values.same_unit(a, ua, b, ub)
         if expr.step is None:
             return RangeValue(a, b, expr.exclusive, None, kind)
@@ -207,11 +192,11 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
 
 def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
-    index = COMPONENTS.get(name.text)
+    index = values.COMPONENTS.get(name.text)
     if index is None:
         help, fix = member_advice(name), None
         if help is None:
-            help, fix = did_you_mean(name.text, COMPONENTS, name.span)
+            help, fix = did_you_mean(name.text, values.COMPONENTS, name.span)
         help = help or "vectors have .x .y .z, or .r .g .b, or [i]"
         place.report.error("E0212", f"no value has a member `{name.text}`", name.span, help=help, fix=fix)
         return POISONED
@@ -219,11 +204,11 @@ def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code
 
     def pick(value: Any) -> Any:
         if value.__class__ is not Vec:
-            kind = describe(value)
+            kind = values.describe(value)
             message = f"`.{name.text}` of {kind}, which is not a vector"
             raise Problem("E0301", message, found=kind)
         if at >= len(value.items):
-            raise Problem("E0307", f"`.{name.text}` of {describe(value)}")
+            raise Problem("E0307", f"`.{name.text}` of {values.describe(value)}")
         return value.items[at]
 
     def run(env: Env) -> Any:
@@ -243,7 +228,7 @@ def item(value: Any, index: Any) -> Any:
     elif value.__class__ is RangeValue:
         length = value.count()
     else:
-        raise unexpected("a vector or a range", value, operand=0)
+        raise values.unexpected("a vector or a range", value, operand=0)
     if not at.is_integer():
         raise Problem("E0307", f"index {at:.6g} is not a whole number", "round it with floor(…)", 1)
     if not 0 <= at < length:
@@ -299,7 +284,7 @@ def _truth(value: Any, operand: int = 0) -> bool:
     if value.__class__ is bool:
         return value
     help = "compare it with something, as in n != 0" if value.__class__ is float else None
-    raise unexpected("a boolean", value, help, operand)
+    raise values.unexpected("a boolean", value, help, operand)
 
 
 def condition(expr: tree.Expr, place: Place) -> Code:
@@ -421,10 +406,10 @@ def prepare_name(expr: tree.NameRef, place: Place) -> Code:
 def _own_name(name: tree.Name, place: Place) -> Code:
     """A constant of the language or a variable of the animation."""
     text, session = name.text, place.session
-    if text in CONSTANTS:
-        return constant(CONSTANTS[text])
+    if text in values.CONSTANTS:
+        return constant(values.CONSTANTS[text])
     if text not in ANIMATED:
-        if text in FUNCTIONS:
+        if text in values.FUNCTIONS:
             message = f"`{text}` is a function, not a value"
             place.report.error("E0213", message, name.span, help=f"call it: {text}(…)")
         else:
@@ -595,7 +580,7 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code
             return POISONED
         given = [one for one in bound if one is not None]
     exprs = [arg.value for arg, _ in given]
-    meaning = FUNCTIONS[name.text]
+    meaning = values.FUNCTIONS[name.text]
     if name.text == "hsv":
         meaning = _doubted(meaning, exprs[0].span, place)
     place.file.weight += limits.FUNCTIONS.get(name.text, 4 * len(given) if word.variadic else 0)

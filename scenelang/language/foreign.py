@@ -32,6 +32,8 @@ STATEMENTS: Final = _TABLES["statements"]
 SHAPES: Final = _TABLES["shapes"]
 OPERATORS: Final = _TABLES["operators"]
 HEADS: Final = _TABLES["heads"]
+SIGNS: Final = _TABLES["signs"]
+UNIT_NAMES: Final = _TABLES["units"]
 ARGUMENTS: Final = {
     name.removeprefix("arguments of "): table
     for name, table in _TABLES.items()

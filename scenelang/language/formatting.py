@@ -431,9 +431,6 @@ class Layout:
     def if_item(self, word: int, opening: int, inside: Part, closing: int, item: Part) -> Part:
         return sequence([self.word(word), " ", self.parenthesised(opening, inside, closing), " ", item])
 
-    def name_ref(self, name: Part) -> Part:
-        return name
-
     def number(self, token: int) -> Part:
         text = self.text[self.starts[token] : self.ends[token]]
         if len(text) > _SURE_DIGITS or "E" in text or "e" in text.rstrip(_UNIT_LETTERS):
@@ -448,9 +445,10 @@ class Layout:
     color = true = false = word
 
     def callbacks(self) -> list[Callable[..., Any] | None]:
-        """The callback of every rule, as `run` takes them; rules that only recovery uses have none."""
+        """The callback of every rule, as `run` takes them; names, and what only recovery uses, have none."""
         names = (name for _, _, name in tables().rules)
-        return [None if not name or name.startswith("bad_") else getattr(self, name) for name in names]
+        none = re.compile("(bad_.*|name_ref)?")
+        return [None if none.fullmatch(name) else getattr(self, name) for name in names]
 
     def file(self, statements: list[Item] | None = None) -> Part:
         last = self.notes.get(len(self.tokens.kinds) - 1)
@@ -499,11 +497,11 @@ class Layout:
             head.append(ends_of(_lined([limits], flat_of(limits)), limits, limits))
         return self._ended(head, rest[-1])
 
-    def let(self, word: int, name: Part, equal: int, value: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", name, *self._assigned(equal, value)], last)
+    def let(self, word: int, *rest: Any) -> Part:
+        *named, equal, value, last = rest
+        return self._ended([self.word(word), " ", *named, *self._assigned(equal, value)], last)
 
-    def fn(self, word: int, name: Part, params: Part, equal: int, body: Part, last: int) -> Part:
-        return self._ended([self.word(word), " ", name, params, *self._assigned(equal, body)], last)
+    fn = let
 
     def import_(self, word: int, path: int, as_: int, alias: Part, last: int) -> Part:
         return self._ended([self.word(word), " ", self.string(path), " ", self.word(as_), " ", alias], last)

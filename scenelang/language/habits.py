@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from scenelang.assets.records import Record
-from scenelang.language.diagnostics import Fix, ranked
+from scenelang.language.diagnostics import Fix, common_start, ranked
 from scenelang.language.foreign import OPERATORS
 from scenelang.language.lexer import Report, Token, Tokens, reach
 from scenelang.language.tables import END, tables
@@ -41,6 +41,16 @@ _WORDS: Final[dict[str, tuple[str, ...]]] = {
     "block": (*NODES, "for", "if"),
 }
 """Words that a hole of this name takes."""
+
+
+def head_word(tokens: Tokens, at: int) -> str:
+    """First word of the statement that a token is in."""
+    return tokens.text(tokens.head(at, MAX_REPLAY))
+
+
+def quoted(text: str) -> str:
+    text = " ".join(text.split())
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
 
 
 @lru_cache(maxsize=256)
@@ -176,7 +186,7 @@ def _extent(tokens: Tokens, hole: str, at: int, head: int) -> int:
     level = column(head) if tokens.on_new_line(at) else inf
     depth, last = 0, min(at + 4000, len(tokens.kinds) - 1)
     for index in range(at, last):
-        sign = tables().kinds[tokens.kinds[index]]
+        sign = tokens.name(index)
         ended = depth == 0 and tokens.on_new_line(index) and column(index) <= level
         if (hole == "BODY" and ended) or (hole == "BLOCK" and index == at and sign != "{"):
             return index
@@ -311,7 +321,7 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
             code, message, help, safe = _ONCE.code, filled(_ONCE.message), _ONCE.help, False
         elif text.count("{", 0, start) > text.count("}", 0, start):  # perhaps a property
             help, safe = "in a block write material flat { color(…); }, translate(…); or scale(s);", False
-    elif habit.message == _BEFORE.message and match[""][0] and head(tokens, match[""][0] - 1) in _MOVES:
+    elif habit.message == _BEFORE.message and match[""][0] and head_word(tokens, match[""][0] - 1) in _MOVES:
         safe = False  # it may lack its `;`, and what follows be a material
     elif "STMT" in match and tokens.on_new_line(match["STMT"][0]):
         safe = False  # more of the lines below may be meant
@@ -322,23 +332,13 @@ def _tell(tokens: Tokens, report: Report, habit: Habit, match: _Match, new: str)
     place = (start + lead, end - tail) if lead + tail < len(old) else (start, end)
     fix: Fix | None = None
     if safe:
-        shown = " ".join(new.split())
-        shown = shown if len(shown) <= 40 else f"{shown[:37]}…"
-        fix = report.change(start, end, new, f"write `{shown}`" if shown else "remove it")
+        fix = report.change(start, end, new, f"write {quoted(new)}" if new.strip() else "remove it")
     report.add(code, message, *place, help=help, fix=fix)
-
-
-def head(tokens: Tokens, at: int) -> str:
-    first = at
-    while first and at - first < MAX_REPLAY and tokens.text(first - 1) not in (";", "{", "}"):
-        first -= 1
-    return tokens.text(first) if first < at else ""
 
 
 def _alike(one: str, other: str) -> int:
     """Number of letters that two texts have in common at their start, without half a word."""
-    pairs = enumerate(zip(one, other, strict=False))
-    count = next((at for at, (a, b) in pairs if a != b), min(len(one), len(other)))
+    count = common_start(one, other)
     while count and re.match(r"\w\w", one[count - 1 : count + 1] + other[count : count + 1]):
         count -= 1
     return count

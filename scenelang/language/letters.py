@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from scenelang.assets.font import ALIGNED, Font, FontError, Placed
 from scenelang.language import tree
@@ -19,6 +19,8 @@ from scenelang.language.session import Env
 from scenelang.language.values import POISON, Problem, number, show, unexpected
 from scenelang.language.words import LETTERS
 
+MAX_TEXT: Final = 10_000  # characters
+
 
 class Letters(NamedTuple):
     """A font and the name that a Scene has its file by."""
@@ -33,6 +35,8 @@ def _line(font: Font, text: Any, size: Any) -> tuple[list[Placed], float]:
         raise unexpected("a string", text, operand=0)
     if number(size, 1) <= 0.0:
         raise Problem("E0311", f"a size of {show(size)} is not above 0", operand=1)
+    if len(text) > MAX_TEXT:
+        raise Problem("E0370", f"a text of more than {MAX_TEXT:,} characters", operand=0)
     try:
         return font.line(text)
     except FontError as error:
@@ -86,7 +90,8 @@ def prepare_text(stmt: tree.Call, place: Place, letters: Letters) -> Action | No
         session.count_parts(2 * len(line), where.name)
         inside = Builder()
         for name, x, y, radius in line:
-            moves = (Scale(radius), Translate(x, y))
+            scale = make(Scale, {"kind": "scale", "x": radius, "y": radius, "z": radius})
+            moves = scale, make(Translate, {"kind": "translate", "x": x, "y": y, "z": 0.0})
             fields = {"kind": "object", "geometry": f"{file}.{name}", "transforms": moves, "material": None}
             place_child(make(Object, fields), where, inside, session)
         place_called(inside, block, env, where, out, session)

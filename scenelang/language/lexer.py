@@ -23,6 +23,7 @@ from scenelang.language.diagnostics import (
     Span,
     removal,
 )
+from scenelang.language.foreign import SIGNS, UNIT_NAMES
 from scenelang.language.tables import END, tables
 from scenelang.language.words import UNITS
 
@@ -31,13 +32,6 @@ MAX_MISTAKES = 200
 
 Token = tuple[int, int, int]
 """Kind, start and end."""
-
-UNIT_ALIASES = {"degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad"}
-UNIT_ALIASES |= {"turns": "turn", "sec": "s", "second": "s", "seconds": "s", "msec": "ms"}
-FOREIGN = {"**": "^", "===": "==", "!==": "!=", "<>": "!=", "&": "&&", "|": "||", "−": "-", "–": "-"}
-FOREIGN |= {"×": "*", "·": "*", "÷": "/", "≤": "<=", "≥": ">=", "≠": "!="}
-FOREIGN |= {"；": ";", "，": ",", "（": "(", "）": ")", "：": ":"}
-"""Operators and punctuation of other languages and keyboards: what is written here instead."""
 
 # Possessive throughout: a text that matches nothing must not be tried in every way of splitting it.
 _SKIP = r"(?:[\s\ufeff]+|//[^\n]*+|/\*[\s\S]*?\*/)*+"
@@ -51,23 +45,31 @@ _SLIPS = {
     "hash": r"#[ \t!#][^\n]*+|#(?=\n|\Z)|(?<![^\n])#\w++[ \t]++[A-Za-z0-9][^\n]*+",
     "colour": r"#\w*+",
     "name": r"[^\W\d]\w*+",
-    "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in FOREIGN if text not in "&|"),
+    "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in SIGNS if text not in "&|"),
 }
 _SAID = {
     "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
-    "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
-    "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
+    "close_comment": ("", "E0115", "end of a comment that was never opened", None),
+    "open_string": ("STRING", "E0114", "string is never closed", 'a string ends with `"` on its line'),
+    "quotes": ("STRING", "E0123", "string in the wrong quotes", 'strings stand in `"`'),
+    "number": ("NUMBER", "E0116", "`{}` is not a number", None),
     "variable": (
         "NAME",
         "E0113",
         "illegal name `{}`",
         "names have no `$`; in place of `$fn` write s.disc(0.3, sides = 64)",
     ),
+    "hash": ("", "E0127", "`#` does not begin a comment", "comments begin with `//`"),
+    "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
+    "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
+    "foreign": ("", "E0127", "`{}` is not used here", None),
+    "illegal": ("", "E0113", "illegal character `{}`", None),
 }
-"""Slips without a fix: what stands in their place, code, message, help."""
+"""What stands in the place of each slip, code, message, help."""
 _LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
 """Text that may follow a string whose end is known though its quote is missing."""
+_CONSTANT = re.compile(r"#(?:define|declare|local)[ \t]+([A-Za-z_]\w*)[ \t]*=?[ \t]*([^;/\n]+);?")
 _ILLEGAL = r"[^\s\w\x21-\x7e]+|[@$\\~`]+|[\s\S]"
 
 
@@ -134,6 +136,32 @@ class Tokens:
     def text(self, index: int) -> str:
         return self.source.text[self.starts[index] : self.ends[index]]
 
+    def name(self, index: int) -> str:
+        """Name of a token's kind: the text itself of a literal."""
+        return tables().kinds[self.kinds[index]]
+
+    def head(self, index: int, most: int | None = None) -> int:
+        """Index of the first token of the statement that ``index`` ends or goes on, at most so many back."""
+        last = 0 if most is None else max(0, index - most)
+        while index > last and self.name(index - 1) not in (";", "{", "}"):
+            index -= 1
+        return index
+
+    def unmatched(self, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
+        """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
+        names, opening, closing = tables().kinds, (*pairs[::2],), (*pairs[1::2],)
+        open_: list[int] = []
+        stray: list[int] = []
+        for index in range(first, stop):
+            name = names[self.kinds[index]]
+            if name in opening:
+                open_.append(index)
+            elif name in closing and open_:
+                open_.pop()
+            elif name in closing:
+                stray.append(index)
+        return open_, stray
+
     def place(self, first: int, stop: int = 0) -> tuple[int, int]:
         """Start and end of a token, or of those before ``stop``."""
         return self.starts[first], self.ends[(stop or first + 1) - 1]
@@ -193,7 +221,6 @@ def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
     kinds, starts, ends = tokens.kinds, tokens.starts, tokens.ends
     stop = len(text) if stop is None else stop
     keyword = literals.get
-    slips = _Slips(tokens, report)
     for match in pattern.finditer(text, 0, stop):
         group = match.lastindex
         if group is None:
@@ -206,7 +233,7 @@ def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
         else:
             kind = group_kinds[group]
             if kind < 0:
-                slips.read(names[group], start, end)
+                _read_slip(tokens, report, names[group], start, end)
                 if tokens.cut:
                     break
                 continue
@@ -217,102 +244,67 @@ def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
     return tokens
 
 
-class _Slips:
-    """Reports each slip and stands something sound in its place."""
-
-    def __init__(self, tokens: Tokens, report: Report) -> None:
-        self.tokens = tokens
-        self.report = report
-
-    def read(self, name: str, start: int, end: int) -> None:
-        text = self.tokens.source.text[start:end]
-        if name not in _SAID:
-            handler: Callable[[int, int, str], None] = getattr(self, f"_{name}")
-            handler(start, end, text)
-            return
-        kind, code, message, help = _SAID[name]
-        if name == "colour" and re.fullmatch("#(?:[0-9a-fA-F]{4}){1,2}", text):
-            help = f"colours have no alpha: write {text[: 1 + (len(text) - 1) * 3 // 4]}"
-        elif text == "$t":
-            help = "the share of an animation that has run is `u`, after animate(seconds = 2, fps = 24);"
-        if kind:
-            self._keep(kind, start, end)
-        self.tokens.cut |= name == "open_comment"
-        self.report.add(code, message.format(text), start, end, help=help)
-
-    def _keep(self, kind: str, start: int, end: int) -> None:
-        self.tokens.append(tables().kind(kind), start, end)
-        self.tokens.reported.add(start)
-
-    def _close_comment(self, start: int, end: int, text: str) -> None:
-        self.report.add("E0115", "end of a comment that was never opened", start, end, fix="")
-
-    def _open_string(self, start: int, end: int, text: str) -> None:
-        self._keep("STRING", start, end)
-        sure = end - start > 1 and _AFTER_STRING.match(self.tokens.source.text, end)
-        fix = self.report.change(end, end, '"') if sure else None
-        help = 'a string ends with `"` on its line'
-        self.report.add("E0114", "string is never closed", start, end, help=help, fix=fix)
-
-    def _quotes(self, start: int, end: int, text: str) -> None:
-        self._keep("STRING", start, end)
-        fix = None if '"' in text or "\\" in text else f'"{text[1:-1]}"'
-        help = 'strings stand in `"`'
-        self.report.add("E0123", "string in the wrong quotes", start, end, help=help, fix=fix)
-
-    def _number(self, start: int, end: int, text: str) -> None:
-        if re.fullmatch("0[xX][0-9a-fA-F]{6}", text):
-            self._keep("COLOR", start, end)
-            self.report.add(
-                "E0116", f"`{text}` is not a number", start, end, help="this is a colour", fix=f"#{text[2:]}"
-            )
-            return
-        self._keep("NUMBER", start, end)
-        result = re.match(r"([0-9]*\.?[0-9]*)(.*)", text, re.DOTALL)
-        value, rest = result.groups() if result else ("", text)
-        message, fix = f"`{text}` is not a number", None
-        help = "numbers look like `1`, `0.5` or `1e-3`"
-        if rest in ("f", "F"):
-            help, fix = "numbers have no type", value
-        elif re.fullmatch("(?:_[0-9]+)+", rest):
-            help, fix = "digits are not grouped", text.replace("_", "")
-        elif rest and not rest.startswith((".", "e", "E")):
-            message = f"`{rest}` is not a unit"
-            if rest in UNIT_ALIASES:
-                fix, help = value + UNIT_ALIASES[rest], f"it is `{UNIT_ALIASES[rest]}` here"
-            elif rest in _LENGTHS:
-                help = "lengths have no unit: the shorter side of the canvas is 2, its middle 0"
-            elif re.fullmatch("x[0-9]+", rest):
-                help = f"sides are separated by a comma: {value}, {rest[1:]}"
-            else:
-                units = ", ".join(f"`{unit}`" for unit in UNITS)
-                help = f"units are {units}; a product is written with `*`"
-        self.report.add("E0116", message, start, end, help=help, fix=fix)
-
-    def _hash(self, start: int, end: int, text: str) -> None:
-        constant = re.fullmatch(
-            r"#(?:define|declare|local)[ \t]+([A-Za-z_]\w*)[ \t]*=?[ \t]*([^;/\n]+);?", text
-        )
-        if constant:
-            bound = f"let {constant[1]} = {constant[2].rstrip()};"
-            self.report.add("E0133", "names are bound by `let`", start, end, fix=bound)
-            return
+def _read_slip(tokens: Tokens, report: Report, name: str, start: int, end: int) -> None:
+    """Report a slip and stand something sound in its place."""
+    kind, code, message, help = _SAID[name]
+    text = shown = tokens.source.text[start:end]
+    fix: Fix | str | None = None
+    stop = end
+    if name == "open_comment":
+        tokens.cut = True
+    elif name == "close_comment":
+        fix = ""
+    elif name == "open_string" and end - start > 1 and _AFTER_STRING.match(tokens.source.text, end):
+        fix = report.change(end, end, '"')
+    elif name == "quotes" and not ('"' in text or "\\" in text):
+        fix = f'"{text[1:-1]}"'
+    elif name == "number" and re.fullmatch("0[xX][0-9a-fA-F]{6}", text):
+        kind, help, fix = "COLOR", "this is a colour", f"#{text[2:]}"
+    elif name == "number":
+        message, help, fix = _number_advice(text)
+    elif name == "colour" and re.fullmatch("#(?:[0-9a-fA-F]{4}){1,2}", text):
+        help = f"colours have no alpha: write {text[: 1 + (len(text) - 1) * 3 // 4]}"
+    elif text == "$t":
+        help = "the share of an animation that has run is `u`, after animate(seconds = 2, fps = 24);"
+    elif name == "hash" and (constant := _CONSTANT.fullmatch(text)):
+        code, message, help = "E0133", "names are bound by `let`", None
+        fix = f"let {constant[1]} = {constant[2].rstrip()};"
+    elif name == "hash":
+        stop = start + 1
         fix = None if text.rstrip().endswith((";", "{", "}")) else "//"  # OpenSCAD marks objects by it
-        message, help = "`#` does not begin a comment", "comments begin with `//`"
-        self.report.add("E0127", message, start, start + 1, help=help, fix=fix)
-
-    def _foreign(self, start: int, end: int, text: str) -> None:
-        new = FOREIGN[text]
-        self._keep(new, start, end)
-        message, help = f"`{text}` is not used here", f"`{new}` is the sign for it"
-        self.report.add("E0127", message, start, end, help=help, fix=new)
-
-    def _illegal(self, start: int, end: int, text: str) -> None:
-        self.tokens.reported.add(start)
+    elif name == "foreign":
+        kind = fix = SIGNS[text]
+        help = f"`{kind}` is the sign for it"
+    elif name == "illegal":
+        tokens.reported.add(start)
         shown = text if text.isprintable() else " ".join(f"U+{ord(c):04X}" for c in text[:8])
-        unseen = all(category(c) in ("Cf", "Cc") for c in text)  # comes along when text is copied
-        help, fix = ("it cannot be seen", "") if unseen else (None, None)
-        self.report.add("E0113", f"illegal character `{shown}`", start, end, help=help, fix=fix)
+        if all(category(c) in ("Cf", "Cc") for c in text):  # comes along when text is copied
+            help, fix = "it cannot be seen", ""
+    if kind:
+        tokens.append(tables().kind(kind), start, end)
+        tokens.reported.add(start)
+    report.add(code, message.format(shown), start, stop, help=help, fix=fix)
+
+
+def _number_advice(text: str) -> tuple[str, str, str | None]:
+    """Message, help and fix for a number that is none, or has something behind its digits."""
+    value, rest = re.findall(r"^([0-9]*\.?[0-9]*)(.*)", text)[0]
+    message = f"`{text}` is not a number"
+    if rest in ("f", "F"):
+        return message, "numbers have no type", value
+    if re.fullmatch("(?:_[0-9]+)+", rest):
+        return message, "digits are not grouped", text.replace("_", "")
+    if not rest or rest.startswith((".", "e", "E")):
+        return message, "numbers look like `1`, `0.5` or `1e-3`", None
+    message = f"`{rest}` is not a unit"
+    if rest in UNIT_NAMES:
+        return message, f"it is `{UNIT_NAMES[rest]}` here", value + UNIT_NAMES[rest]
+    if rest in _LENGTHS:
+        return message, "lengths have no unit: the shorter side of the canvas is 2, its middle 0", None
+    if re.fullmatch("x[0-9]+", rest):
+        return message, f"sides are separated by a comma: {value}, {rest[1:]}", None
+    units = ", ".join(f"`{unit}`" for unit in UNITS)
+    return message, f"units are {units}; a product is written with `*`", None
 
 
 LOOKAHEAD = 8

@@ -8,20 +8,11 @@ from typing import Any, Final
 
 from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
-from scenelang.language import advice, nodes, scopes, tree, words
+from scenelang.language import advice, expressions, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
-from scenelang.language.expressions import (
-    POISONED,
-    VARIES,
-    Code,
-    Given,
-    bind,
-    prepare_arguments,
-    value_of,
-    wrong_kind,
-)
+from scenelang.language.expressions import POISONED, Code, Given, bind
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
 from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, singular
@@ -73,63 +64,24 @@ def _opaque(value: Any, operand: int, what: str = "colour") -> tuple[float, ...]
     return rgb
 
 
-def _side(value: Any, operand: int) -> int:
-    side = number(value, operand)
-    if not side.is_integer() or not 1 <= side <= MAX_SIDE_PX:
-        message = f"a canvas side of {show(side)} is not a whole number in 1..{MAX_SIDE_PX}"
-        raise Problem("E0311", message, operand=operand)
-    return int(side)
+def _within(
+    fits: Callable[[float], bool], message: str, help: str | None = None, code: str = "E0311"
+) -> Callable[[Any, int], float]:
+    """The reader of a number that fits; the message has ``{}`` for one that does not."""
 
+    def read(value: Any, operand: int) -> float:
+        given = number(value, operand)
+        if not fits(given):
+            raise Problem(code, message.format(show(given)), help, operand)
+        return given
 
-def _share(value: Any, operand: int) -> float:
-    share = number(value, operand)
-    if not 0.0 <= share <= 1.0:
-        raise Problem("E0311", f"an opacity of {show(share)} is outside 0..1", operand=operand)
-    return share
-
-
-def _samples(value: Any, operand: int) -> int:
-    count = number(value, operand)
-    if count not in SAMPLES:
-        raise Problem("E0311", f"{show(count)} samples a pixel, where it takes 4 or 16", operand=operand)
-    return int(count)
-
-
-def _positive(value: Any, operand: int, what: str) -> float:
-    size = float(value.size) if value.__class__ is Time and what == "length" else number(value, operand)
-    if size <= 0.0:
-        raise Problem("E0311", f"a {what} of {show(size)} is not above 0", operand=operand)
-    return size
+    return read
 
 
 def _boolean(value: Any, operand: int) -> bool:
     if value.__class__ is bool:
         return value
     raise unexpected("a boolean", value, operand=operand)
-
-
-def _factor(value: Any, operand: int) -> float:
-    factor = number(value, operand)
-    if factor == 0.0:
-        help = "decimals stand behind a point, as in 0.5"
-        raise Problem("E0312", "a scale by 0 flattens what it moves", help, operand)
-    return factor
-
-
-def _growth(value: Any, operand: int) -> float:
-    growth = number(value, operand)
-    if not -0.5 <= growth <= 1.0:
-        help = "r is in units of the leaf, before any scale"
-        raise Problem("E0311", f"a growth of {show(growth)} is outside -0.5..1", help, operand)
-    return growth
-
-
-def _wall(value: Any, operand: int) -> float:
-    wall = number(value, operand)
-    if not 0.0 < wall <= 1.0:
-        help = "w is in units of the leaf, before any scale"
-        raise Problem("E0311", f"a wall of {show(wall)} is not above 0 and at most 1", help, operand)
-    return wall
 
 
 def _axis(value: Any, operand: int) -> tuple[float, ...]:
@@ -157,25 +109,39 @@ def _rows(rows: Any, operand: int) -> tuple[tuple[float, ...], ...]:
     return values
 
 
+_LEAF_UNITS: Final = "{} is in units of the leaf, before any scale"
+_side = _within(
+    lambda side: side.is_integer() and 1 <= side <= MAX_SIDE_PX,
+    f"a canvas side of {{}} is not a whole number in 1..{MAX_SIDE_PX}",
+)
+_samples = _within(lambda count: count in SAMPLES, "{} samples a pixel, where it takes 4 or 16")
+_seconds = _within(lambda seconds: seconds > 0.0, "a length of {} is not above 0")
+
 KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "number": number,
     "angle": angle,
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
-    "factor": _factor,
-    "growth": _growth,
-    "wall": _wall,
+    "factor": _within(
+        bool, "a scale by 0 flattens what it moves", "decimals stand behind a point, as in 0.5", "E0312"
+    ),
+    "growth": _within(
+        lambda r: -0.5 <= r <= 1.0, "a growth of {} is outside -0.5..1", _LEAF_UNITS.format("r")
+    ),
+    "wall": _within(
+        lambda w: 0.0 < w <= 1.0, "a wall of {} is not above 0 and at most 1", _LEAF_UNITS.format("w")
+    ),
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,
     "colour": color,
     "opaque": _opaque,
     "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
-    "side": _side,
-    "share": _share,
-    "samples": _samples,
-    "seconds": lambda value, at: _positive(value, at, "length"),
-    "fps": lambda value, at: _positive(value, at, "frame rate"),
+    "side": lambda value, at: int(_side(value, at)),
+    "share": _within(lambda share: 0.0 <= share <= 1.0, "an opacity of {} is outside 0..1"),
+    "samples": lambda value, at: int(_samples(value, at)),
+    "seconds": lambda value, at: _seconds(value.size if value.__class__ is Time else value, at),
+    "fps": _within(lambda rate: rate > 0.0, "a frame rate of {} is not above 0"),
     "boolean": _boolean,
 }
 """Readers of arguments by their kinds in `words`: the value in base units; each raises Problem."""
@@ -270,7 +236,7 @@ def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
 def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     name, report = stmt.name.text, place.report
-    given = prepare_arguments(stmt.args, place, name)
+    given = expressions.prepare_arguments(stmt.args, place, name)
     spec = _spec(stmt, place)
     if spec is None:
         return None
@@ -345,7 +311,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
         if (name := spec.word.name) in words.PROPERTIES:
             first = out.properties.setdefault(name, (span, node))[0]
             if first is not span:
-                _twice(name, span, first, session.report)
+                given_twice(name, span, first, session.report)
             return
         if out.moved is None:
             out.moved = span  # even by a transform with a mistake: children have their order all the same
@@ -356,7 +322,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
             if session.watch is not None:
                 session.watch(stmt.span, node)
 
-    if all(one is None or one.code.value is not VARIES for one in bound):
+    if all(one is None or one.code.value is not expressions.VARIES for one in bound):
         place.file.weight += SAME_MOVE
         constants = [LEFT_OUT if one is None else one.code.value for one in bound]
         created: list[Any] = []
@@ -377,9 +343,10 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: P
     return action
 
 
-def _twice(name: str, span: Span, first: Span, report: Reporter) -> None:
+def given_twice(what: str, span: Span, first: Span, report: Reporter, more: str = "") -> None:
     labels = (Label(first, "first given here"),)
-    report.error("E0333", f"`{name}` is given twice", span, labels=labels, help="leave one of them out")
+    help = f"leave one of them out{more}"
+    report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
 
 
 def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
@@ -485,11 +452,11 @@ def _called(name: tree.Name, place: Place) -> str | None:
     if binding is None:
         advice.unknown(name, place)
     elif binding.kind not in ("import", "poison"):
-        wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
+        expressions.wrong_kind(tree.Name(name.span, alias), binding, place, "an imported file")
     elif own is not None and own.kind in scopes.VALUES:
         _is_value(name, place)
     elif own is not None:
-        wrong_kind(name, own, place, "a material")
+        expressions.wrong_kind(name, own, place, "a material")
     else:
         advice.unknown_member(name, place, exported, "material")
     return None
@@ -574,7 +541,7 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action
     """``mist;`` or ``mist { hue(0.1turn); }``: the block's operations come after the value's own."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     operations = _operations(stmt.body, place)
-    get = value_of(stmt.name, binding, place).run
+    get = expressions.value_of(stmt.name, binding, place).run
     if stmt.args:
         session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
         return None

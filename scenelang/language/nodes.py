@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from math import atan, degrees, nextafter, pi
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, overload
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, dataclass_transform, overload
 
 from pydantic import (
     AfterValidator,
@@ -19,6 +19,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     Tag,
     ValidationError,
@@ -163,6 +164,12 @@ def _decoded(name: str, text: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
+def _kind(word: str, *, init: Literal[False] = False) -> Any:
+    """The field that tells nodes apart in data, while Python's constructors know it."""
+    return Field(default=word)
+
+
+@dataclass_transform(field_specifiers=(Field, PrivateAttr, _kind))  # fields may go without their names
 class Frozen(BaseModel):
     """Base of all nodes of a Scene."""
 
@@ -241,8 +248,8 @@ class Brief(Frozen):
 class _Turn(Frozen):
     """A turn, whose angle does not go without a word on its unit."""
 
-    kind: str
-    angle: Radians
+    kind: str = _kind("")
+    angle: Radians = Field(kw_only=True)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
@@ -256,25 +263,17 @@ class _Turn(Frozen):
 class Translate(Frozen):
     """A move; z is for 3D models."""
 
-    kind: Literal["translate"] = "translate"
+    kind: Literal["translate"] = _kind("translate")
     x: Length
     y: Length
     z: Length = 0.0
-
-    if TYPE_CHECKING:
-
-        def __init__(self, x: float, y: float, z: float = 0.0) -> None: ...
 
 
 class Rotate(_Turn):
     """A turn by ``angle`` radians, counter-clockwise, about ``axis`` (any length but 0)."""
 
-    kind: Literal["rotate"] = "rotate"
-    axis: Axis = (0.0, 0.0, 1.0)
-
-    if TYPE_CHECKING:
-
-        def __init__(self, *, angle: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> None: ...
+    kind: Literal["rotate"] = _kind("rotate")
+    axis: Axis = Field(default=(0.0, 0.0, 1.0), kw_only=True)
 
     @classmethod
     def degrees(cls, angle_deg: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Rotate:
@@ -285,7 +284,7 @@ class Rotate(_Turn):
 class Scale(Frozen):
     """Factors along the axes, as in text: one alone is for all three, and z is 1 where two are given."""
 
-    kind: Literal["scale"] = "scale"
+    kind: Literal["scale"] = _kind("scale")
     x: Factor
     y: Factor
     z: Factor
@@ -311,19 +310,15 @@ class Scale(Frozen):
 class Shear(Frozen):
     """``xy``: x += k y, and so on."""
 
-    kind: Literal["shear"] = "shear"
+    kind: Literal["shear"] = _kind("shear")
     axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"]
     k: Finite
-
-    if TYPE_CHECKING:
-
-        def __init__(self, axes: Literal["xy", "xz", "yx", "yz", "zx", "zy"], k: float) -> None: ...
 
 
 class Matrix(Frozen):
     """A 4 x 4 affine, rows, for column vectors; the last row is 0 0 0 1."""
 
-    kind: Literal["matrix"] = "matrix"
+    kind: Literal["matrix"] = _kind("matrix")
     rows: Affine
 
     if TYPE_CHECKING:
@@ -334,91 +329,68 @@ class Matrix(Frozen):
 class _Warp(Frozen):
     """A turn whose angle grows along something."""
 
-    kind: str
+    kind: str = _kind("")
     k: Rate
 
 
 class Twirl(_Warp):
     """A turn that grows with the distance from the origin."""
 
-    kind: Literal["twirl"] = "twirl"
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
+    kind: Literal["twirl"] = _kind("twirl")
 
 
 class Bend(_Warp):
     """A turn that grows along x."""
 
-    kind: Literal["bend"] = "bend"
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
+    kind: Literal["bend"] = _kind("bend")
 
 
 class Twist(_Warp):
     """A turn of (x, z) that grows along y; for 3D models."""
 
-    kind: Literal["twist"] = "twist"
-
-    if TYPE_CHECKING:
-
-        def __init__(self, k: float) -> None: ...
+    kind: Literal["twist"] = _kind("twist")
 
 
 class Displace(Frozen):
     """Adds ``amount`` sin(f x) sin(f y) sin(f z) to the distance, f being ``frequency``; for 3D models."""
 
-    kind: Literal["displace"] = "displace"
+    kind: Literal["displace"] = _kind("displace")
     amount: Length
     frequency: Annotated[Finite, Field(description="radians per world unit")]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, amount: float, frequency: float) -> None: ...
 
 
 class Grow(Frozen):
     """Takes ``r`` off the leaf's own distance, so that its edge moves out by it; first, before any move."""
 
-    kind: Literal["grow"] = "grow"
+    kind: Literal["grow"] = _kind("grow")
     r: Annotated[Finite, Field(ge=-0.5, le=1, description="leaf units; below 0 the leaf shrinks")]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, r: float) -> None: ...
 
 
 class Shell(Frozen):
     """Keeps what is within ``w`` / 2 of the leaf's edge; first, before any move."""
 
-    kind: Literal["shell"] = "shell"
+    kind: Literal["shell"] = _kind("shell")
     w: Annotated[Finite, Field(gt=0, le=1, description="leaf units; half on either side of the edge")]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, w: float) -> None: ...
 
 
 Transform = Annotated[
     Translate | Rotate | Scale | Shear | Matrix | Twirl | Bend | Twist | Displace | Grow | Shell,
     Field(discriminator="kind"),
 ]
+Moves = Iterable[Transform] | Transform
 Transforms = Annotated[tuple[Transform, ...], Field(description="in order, nearest the leaf first")]
 
 
 class Flip(Frozen):
     """x to -x."""
 
-    kind: Literal["flip"] = "flip"
+    kind: Literal["flip"] = _kind("flip")
 
 
 class Color(Frozen):
     """Multiplies by ``rgb``."""
 
-    kind: Literal["color"] = "color"
+    kind: Literal["color"] = _kind("color")
     rgb: Rgb
 
     if TYPE_CHECKING:
@@ -434,22 +406,14 @@ class Color(Frozen):
 class Grayscale(Frozen):
     """Mixes with the luma."""
 
-    kind: Literal["grayscale"] = "grayscale"
+    kind: Literal["grayscale"] = _kind("grayscale")
     amount: Annotated[Finite, Field(description="0 keeps the colour, 1 is grey")]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, amount: float) -> None: ...
 
 
 class Hue(_Turn):
     """An HSV hue shift by ``angle`` radians."""
 
-    kind: Literal["hue"] = "hue"
-
-    if TYPE_CHECKING:
-
-        def __init__(self, *, angle: float) -> None: ...
+    kind: Literal["hue"] = _kind("hue")
 
     @classmethod
     def degrees(cls, angle_deg: float) -> Hue:
@@ -460,7 +424,7 @@ class Hue(_Turn):
 class Stop(Frozen):
     """A stop of a gradient: the colour ``rgb`` at ``offset``."""
 
-    kind: Literal["stop"] = "stop"
+    kind: Literal["stop"] = _kind("stop")
     offset: Share
     rgb: Rgb
 
@@ -473,6 +437,7 @@ MaterialOp = Annotated[
     Translate | Rotate | Scale | Shear | Flip | Color | Grayscale | Hue | Stop,
     Field(discriminator="kind"),
 ]
+Inks = Iterable[MaterialOp] | MaterialOp | str
 
 
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
@@ -488,11 +453,7 @@ class Camera(Frozen):
 
     eye: Point = (0.0, 1.2, 6.0)
     target: Point = (0.0, 0.0, 0.0)
-    fov: Annotated[Radians, Field(gt=0, lt=pi)] = 2.0 * atan(1.0 / 3.0)
-
-    if TYPE_CHECKING:
-
-        def __init__(self, eye: Triple = ..., target: Triple = ..., *, fov: float = ...) -> None: ...
+    fov: Annotated[Radians, Field(gt=0, lt=pi)] = Field(default=2.0 * atan(1.0 / 3.0), kw_only=True)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:
@@ -562,11 +523,7 @@ class Material(Brief):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            name: str,
-            ops: Iterable[MaterialOp] | MaterialOp | str = (),
-            shading: str | None = None,
-            opacity: float = 1.0,
+            self, name: str, ops: Inks = (), shading: str | None = None, opacity: float = 1.0
         ) -> None: ...
 
     @classmethod
@@ -585,7 +542,7 @@ class Material(Brief):
 class Object(Frozen):
     """A leaf geometry, its transforms nearest the leaf first, and its material."""
 
-    kind: Literal["object"] = "object"
+    kind: Literal["object"] = _kind("object")
     geometry: Annotated[Dotted, Field(description="a leaf geometry of the model, or an element's")]
     transforms: Transforms = ()
     material: Material | None = None
@@ -593,17 +550,14 @@ class Object(Frozen):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            geometry: str,
-            transforms: Iterable[Transform] | Transform = (),
-            material: Material | None = None,
+            self, geometry: str, transforms: Moves = (), material: Material | None = None
         ) -> None: ...
 
 
 class Group(Frozen):
     """Children as a union in order, then transforms that apply to all of them."""
 
-    kind: Literal["group"] = "group"
+    kind: Literal["group"] = _kind("group")
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
     material: Material | None = None
@@ -611,10 +565,7 @@ class Group(Frozen):
     if TYPE_CHECKING:
 
         def __init__(
-            self,
-            children: Iterable[SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
-            material: Material | None = None,
+            self, children: Nodes = (), transforms: Moves = (), material: Material | None = None
         ) -> None: ...
 
 
@@ -644,7 +595,7 @@ class _Joining(Frozen):
 class Boolean(_Joining):
     """A boolean node over its children, folded left; ``k`` is the width of its blend."""
 
-    kind: Literal["boolean"] = "boolean"
+    kind: Literal["boolean"] = _kind("boolean")
     op: Combine
     children: tuple[SceneNode, ...] = ()
     transforms: Transforms = ()
@@ -656,8 +607,8 @@ class Boolean(_Joining):
         def __init__(
             self,
             op: Combine,
-            children: Iterable[SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
+            children: Nodes = (),
+            transforms: Moves = (),
             material: Material | None = None,
             k: float | None = None,
         ) -> None: ...
@@ -666,7 +617,7 @@ class Boolean(_Joining):
 class Link(_Joining):
     """One child of a chain with the word that joins it to what came before (first: union)."""
 
-    op: Combine = "union"
+    op: Combine = Field(default="union", kw_only=True)
     node: SceneNode
     k: Blend | None = None
 
@@ -682,7 +633,7 @@ class Link(_Joining):
 class Chain(Frozen):
     """The streamed form: children in order, each with its boolean word."""
 
-    kind: Literal["chain"] = "chain"
+    kind: Literal["chain"] = _kind("chain")
     children: Annotated[tuple[Link, ...], Field(json_schema_extra=first_joins_by_union)] = ()
     transforms: Transforms = ()
     material: Material | None = None
@@ -691,8 +642,8 @@ class Chain(Frozen):
 
         def __init__(
             self,
-            children: Iterable[Link | SceneNode] | SceneNode = (),
-            transforms: Iterable[Transform] | Transform = (),
+            children: Iterable[Link | SceneNode] | Nodes = (),
+            transforms: Moves = (),
             material: Material | None = None,
         ) -> None: ...
 
@@ -715,6 +666,7 @@ class Chain(Frozen):
 
 
 SceneNode = Annotated[Object | Group | Boolean | Chain, Field(discriminator="kind")]
+Nodes = Iterable[SceneNode] | SceneNode
 
 
 class Animation(Frozen):
@@ -723,10 +675,6 @@ class Animation(Frozen):
     seconds: Annotated[Finite, Field(gt=0)]
     fps: Annotated[Finite, Field(gt=0, description="frames per second")]
     loop: Annotated[bool, Field(strict=True, description="the last frame is followed by the first")] = True
-
-    if TYPE_CHECKING:
-
-        def __init__(self, seconds: float, fps: float, loop: bool = True) -> None: ...
 
     @model_validator(mode="after")
     def _is_bounded(self) -> Animation:

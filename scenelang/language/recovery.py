@@ -19,12 +19,11 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import Label, Span
-from scenelang.language.foreign import HEADS, OPERATORS
-from scenelang.language.habits import MAX_REPLAY, head, keywords_near, mend_habit
+from scenelang.language.foreign import HEADS, OPERATORS, UNIT_NAMES
+from scenelang.language.habits import MAX_REPLAY, head_word, keywords_near, mend_habit, quoted
 from scenelang.language.lexer import (
     LOOKAHEAD,
     MAX_MISTAKES,
-    UNIT_ALIASES,
     Report,
     Tokens,
     advance,
@@ -39,7 +38,7 @@ from scenelang.language.words import TRANSFORMS, UNITS
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
 _LONGEST: Final = 80  # so many places before the first misfit are tried
 _MOST: Final = 50  # slips of one text
-_INSTEAD: Final = (*"()[];,=", "BAD_EXPRESSION", "NAME", "*", ".", "..", ":", "in", "as")
+_INSTEAD: Final = "( ) [ ] ; , = BAD_EXPRESSION NAME * . .. : in as"
 """Tokens that a brace may be written for, likely ones first."""
 
 
@@ -49,32 +48,15 @@ def balance(tokens: Tokens, report: Report) -> None:
         for first, missing in reversed(_slips(tokens)):  # from the last on, so that indices hold
             _mend(tokens, report, first, missing)
     last = len(tokens.kinds) - 1
-    stray = _unmatched(tokens, last)[1]
+    stray = tokens.unmatched(last)[1]
     for at in stray:
         report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
     tokens.drop(stray)
     last -= len(stray)
-    open_ = _unmatched(tokens, last)[0]
+    open_ = tokens.unmatched(last)[0]
     if open_ and not tokens.cut:
         _report_unclosed(tokens, report, last, open_[-3:], len(open_))
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
-
-
-def _unmatched(tokens: Tokens, stop: int, first: int = 0, pairs: str = "{}") -> tuple[list[int], list[int]]:
-    """Indices of the brackets that are open before ``stop``, and of those that close nothing."""
-    signs = [tables().literals[sign] for sign in pairs]
-    opening, closing = signs[::2], signs[1::2]
-    open_: list[int] = []
-    stray: list[int] = []
-    for index in range(first, stop):
-        kind = tokens.kinds[index]
-        if kind in opening:
-            open_.append(index)
-        elif kind in closing and open_:
-            open_.pop()
-        elif kind in closing:
-            stray.append(index)
-    return open_, stray
 
 
 def _report_unclosed(tokens: Tokens, report: Report, at: int, open_: list[int], count: int = 1) -> None:
@@ -129,12 +111,11 @@ def _mend(tokens: Tokens, report: Report, first: int, missing: int) -> None:
     last = len(tokens.kinds) - 1
     stop = last if newline < 0 else bisect_left(tokens.starts, newline, first + 1)
     repair = _best(tokens, first, stop, missing)
-    names = [tables().kinds[kind] for kind in repair.insert]
     end = tokens.end_before(repair.at)
-    if names == ["{"] and not repair.delete:
+    if repair.insert == _kinds("{") and not repair.delete:
         report.add("E0106", "missing `{`", end, end, fix=" {")
-    elif names == ["}"] and not repair.delete:
-        _report_unclosed(tokens, report, repair.at, _unmatched(tokens, repair.at)[0][-1:])
+    elif repair.insert == _kinds("}") and not repair.delete:
+        _report_unclosed(tokens, report, repair.at, tokens.unmatched(repair.at)[0][-1:])
     else:
         report_repair(tokens, report, repair, [])
     tokens.replace(repair.at, repair.delete, repair.insert)
@@ -147,7 +128,11 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
     while kinds[limit] in (opening, closing):
         limit += 1
     end = min(limit + _BEHIND, len(kinds) - 1)
-    stack = _inside(kinds, first)
+    other = _kinds("else")[0]
+    words = "if ( NAME ) {" if other in kinds[first : first + 2] else "NAME {"
+    stack = [tables().start]
+    for kind in _kinds(words) * 40 + _kinds("}") * (kinds[first] == other):
+        advance(stack, kind)  # deep inside blocks, where all that a line can close fits
     misfit = min(reach(stack.copy(), kinds, first, end), limit)
     places = range(max(first, misfit - _LONGEST), misfit + 1)
     reach(stack, kinds, first, places.start)
@@ -170,39 +155,27 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
     return best
 
 
-def _inside(kinds: list[int], first: int) -> list[int]:
-    """The states deep inside blocks: all that a line can close fits there."""
-    words = "if ( NAME ) {" if tables().literals["else"] in kinds[first : first + 2] else "NAME {"
-    stack = [tables().start]
-    for kind in _kinds(words) * 40:
-        advance(stack, kind)
-    if kinds[first] == tables().literals["else"]:
-        advance(stack, tables().literals["}"])
-    return stack
-
-
 def _mends(
     tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
 ) -> Iterator[Repair]:
     """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
-    literals, kind = tables().literals, tokens.kinds[at]
-    closes = missing == literals["}"]
-    surplus = literals["{" if closes else "}"]
+    (brace,), (end,) = _kinds("}"), _kinds(";")
+    closes, name = missing == brace, tokens.name(at)
     if at <= stop:
         yield Repair(at, 0, (missing,), -0.3)
-    if at == stop and not fits(stack, literals["}"]):  # the line breaks off
-        rest = completion(stack, literals[";" if closes else "{"])
+    if at == stop and not fits(stack, brace):  # the line breaks off
+        rest = completion(stack, end if closes else missing)
         if rest is not None and (closes or rest):
-            yield Repair(at, 0, (*rest, *((literals[";"],) if closes else ()), missing), -0.6)
+            yield Repair(at, 0, (*rest, end, missing) if closes else (*rest, missing), -0.6)
     elif at == stop and closes:
-        yield Repair(at, 0, (missing, literals[";"]), -0.25)
+        yield Repair(at, 0, (missing, end), -0.25)
     if at >= limit:
         return
-    if kind == surplus:
+    if name == ("{" if closes else "}"):
         yield Repair(at, 1, (), -0.2 if closes else -0.5 - 0.05 * tokens.on_new_line(at))
-        for rank, name in enumerate(_INSTEAD):
-            yield Repair(at, 1, (tables().kind(name),), 0.001 * rank - 0.1)
-    elif kind != missing:
+        for rank, kind in enumerate(_kinds(_INSTEAD)):
+            yield Repair(at, 1, (kind,), 0.001 * rank - 0.1)
+    elif tokens.kinds[at] != missing:
         yield Repair(at, 1, (missing,), -0.1)
 
 
@@ -248,6 +221,9 @@ _FLAT: Final = re.compile(r"[^()\[\]{};]*+")
 """The inside of brackets that holds no others: before a block, all of it belongs there."""
 _BEGINNINGS: Final = ("let", "param", "fn", "module")
 _DEFINITIONS: Final = ("let", "param", "fn")
+_CLOSES: Final = {"(": ")", "[": "]"}
+_FIXED: Final = ("{", "}", "$END")  # braces were matched before
+_ENDS: Final = (";", "}", "$END")
 _NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
 _CODES: Final = {
     **{")": "E0103", "]": "E0103", "}": "E0104", "{": "E0106", "BAD_EXPRESSION": "E0108"},
@@ -265,6 +241,7 @@ class Repair(Record):
     cost: float = 0
 
 
+@cache
 def _kinds(names: str) -> tuple[int, ...]:
     return tuple(map(tables().kind, names.split()))
 
@@ -275,25 +252,13 @@ def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
     return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
 
 
-@cache
-def _replacements() -> dict[int, dict[tuple[int, ...], float]]:
-    rows = _REPLACEMENTS.items()
-    return {tables().kind(old): {_kinds(new): cost for new, cost in row.items()} for old, row in rows}
-
-
 class Recovery:
     """Recovery for one file, whose tokens it edits."""
 
     def __init__(self, tokens: Tokens, report: Report) -> None:
         self.tokens = tokens
         self.report = report
-        self.literals = literals = tables().literals
         self.repairs = 0
-        self.closing_of = {literals["("]: literals[")"], literals["["]: literals["]"]}
-        self.fixed = {END, literals["{"], literals["}"]}  # braces were matched before
-        self.ends = {literals[";"], literals["}"], END}
-        self.name = tables().kind("NAME")
-        self.words = {kind for text, kind in literals.items() if text.isalpha()}
 
     def resume(self, states: list[int], values: list[Any], at: int) -> int | None:
         """Mend what does not fit at a token and cut the parser's stacks back to read its statement again.
@@ -305,32 +270,24 @@ class Recovery:
             return None
         depth = statement_depth(states)
         base = states[: depth + 1]
-        first = self._index(values[depth]) if depth < len(values) else at
-        if at - first <= MAX_REPLAY and mend_habit(self.tokens, self.report, base, first, at):
-            del states[depth + 1 :], values[depth:]
-            return first
-        if self._spaced_unit(at) or (first == at and self._start_mistake(at)):
+        begun = values[depth] if depth < len(values) else at
+        if not isinstance(begun, int):
+            span: Span = begun[1] if isinstance(begun, tuple) else begun.span
+            begun = bisect_left(self.tokens.starts, span.start)
+        first: int = begun
+        near = at - first <= MAX_REPLAY
+        mended = near and mend_habit(self.tokens, self.report, base, first, at)
+        if not mended and (self._spaced_unit(at) or (first == at and self._start_mistake(at))):
             return at
-        repair = self._search(base, states, first, at)
-        if repair is None:
-            del states[depth + 1 :], values[depth:]
-            return self._skip(first, at)
-        report_repair(self.tokens, self.report, repair, _unmatched(self.tokens, repair.at, first, "()[]")[0])
-        self.tokens.replace(repair.at, repair.delete, repair.insert)
-        if at - first > MAX_REPLAY:
-            return at
+        if not mended and (repair := self._search(base, states, first, at)) is not None:
+            open_ = self.tokens.unmatched(repair.at, first, "()[]")[0]
+            report_repair(self.tokens, self.report, repair, open_)
+            self.tokens.replace(repair.at, repair.delete, repair.insert)
+            if not near:
+                return at
+            mended = True
         del states[depth + 1 :], values[depth:]
-        return first
-
-    def _is(self, index: int, *texts: str) -> bool:
-        kinds = self.tokens.kinds
-        return index < len(kinds) and any(kinds[index] == self.literals[text] for text in texts)
-
-    def _index(self, value: Any) -> int:
-        if isinstance(value, int):
-            return value
-        span: Span = value[1] if isinstance(value, tuple) else value.span
-        return bisect_left(self.tokens.starts, span.start)
+        return first if mended else self._skip(first, at)
 
     # ------------------------------------------------------------ the best repair
 
@@ -339,131 +296,129 @@ class Recovery:
 
         ``base`` are the states before the statement, ``stack`` those at the mistake, used if it is too far.
         """
-        kinds = self.tokens.kinds
-        bound = next((i for i in range(at, at + FOLLOWED) if kinds[i] in self.ends), at + FOLLOWED)
+        tokens, kinds = self.tokens, self.tokens.kinds
+        bound = next((i for i in range(at, at + FOLLOWED) if tokens.name(i) in _ENDS), at + FOLLOWED)
 
         def worth(stop: int) -> float:  # tokens of later statements that fit count little
             own = min(stop, bound + 1) - at
             return own + 0.15 * (min(stop, at + FOLLOWED) - at - own)
 
-        attempts: list[tuple[float, float, Repair, list[int]]] = []
-
-        def attempt(stack: list[int], place: int, repairs: Iterator[Repair]) -> None:
-            cost = 0.1 + 0.1 * (at - place) if place < at else 0.0
+        far = at - first > MAX_REPLAY
+        before = (stack if far else base).copy()
+        prefixes = []
+        for place in range(at if far else first, at):  # the parser may have applied rules for the bad token
+            prefixes.append((place, before.copy()))
+            advance(before, kinds[place])
+        found = [(at, before, self._candidates(before, first, at))]
+        found += [(place, states, self._misspelt(first, place)) for place, states in prefixes[:1]]
+        for place, states in prefixes[-_WINDOW if len(self.report.found) < _THOROUGH else -1 :]:
+            if tokens.on_new_line(place) and (tokens.name(place) == "NAME" or tokens.name(place).islower()):
+                found.append((place, states, self._broken_off(states, place, 0.7 - 0.1 * (at - place))))
+            found.append((place, states, self._candidates(states, first, place)))
+        attempts = []
+        for place, states, repairs in found:
+            early = 0.1 + 0.1 * (at - place) if place < at else 0.0
             for repair in repairs:
-                trial = stack.copy()
+                trial = states.copy()
                 if not all(advance(trial, kind) for kind in repair.insert):
                     continue
                 end = repair.at + repair.delete
                 start = max(at, end)
                 stop = reach(trial.copy(), kinds, end, start + LOOKAHEAD)
-                if stop >= start + 3 or any(kind in self.ends for kind in kinds[start:stop]):
-                    attempts.append((worth(stop) - cost - repair.cost, cost + repair.cost, repair, trial))
-
-        def settle() -> Repair | None:
-            best: tuple[float, Repair | None] = (-inf, None)
-            for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
-                end = repair.at + repair.delete
-                score = worth(reach(trial.copy(), kinds, end, max(at, end) + FOLLOWED)) - cost
-                best = max(best, (score, repair), key=lambda one: one[0])
-            return best[1]
-
-        if at - first > MAX_REPLAY:
-            attempt(stack, at, self._candidates(stack, first, at))
-            return settle()
-        prefixes, prefix = [], base.copy()
-        for place in range(first, at):  # replayed: the parser may have applied rules for the bad token
-            prefixes.append((place, prefix.copy()))
-            advance(prefix, kinds[place])
-        attempt(prefix, at, self._candidates(prefix, first, at))
-        for place, stack in prefixes[:1]:
-            attempt(stack, place, self._misspelt(first, place))
-        for place, stack in prefixes[-_WINDOW:] if len(self.report.found) < _THOROUGH else prefixes[-1:]:
-            if self.tokens.on_new_line(place) and kinds[place] in (self.name, *self.words):
-                attempt(stack, place, self._broken_off(stack, place, 0.7 - 0.1 * (at - place)))
-            attempt(stack, place, self._candidates(stack, first, place))
-        return settle()
+                if stop >= start + 3 or any(tokens.name(index) in _ENDS for index in range(start, stop)):
+                    attempts.append((worth(stop) - early - repair.cost, early + repair.cost, repair, trial))
+        best, highest = None, -inf
+        for _, cost, repair, trial in sorted(attempts, key=lambda one: -one[0])[:8]:
+            end = repair.at + repair.delete
+            score = worth(reach(trial, kinds, end, max(at, end) + FOLLOWED)) - cost
+            if score > highest:
+                best, highest = repair, score
+        return best
 
     def _candidates(self, stack: list[int], first: int, at: int) -> Iterator[Repair]:
-        tokens, kinds, semicolon = self.tokens, self.tokens.kinds, self.literals[";"]
-        kind, new_line = kinds[at], tokens.on_new_line(at)
-        after = kinds[at + 1] if kind != END else END
-        open_ = _unmatched(tokens, at, first, "()[]")[0]
+        tokens, kind = self.tokens, self.tokens.kinds[at]
+        name, new_line = tokens.name(at), tokens.on_new_line(at)
+        following = at + (kind != END)
+        after = tokens.kinds[following]
+        open_ = [tokens.name(index) for index in tokens.unmatched(at, first, "()[]")[0]]
         if open_:
-            dangling = at - 1 == open_[-1] or self._is(at - 1, ",")  # nobody forgets to close these
-            closings = tuple(self.closing_of[kinds[index]] for index in reversed(open_))
-            yield Repair(at, 0, closings[:1], _CLOSING + dangling)
-            yield Repair(at, 0, closings, _CLOSING + dangling + 0.1 * len(closings))
-            yield Repair(at, 0, (*closings, semicolon), _CLOSING + 0.7 + dangling)
-            if kind not in self.fixed and kind not in self.closing_of.values():
-                yield Repair(at, 1, closings[:1], _CLOSING + dangling + _SUBSTITUTION)
+            cost = _CLOSING + (tokens.name(at - 1) in ("(", "[", ","))  # nobody forgets to close these
+            closings = _kinds(" ".join(_CLOSES[bracket] for bracket in reversed(open_)))
+            yield Repair(at, 0, closings[:1], cost)
+            yield Repair(at, 0, closings, cost + 0.1 * len(closings))
+            yield Repair(at, 0, (*closings, *_kinds(";")), cost + 0.7)
+            if name not in (*_FIXED, ")", "]"):
+                yield Repair(at, 1, closings[:1], cost + _SUBSTITUTION)
             if new_line:
-                yield Repair(at, 0, (closings[0], self.literals[","]), _CLOSING + 0.7 + dangling)
-        for insert, cost, following in _insertions():
-            after_string = at > 0 and kinds[at - 1] == tables().kind("STRING")
-            if not fits(stack, insert[0]) or (insert[0] == self.literals["as"] and not after_string):
+                yield Repair(at, 0, (closings[0], *_kinds(",")), cost + 0.7)
+        for insert, cost, needed in _insertions():
+            starts = tables().kinds[insert[0]]
+            behind = tokens.name(at - 1) if at else ""
+            if not fits(stack, insert[0]) or (starts == "as" and behind != "STRING"):
                 continue
-            if following in ((), (after,)) and kind not in self.fixed and insert != (kind,):
+            if needed in ((), (after,)) and name not in _FIXED and insert != (kind,):
                 yield Repair(at, 1, insert, cost + _SUBSTITUTION + _NEW_LINE * new_line + len(insert) - 1)
-            if insert[0] == semicolon and (new_line or kind in self.ends):
+            if starts == ";" and (new_line or name in _ENDS):
                 cost = 1.0
-            elif new_line and insert[0] not in self.ends:
+            elif new_line and starts not in _ENDS:
                 cost += _NEW_LINE / 2
-            if following in ((), (kind,)):
+            if needed in ((), (kind,)):
                 yield Repair(at, 0, insert, cost)
-        if new_line or kind in self.ends:
+        if new_line or name in _ENDS:
             yield from self._broken_off(stack, at)
-        if END not in (kind, after) and kind != after and not self.fixed.issuperset((kind, after)):
+        both = {name, tokens.name(following)}
+        if END not in (kind, after) and len(both) == 2 and not both <= {*_FIXED}:
             yield Repair(at, 2, (after, kind), _SWAP)
-        if kind in self.fixed:
+        if name in _FIXED:
             return
-        for insert, cost in _replacements().get(kind, {}).items():
-            header = kind == self.literals["="] and self._is(first, "fn", "module")
-            yield Repair(at, 1, insert, cost + 0.5 * header)
-        if kind in self.words:
-            yield Repair(at, 1, (self.name,), _MISSPELT + 0.2)
+        for meant, cost in _REPLACEMENTS.get(name, {}).items():
+            header = name == "=" and tokens.name(first) in ("fn", "module")
+            yield Repair(at, 1, _kinds(meant), cost + 0.5 * header)
+        if name.islower():
+            yield Repair(at, 1, _kinds("NAME"), _MISSPELT + 0.2)
         yield from self._misspelt(first, at)
         cost = _DELETION
         for last in range(at, at + 3):
             begins = tokens.on_new_line(last)
-            if kinds[last] in self.fixed or (last > at and (kinds[last] == semicolon or begins)):
+            if tokens.name(last) in _FIXED or (last > at and (tokens.name(last) == ";" or begins)):
                 return
             yield Repair(at, last + 1 - at, (), cost + _NEW_LINE * begins)
             cost += 0.6
 
     def _misspelt(self, first: int, at: int) -> Iterator[Repair]:
         """A keyword with a slip or of another language, or an operator written as a word."""
-        text = self.tokens.text(at) if self.tokens.kinds[at] == self.name else ""
+        text = self.tokens.text(at) if self.tokens.name(at) == "NAME" else ""
         for word in (OPERATORS.get(text), HEADS.get(text) if at == first else None, *keywords_near(text)):
             if text and word:
-                yield Repair(at, 1, (self.literals[word],), _MISSPELT)
+                yield Repair(at, 1, _kinds(word), _MISSPELT)
 
     def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
         """The line before a token breaks off in the middle of a statement."""
-        for goal, rest in ((";", ()), ("{", (self.literals["}"],))):
-            missing = completion(stack, self.literals[goal])
-            if missing or (missing is not None and goal == ";"):
-                yield Repair(at, 0, (*missing, self.literals[goal], *rest), cost + 0.05 * len(missing))
+        for end in (_kinds(";"), _kinds("{ }")):
+            missing = completion(stack, end[0])
+            if missing or (missing is not None and len(end) == 1):
+                yield Repair(at, 0, (*missing, *end), cost + 0.05 * len(missing))
 
     # ------------------------------------------------------------ mistakes with words of their own
 
     def _start_mistake(self, at: int) -> bool:
         """A token that no statement begins with."""
-        tokens, place = self.tokens, self.tokens.place(at)
-        if self._is(at, ";") and not self._is(at + 1, "{"):
+        tokens, place, name = self.tokens, self.tokens.place(at), self.tokens.name(at)
+        block = tokens.kinds[at] != END and tokens.name(at + 1) == "{"
+        if name == ";" and not block:
             self.report.add("W0101", "stray `;`", *place, help="no `;` follows a block", fix="")
-            tokens.replace(at, 1, [])
-        elif self._is(at, "{") and at and self._is(at - 1, ";") and not tokens.on_new_line(at):
-            fix = None if head(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
+            tokens.replace(at, 1, ())
+        elif name == "{" and at and tokens.name(at - 1) == ";" and not tokens.on_new_line(at):
+            fix = None if head_word(tokens, at - 1) in _DEFINITIONS else ""  # it needs its `;`
             self.report.add("E0130", "`;` between a statement and its block", *tokens.place(at - 1), fix=fix)
-            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
-        elif self._is(at, "{"):
+            tokens.replace(at, 0, _kinds("BAD_HEAD"))
+        elif name == "{":
             help = "a block belongs to an object, a module, `group`, `material`, `for`, `if` or a boolean"
             self.report.add("E0129", "block without a head", *place, help=help)
-            tokens.replace(at, 0, [tables().kind("BAD_HEAD")])
-        elif self._is(at, "else"):
+            tokens.replace(at, 0, _kinds("BAD_HEAD"))
+        elif name == "else":
             self.report.add("E0101", "`else` without `if`", *place)
-            tokens.replace(at, 1, [tables().kind("BAD_HEAD")] if self._is(at + 1, "{") else [])
+            tokens.replace(at, 1, _kinds("BAD_HEAD") if block else ())
         else:
             return False
         return True
@@ -471,7 +426,7 @@ class Recovery:
     def _spaced_unit(self, at: int) -> bool:
         """`30 deg`: one number, whose value is unknown."""
         tokens, number, word = self.tokens, tables().kind("NUMBER"), self.tokens.text(at)
-        unit, gap = UNIT_ALIASES.get(word, word), (tokens.end_before(at), tokens.starts[at])
+        unit, gap = UNIT_NAMES.get(word, word), (tokens.end_before(at), tokens.starts[at])
         bare = at > 0 and tokens.kinds[at - 1] == number and tokens.text(at - 1)[-1:].isdigit()
         if not bare or unit not in UNITS or tokens.source.text[slice(*gap)].strip(" "):
             return False
@@ -490,16 +445,14 @@ class Recovery:
             place = (tokens.end_before(at),) * 2 if tokens.kinds[at] == END else tokens.place(at)
             self.report.add("E0122", f"this is not a statement: unexpected {_shown(tokens, at)}", *place)
         stop = at
-        while tokens.kinds[stop] not in self.fixed:
-            if self._is(stop, ";"):
-                stop += 1
-                break
-            if stop > at and tokens.kinds[stop] in self.words and tokens.on_new_line(stop):
+        while tokens.name(stop) not in _FIXED:
+            begins = tokens.name(stop).islower() and tokens.on_new_line(stop)
+            if stop > at and (begins or tokens.name(stop - 1) == ";"):
                 break
             stop += 1
         if stop == first:
             return None
-        bad = "BAD_HEAD" if self._is(stop, "{") and not self._is(stop - 1, ";") else "BAD_STATEMENT"
+        bad = "BAD_HEAD" if tokens.name(stop) == "{" and tokens.name(stop - 1) != ";" else "BAD_STATEMENT"
         tokens.splice(first, stop, [(tables().kind(bad), *tokens.place(first, stop))])
         return first
 
@@ -526,7 +479,7 @@ def report_repair(tokens: Tokens, report: Report, repair: Repair, open_: list[in
         twice = text.isalpha() and text in (tokens.text(stop), tokens.text(at - 1))
         help = "between values choose with c ? a : b" if text.startswith("else") else None
         place = tokens.place(at, stop)
-        report.add(code, f"{word} {_quoted(text)}", *place, help=help, fix="" if twice else None)
+        report.add(code, f"{word} {quoted(text)}", *place, help=help, fix="" if twice else None)
     else:
         _report_replacement(tokens, report, repair, names)
 
@@ -549,11 +502,12 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
             simple = {"`;`": _PLAIN, "`{`": _FLAT}.get(shown)
             fix = first if simple and simple.fullmatch(tokens.source.text, *inside) else None
     elif first == ";":
-        help = "a `;` ends every statement without a block"
+        help, text = "a `;` ends every statement without a block", tokens.text(at)
+        moved = tokens.text(at - 1) == ")" and head_word(tokens, at - 1) in TRANSFORMS
         if tokens.kinds[at] != END and _DIVISION.match(tokens.source.text, end):
             help = "`//` begins a comment; the whole part of a / b is floor(a / b)"
-        elif breaks_off or shown == "`}`" or _surely_next(tokens, at):
-            fix = ";"
+        elif breaks_off or text in ("}", *_BEGINNINGS) or (moved and text in (*TRANSFORMS, "material")):
+            fix = ";"  # what comes next can only begin a statement of its own
     elif first in _NAMED:
         message = f"expected {_NAMED[first]}, found {shown}"
         if not breaks_off:  # an operand is missed where the next token stands
@@ -564,14 +518,6 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
         message = f"{message} before {shown}"
         fix = f" {first}" if names in (["="], ["in"], ["as"]) else None
     report.add(code, message, *place, labels=labels, help=help, fix=fix)
-
-
-def _surely_next(tokens: Tokens, at: int) -> bool:
-    """Test whether a token within a line can only begin a statement of its own."""
-    text = tokens.text(at)
-    inside = text == "material" or text in TRANSFORMS
-    moved = inside and tokens.text(at - 1) == ")" and head(tokens, at - 1) in TRANSFORMS
-    return moved or text in _BEGINNINGS
 
 
 def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: list[str]) -> None:
@@ -587,7 +533,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
         message = f"expected {_NAMED[names[0]]}, found {_shown(tokens, at)}"
     elif new == "==":
         code, message, help = "E0111", "`=` does not compare", "equality is `==`"
-        fix = None if head(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
+        fix = None if head_word(tokens, at) in _DEFINITIONS else new  # two names for one value, more likely
     elif names == ["{", "}"]:
         code, message = "E0106", f"missing block, found `{text}`"
     elif {text, new} == {")", "]"}:
@@ -615,9 +561,4 @@ def _listed(names: list[str]) -> str:
 
 
 def _shown(tokens: Tokens, at: int) -> str:
-    return "the end of the file" if tokens.kinds[at] == END else _quoted(tokens.text(at))
-
-
-def _quoted(text: str) -> str:
-    text = " ".join(text.split())
-    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}…`"
+    return "the end of the file" if tokens.kinds[at] == END else quoted(tokens.text(at))

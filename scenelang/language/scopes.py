@@ -38,17 +38,12 @@ def find(scope: Scope[T_co], name: str) -> T_co | None:
 
 
 def head_of(stmt: tree.Call, own: Any, kind: str) -> Literal["setting", "move", "own", "leaf"]:
-    """Meaning of the name that heads a statement, by the rules of hiding.
+    """Meaning of the name that heads a statement in a kind of block, by the rules of hiding.
 
-    A module, or a value without parentheses, hides a word that the first scenes did not have. In a module
-    named like a leaf the name without parentheses is the leaf.
-
-    Args:
-        own: the definition in sight, with its ``kind`` and ``node``; None for a word of `LANGUAGE`.
-        kind: of the block around it; in a material's no transform or operation is hidden.
-
-    Returns:
-        ``move`` for transforms and operations; ``leaf`` for every name that is not defined.
+    A module, or a value without parentheses, hides a word that the first scenes did not have, but for the
+    operations of a material. In a module named like a leaf the name without parentheses is the leaf.
+    ``own`` is the definition in sight, None for a word of `LANGUAGE`. A ``move`` is a transform or an
+    operation, a ``leaf`` any name that is not defined.
     """
     name, bare, what = stmt.name.text, stmt.args is None, own.kind if own is not None else ""
     hidden = what in ("module", "poison") or (bare and what in VALUES)

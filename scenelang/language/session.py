@@ -75,10 +75,6 @@ class Definition(Record, frozen=False):
     needs: Needs = field(default_factory=Needs)  # what its body depends on besides its arguments
 
 
-Brought = Literal["text", "width"]
-"""Kinds of bindings of what a font brings."""
-
-
 class Binding(Record, frozen=False):
     """Meaning of a name: a `Definition`, a file, an element's name or the value of a constant ``let``."""
 

@@ -19,6 +19,7 @@ from scenelang.language import (
     modifiers,
     scopes,
     tree,
+    values,
     words,
 )
 from scenelang.language.builder import Action, Builder, FileContext, Place, make
@@ -42,19 +43,7 @@ from scenelang.language.parser import parse
 from scenelang.language.reporter import Advice, Reporter, find_damage
 from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Light
 from scenelang.language.session import Binding, Defines, Env, Session
-from scenelang.language.values import (
-    POISON,
-    UNITS,
-    Angle,
-    Problem,
-    RangeValue,
-    Time,
-    Vec,
-    describe,
-    equal,
-    same_unit,
-    unpack,
-)
+from scenelang.language.values import POISON, UNITS, Angle, Problem, RangeValue, Time, Vec
 
 
 def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
@@ -69,10 +58,8 @@ def _once(session: Session, what: str, span: Span) -> bool:
     """Test whether a setting is given for the first time, and report a second one."""
     first = session.settings.given.setdefault(what, span)
     if first is not span:
-        labels = (Label(first, "first given here"),)
         more = "; there is one light, and its power says how bright" if what == "light" else ""
-        help = f"leave one of them out{more}"
-        session.report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
+        modifiers.given_twice(what, span, first, session.report, more)
     return first is span
 
 
@@ -313,14 +300,14 @@ def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
 def _checked_default(value: Any, allowed: Any, stmt: tree.Param, session: Session) -> Any:
     """The default, or poison where it has no type for a param; reports one outside the range."""
     if value.__class__ not in (*UNITS, bool, str, Vec):
-        message = f"{describe(value)} as the value of a param"
+        message = f"{values.describe(value)} as the value of a param"
         help = "params are numbers, angles, times, booleans, strings and vectors"
         session.report.error("E0301", message, stmt.default.span, help=help)
         return POISON
     if stmt.range is None or allowed is POISON:
         return value
     if allowed.__class__ is not RangeValue and allowed.__class__ is not Vec:
-        message = f"expected a range or a vector of choices, found {describe(allowed)}"
+        message = f"expected a range or a vector of choices, found {values.describe(allowed)}"
         session.report.error("E0301", message, stmt.range.span, help="write in 0..1")
         return value
     try:
@@ -339,7 +326,7 @@ def _range_meant(value: Any, allowed: Any, range: tree.Expr) -> tuple[str | None
     ends = allowed.items if allowed.__class__ is Vec else ()
     if len(ends) != 2 or not all(one.__class__ is value.__class__ and one.__class__ in UNITS for one in ends):
         return None, None
-    low, at, high = (unpack(one)[0] for one in (ends[0], value, ends[1]))
+    low, at, high = (values.unpack(one)[0] for one in (ends[0], value, ends[1]))
     if not low < at < high:
         return None, None
     help = "a vector has the choices there are; a range is written 3..9"
@@ -352,13 +339,13 @@ def _range_meant(value: Any, allowed: Any, range: tree.Expr) -> tuple[str | None
 def within(value: Any, allowed: Any) -> bool:
     """Test whether a value, or each number of a vector, is in a range or among choices; raises Problem."""
     if allowed.__class__ is Vec:
-        return any(equal(value, choice) for choice in allowed.items)
+        return any(values.equal(value, choice) for choice in allowed.items)
     if value.__class__ is Vec:
         return all(within(item, allowed) for item in value.items)
     if value.__class__ not in UNITS:
-        raise Problem("E0301", f"{describe(value)} with a range of {allowed.unit}s")
-    x, kind = unpack(value)
-    same_unit(x, kind, allowed.start or allowed.stop, allowed.unit)
+        raise Problem("E0301", f"{values.describe(value)} with a range of {allowed.unit}s")
+    x, kind = values.unpack(value)
+    values.same_unit(x, kind, allowed.start or allowed.stop, allowed.unit)
     return bool(allowed.contains(x))
 
 
@@ -388,8 +375,8 @@ def _from_outside(
         value = Angle(0.0)
     if value.__class__ is not default.__class__:
         help = "give it a unit, as in 30deg" if default.__class__ is Angle else None
-        message = f"{shown} is {describe(value)}, expected {describe(default)}"
-        labels = (Label(stmt.default.span, f"its default is {describe(default)}"),)
+        message = f"{shown} is {values.describe(value)}, expected {values.describe(default)}"
+        labels = (Label(stmt.default.span, f"its default is {values.describe(default)}"),)
         report.error("E0310", message, span, help=help, labels=labels)
         return POISON
     if stmt.range is not None and (allowed.__class__ is RangeValue or allowed.__class__ is Vec):

@@ -20,18 +20,13 @@ from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
-from scenelang.output.frames import Clip, Film, FrameRange, Store, Target, find_target, put_frame
-from scenelang.output.painting import Cluster, Drawable, Errand, Painter, Workers
+from scenelang.output.frames import Clip, Drawable, Film, FrameRange, Store, Target, find_target, put_frame
+from scenelang.output.painting import Cluster, Errand, Painter, Workers
 
 if TYPE_CHECKING:
     from scenelang.drawing.image import Image
     from scenelang.output.encoders import Palette
 
-
-Beside = Callable[[Drawable, Store], Mapping[str, bytes]]
-"""Gives the files to write next to a frame's picture, by suffix; an exception ends the run."""
-Failed = Callable[[int, SceneError], None]
-"""Called with the number of a frame and its errors."""
 
 WORTH_S: Final = 12.0  # least drawing left that repays starting other processes, each of which loads torch
 _FPS: Final = 1e-4, 1e6  # rates of films: beyond, formats cannot store the time of a frame
@@ -88,14 +83,11 @@ def make(
     palette: Palette = "auto",
     dither: bool = False,
     strict: bool = False,
-    beside: Beside | None = None,
-    failed: Failed | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> RenderResult:
     """Draw frames and write them whole, with arguments and errors as of `animate`.
 
-    Drawn frames stay in `Target.work` until the same call continues. ``strict`` counts warnings as errors,
-    ``beside`` gives further files of a frame; without ``failed`` a frame with errors ends the run.
+    Drawn frames stay in `Target.work` until the same call continues. ``strict`` counts warnings as errors.
     """
     place = output_place(target.path)
     if target.kind == "video":
@@ -110,7 +102,7 @@ def make(
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     result = RenderResult([], len(numbers))
     with Store(target.work, suffix) as store:
-        run = _Run(painter, store, jobs, cluster, strict, beside, failed, progress, result)
+        run = _Run(painter, store, jobs, cluster, strict, progress, result)
         run.draw(numbers)
         started = time.perf_counter()
         if target.kind == "sequence":
@@ -145,8 +137,6 @@ class _Run:
     jobs: int | None
     cluster: str | None
     strict: bool
-    beside: Beside | None
-    failed: Failed | None
     progress: Callable[[Progress], None]
     result: RenderResult
     alpha: bool = False  # whether any frame has
@@ -191,17 +181,14 @@ class _Run:
             if self.strict and painter.clip.diagnostics.items:
                 raise SceneError(painter.clip.diagnostics)
         except SceneError as error:
-            if self.failed is None:
-                raise
-            self.failed(number, error)
+            painter.clip.failed(number, error)
             return None
         self.result.compile_s += time.perf_counter() - painter.load_s - started
         self.alpha |= frame.shot.scene.background is None
-        if self.beside is not None:
-            files = self.beside(frame, self.store)
-            self.suffixes = tuple(files)
-            for suffix, data in files.items():
-                write_whole(self.store.beside(frame.key, number, suffix), data, flush=False)
+        files = painter.clip.beside(frame, self.store)
+        self.suffixes = tuple(files)
+        for suffix, data in files.items():
+            write_whole(self.store.beside(frame.key, number, suffix), data, flush=False)
         return frame
 
     def _one(self, frame: Drawable, index: int, total: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from scenelang.compiler.compile import why_chosen
@@ -17,9 +18,7 @@ from scenelang.compiler.steps import Affine
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
-from scenelang.drawing.neural.draw import Drawing
 from scenelang.drawing.small import draw_small
-from scenelang.drawing.solid.march import Work
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS
@@ -111,66 +110,50 @@ def drawing_cost(
     """Draw a Program of a scene and measure its work, time and error.
 
     Returns:
-        ``pixels`` of the canvas, ``refined`` (pixels sampled four times), counts of `_meetings` or `_rays`,
+        ``pixels`` of the canvas, ``refined`` (pixels sampled four times),
         ``ms`` (the best of three frames, after one that does not count), ``psnr`` (dB, at most 50), ``flip``
         (None without its package), ``unknown`` (why there is no exact picture, or None) and ``parameters``.
+        In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
+        ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample
+        with every object). In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the
+        light, how many of both came ``near`` an object, their ``steps`` (points at which the field was asked)
+        and ``evaluations`` (an object's network at a point).
     """
     from scenelang.drawing.neural.load import place_of
     from scenelang.drawing.torch_backend import draw_program
 
     by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
 
+    draw = partial(draw_small, program) if by_numpy else partial(draw_program, program, model)
     times = []
     for _ in range(1 + REPEATS):
         started = time.perf_counter()
-        if by_numpy:
-            drawing = draw_small(program, threads=threads)
-        else:
-            drawing = draw_program(program, model, threads=threads)
+        drawing = draw(threads=threads)
         times.append(1000 * (time.perf_counter() - started))
     own, unknown = over_white(drawing.image), None
     try:
         exact = over_white(reference_of(scene, model.manifest, spans=spans))
     except ValueError as error:
         exact, unknown = None, str(error)
+    if (work := drawing.work) is not None:
+        counts = {"rays": work.rays, "light_rays": work.lights, "near": work.near, "steps": work.steps}
+        counts["evaluations"] = work.met
+    else:
+        samples = program.canvas[0] * program.canvas[1] + program.samples * drawing.refined
+        if model.manifest.renderer != "framed":  # others take every sample, with every object
+            samples = drawing.pairs // max(1, len(program))
+        counts = {"evaluated": drawing.met, "samples": samples, "meetings": drawing.pairs}
+        counts["meetings_unskipped"] = samples * len(program)
     off = None
     with suppress(ImportError):
         off = None if exact is None else round(flip(own, exact), 5)
     return {
         "pixels": program.canvas[0] * program.canvas[1],
         "refined": drawing.refined,
-        **(_meetings(drawing, program, model) if drawing.work is None else _rays(drawing.work)),
+        **counts,
         "ms": round(min(times[1:]), 2),
         "psnr": None if exact is None else round(min(MOST_DB, psnr(own, exact)), 2),
         "flip": off,
         "unknown": unknown,
         "parameters": sum(p.numel() for p in model.network.parameters()),
-    }
-
-
-def _meetings(drawing: Drawing, program: Program, model: Model) -> dict[str, int]:
-    """In the plane: ``evaluated`` (pixels that an object reached; the network saw no other), ``samples``,
-    ``meetings`` (a sample and an object through the network) and ``meetings_unskipped`` (every sample with
-    every object)."""
-    samples = program.canvas[0] * program.canvas[1] + program.samples * drawing.refined
-    if model.manifest.renderer != "framed":  # others take every sample, with every object
-        samples = drawing.pairs // max(1, len(program))
-    return {
-        "evaluated": drawing.met,
-        "samples": samples,
-        "meetings": drawing.pairs,
-        "meetings_unskipped": samples * len(program),
-    }
-
-
-def _rays(work: Work) -> dict[str, int]:
-    """In space: ``rays`` from the eye, ``light_rays`` between surfaces or media and the light, how many of
-    both came ``near`` an object, their ``steps`` (points at which the field was asked) and ``evaluations``
-    (an object's network at a point)."""
-    return {
-        "rays": work.rays,
-        "light_rays": work.lights,
-        "near": work.near,
-        "steps": work.steps,
-        "evaluations": work.met,
     }

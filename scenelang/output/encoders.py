@@ -16,7 +16,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen, run
 from typing import BinaryIO, Final, Literal
@@ -59,9 +59,9 @@ def write_gif(
     census = Census(most)
     count = len(lengths)
     if palette != "frame":
-        for index, (file, length) in enumerate(runs(film.files, lengths)):
+        for done, (file, length) in enumerate(runs(film.files, lengths)):
             census.add(film.read(file), length)
-            progress(0.4 * index / count)
+            progress(0.4 * done / count)
     own = palette == "frame" or (palette == "auto" and not census.fits and not census.crowded)
     common = None if own else census.choose()
     with part.open("wb") as out:
@@ -74,16 +74,15 @@ def write_gif(
         if film.loop:
             out.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
         shown: npt.NDArray[np.uint8] | None = None
-        mapper = Mapper(common, dither) if common is not None else None
-        for index, (file, length) in enumerate(runs(film.files, lengths)):
+        for done, (file, length) in enumerate(runs(film.files, lengths)):
             pixels = film.read(file)
-            if own:
+            if (colours := common) is None:
                 one = Census(most)
                 one.add(pixels)
-                mapper = Mapper(one.choose(), dither)
-            assert mapper is not None
-            shown = _frame(out, film, pixels, shown, mapper, length, own)
-            progress(0.4 + 0.6 * index / count)
+                colours = one.choose()
+            index = mapped(pixels, colours, dither)
+            shown = _frame(out, film, pixels, shown, index, colours, length, own)
+            progress(0.4 + 0.6 * done / count)
         out.write(b";")
 
 
@@ -92,14 +91,13 @@ def _frame(
     film: Film,
     pixels: npt.NDArray[np.uint8],
     shown: npt.NDArray[np.uint8] | None,
-    mapper: Mapper,
+    index: npt.NDArray[np.uint8],
+    colours: Colours,
     length: int,
     own: bool,
 ) -> npt.NDArray[np.uint8]:
     """Write one picture; returns the colours that a viewer then shows."""
-    colours = mapper.colours
     clear = len(colours)  # the index after the palette's own
-    index = mapper(pixels)
     now = colours[index]
     box: Box = (0, 0, *film.size)
     if film.alpha:
@@ -184,31 +182,20 @@ class Census:
         return np.unique(table[: max(used, 1)], axis=0)
 
 
-class Mapper:
-    """Pictures to nearest indices of a palette (K, 3); if asked, dithered (Floyd and Steinberg 1976)."""
-
-    def __init__(self, colours: Colours, dither: bool) -> None:
-        self.colours, self.dither = colours, dither
-        self._nearest = lru_cache(_MOST_KNOWN)(partial(_nearest, colours.astype(np.int32)))
-
-    def __call__(self, pixels: Pixels) -> npt.NDArray[np.uint8]:
-        """Indices (H, W)."""
-        flat = packed(pixels)
-        result, inverse = np.unique(flat, return_inverse=True)
-        index = np.array([self._nearest(number) for number in result.tolist()], np.uint8)
-        exact = (self.colours[index] == unpacked(result)).all(axis=1).all()
-        if exact or not self.dither:
-            return index[inverse].reshape(flat.shape)
-        table = Image.new("P", (1, 1))
-        table.putpalette(self.colours.tobytes())
-        image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
-        index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
-        return np.asarray(np.minimum(index, len(self.colours) - 1), np.uint8)
-
-
-def _nearest(colours: npt.NDArray[np.int32], number: int) -> int:
-    rgb = np.array([number >> 16, (number >> 8) & 255, number & 255], np.int32)
-    return int(((colours - rgb) ** 2).sum(axis=1).argmin())
+def mapped(pixels: Pixels, colours: Colours, dither: bool) -> npt.NDArray[np.uint8]:
+    """Nearest indices (H, W) of a palette (K, 3); if asked, dithered (Floyd and Steinberg 1976)."""
+    result, inverse = np.unique(packed(pixels), return_inverse=True)
+    wide = colours.astype(np.float32)  # which holds these squares exactly
+    sizes, parts = np.square(wide).sum(1), range(0, len(result), _SAMPLE)
+    own = (unpacked(result[at : at + _SAMPLE]).astype(np.float32) for at in parts)
+    index = np.concatenate([(sizes - 2 * part @ wide.T).argmin(1) for part in own]).astype(np.uint8)
+    if not dither or np.array_equal(colours[index], unpacked(result)):
+        return index[inverse].reshape(pixels.shape[:2])
+    table = Image.new("P", (1, 1))
+    table.putpalette(colours.tobytes())
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+    index = np.asarray(image.quantize(palette=table, dither=Image.Dither.FLOYDSTEINBERG))
+    return np.asarray(np.minimum(index, len(colours) - 1), np.uint8)
 
 
 def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
@@ -316,31 +303,23 @@ class NoFfmpeg(RenderError):
     """There is no ffmpeg, or it cannot encode."""
 
 
-@lru_cache(maxsize=1)
-def find_ffmpeg() -> str:
-    """The ffmpeg on the PATH, or the one that imageio-ffmpeg brings; raises `NoFfmpeg` without either."""
-    result = shutil.which("ffmpeg")
-    if result is not None:
-        return result
-    try:
-        import imageio_ffmpeg
+@lru_cache(maxsize=len(VIDEOS))
+def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without.
 
-        return str(imageio_ffmpeg.get_ffmpeg_exe())
-    except (ImportError, RuntimeError, OSError):
-        raise NoFfmpeg(MISSING) from None
+    It is the one on the PATH, or the one that imageio-ffmpeg brings.
+    """
+    ffmpeg = shutil.which("ffmpeg")
+    if ffmpeg is None:
+        try:
+            import imageio_ffmpeg
 
-
-@lru_cache(maxsize=1)
-def _encoders(ffmpeg: str) -> frozenset[str]:
+            ffmpeg = str(imageio_ffmpeg.get_ffmpeg_exe())
+        except (ImportError, RuntimeError, OSError):
+            raise NoFfmpeg(MISSING) from None
     done = run([ffmpeg, "-hide_banner", "-encoders"], capture_output=True, check=False, stdin=DEVNULL)
     lines = done.stdout.decode(errors="replace").splitlines()
-    return frozenset(words[1] for line in lines if len(words := line.split()) > 1)
-
-
-def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
-    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without."""
-    ffmpeg = find_ffmpeg()
-    known = _encoders(ffmpeg)
+    known = [words[1] for line in lines if len(words := line.split()) > 1]
     wanted = (_VP9,) if suffix == ".webm" else (_H264, *_OTHERS)
     for codec in wanted:
         if codec[0] in known:

@@ -27,7 +27,7 @@ from scenelang.assets.files import lock, open_own, write_whole
 from scenelang.compiler.lower import Memory
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import image_format
-from scenelang.language.diagnostics import Diagnostics, SourceFile, plural
+from scenelang.language.diagnostics import Diagnostics, plural
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.library import SpanMap
 from scenelang.language.reports import SceneError
@@ -57,13 +57,10 @@ class FrameRange:
         match = _RANGE.fullmatch(text)
         if match is None or (match[2] and match[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
-        first = int(match[1])
+        first, last = int(match[1]), int(match[3]) - bool(match[2]) if match[3] else None
         if ".." not in text:
             return cls(first, first)
-        if match[3] is None:
-            return cls(first)
-        last = int(match[3]) - bool(match[2])
-        if last < first:
+        if last is not None and last < first:
             raise FramesError(f"the range of frames `{text}` is empty")
         return cls(first, last)
 
@@ -163,7 +160,7 @@ def is_animation(out: str) -> bool:
     return is_pattern(out) or Path(out).suffix.lower() in FILM_FORMATS
 
 
-def find_target(out: str, stem: str = "frame") -> Target:
+def find_target(out: str, stem: str = "frame", digits: int = 4) -> Target:
     """Parse ``out``, one of `FILM_FORMATS`, a pattern, or a folder of ``stem``s, or raise `TargetError`."""
     path = Path(out)
     if is_pattern(out):
@@ -175,26 +172,22 @@ def find_target(out: str, stem: str = "frame") -> Target:
             image_format(path)
         except ValueError as error:
             raise TargetError(str(error)) from None
-        _check_folder(path.parent, out)
-        return Target("sequence", path.parent, path.name)
-    if out.endswith(("/", "\\")) or path.is_dir():
+        target = Target("sequence", path.parent, path.name)
+    elif out.endswith(("/", "\\")) or path.is_dir():
         if path.exists() and not path.is_dir():
             raise TargetError(f"`{out}` is a file")
-        return Target("sequence", path, f"{stem.replace('%', '%%')}-%04d.png")
-    kind = FILM_FORMATS.get(path.suffix.lower())
-    if kind is None:
+        return Target("sequence", path, f"{stem.replace('%', '%%')}-%0{digits}d.png")
+    elif (kind := FILM_FORMATS.get(path.suffix.lower())) is not None:
+        target = Target(kind, path)
+    else:
         raise TargetError(
             f"`{out}` holds one picture; an animation goes to a file with one of the suffixes "
             f"{', '.join(FILM_FORMATS)}, to "
             "numbered pictures such as frame-%04d.png, or to a folder, which ends in a slash"
         )
-    _check_folder(path.parent, out)
-    return Target(kind, path)
-
-
-def _check_folder(folder: Path, out: str) -> None:
-    if not folder.is_dir():
-        raise TargetError(f"cannot write `{out}`: there is no folder `{folder}`")
+    if not path.parent.is_dir():
+        raise TargetError(f"cannot write `{out}`: there is no folder `{path.parent}`")
+    return target
 
 
 _LOCK: Final = "lock"
@@ -337,29 +330,12 @@ class Shot:
 
 
 @dataclass(frozen=True, slots=True)
-class FixedFrames:
-    scenes: tuple[Scene, ...]  # at least one
-    fps: float | None = None  # frames a second; None for those of the first scene's animation
-    wanted: tuple[Path, ...] = ()
-    sources: tuple[SourceFile, ...] = ()
-
-    @property
-    def animates(self) -> bool:
-        return len(self.scenes) > 1
-
-    @property
-    def animation(self) -> Animation:
-        """Length and rate of the frames; raises `ValueError` without a rate, or where canvases differ."""
-        if len({scene.canvas for scene in self.scenes}) > 1:
-            raise ValueError("scenes with several canvases, where size says one for all")
-        first, count = self.scenes[0].animation, len(self.scenes)
-        fps = self.fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
-        if fps is None:
-            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
-        return Animation(count / fps, fps, first.loop if first is not None else True)
-
-    def run(self, number: int) -> tuple[Scene, SpanMap]:
-        return self.scenes[number], SpanMap()
+class Drawable:
+    number: int  # from 0
+    key: str  # digest of all that determines its pixels
+    shot: Shot  # the frame
+    program: Program | None  # what the network draws; None for the reference
+    place: str = "cpu"  # the renderer: numpy, or a torch device
 
 
 class Clip:
@@ -375,10 +351,13 @@ class Clip:
         self.diagnostics = diagnostics if diagnostics is not None else Diagnostics()
         if isinstance(source, Source):
             source = source.evaluation(self.diagnostics, replays=True)
-        self._evaluation = FixedFrames(source, fps) if isinstance(source, tuple) else source
+        self._scenes = source if isinstance(source, tuple) else ()
+        self._evaluation = None if isinstance(source, tuple) else source
+        self._fps = fps  # of Scenes; None for those of the first one's animation
         self._last: tuple[Shot, Program] | None = None
         self._memory: Memory | None = Memory()
-        self.wanted = self._evaluation.wanted  # all files that it imports, also those that do not exist
+        # all files that it imports, also those that do not exist
+        self.wanted = self._evaluation.wanted if self._evaluation is not None else ()
 
     @cached_property
     def first(self) -> Shot:
@@ -387,22 +366,28 @@ class Clip:
 
     @property
     def animates(self) -> bool:
-        return self._evaluation.animates
+        return len(self._scenes) > 1 if self._evaluation is None else self._evaluation.animates
 
     @property
     def texts(self) -> tuple[str, ...]:
-        return tuple(source.text for source in self._evaluation.sources)
+        return tuple(one.text for one in self._evaluation.sources) if self._evaluation is not None else ()
 
     @property
     def animation(self) -> Animation:
-        """Length, frames a second and whether it is a loop."""
-        given = self._evaluation
-        return given.animation if isinstance(given, FixedFrames) else self.first.scene.animation or STILL
+        """Length, rate and whether it is a loop; raises `ValueError` where Scenes do not say."""
+        if self._evaluation is not None:
+            return self.first.scene.animation or STILL
+        if len({scene.canvas for scene in self._scenes}) > 1:
+            raise ValueError("scenes with several canvases, where size says one for all")
+        first, count = self._scenes[0].animation, len(self._scenes)
+        fps = self._fps or (first.fps if first is not None else STILL.fps if count == 1 else None)
+        if fps is None:
+            raise ValueError("scenes without an animation, where fps says how fast they follow each other")
+        return Animation(count / fps, fps, first.loop if first is not None else True)
 
     @property
     def frames(self) -> int:
-        given = self._evaluation
-        return len(given.scenes) if isinstance(given, FixedFrames) else self.animation.frames
+        return len(self._scenes) or self.animation.frames
 
     def numbers(self, frames: FrameRange) -> range:
         """Numbers of the requested frames; raises `SceneError` where some do not exist."""
@@ -417,6 +402,8 @@ class Clip:
 
     def shot(self, number: int) -> Shot:
         """Evaluate a frame; raises `SceneError` if it has errors."""
+        if self._evaluation is None:
+            return Shot(number, self._scenes[number], SpanMap())
         scene, spans = self._evaluation.run(number)
         if scene is None or self.diagnostics.errors:
             raise SceneError(self.diagnostics)
@@ -433,3 +420,11 @@ class Clip:
         )
         self._last = shot, program
         return program
+
+    def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
+        """Files to write next to a frame's picture, by suffix; an exception ends the run."""
+        return {}
+
+    def failed(self, number: int, error: SceneError) -> None:
+        """Raise the errors of a frame, or note them, and it is left out."""
+        raise error

@@ -40,9 +40,6 @@ class Limits:
     ms: float | None  # most milliseconds of a frame on this machine
     flip: float | None  # most mean FLIP
 
-    def __bool__(self) -> bool:
-        return self.ms is not None or self.flip is not None
-
 
 @dataclass(frozen=True, slots=True)
 class Errors:
@@ -108,8 +105,6 @@ def frontier_path(model: str) -> Path:
 
 def load_frontier(model: str) -> Frontier | None:
     """The shipped frontier of a model's set, or None; raises ValueError if damaged, KeyError for no model."""
-    if model not in available():
-        raise KeyError(model)
     try:
         data = read_regular(frontier_path(model), MOST_BYTES)
     except FileNotFoundError:
@@ -140,16 +135,6 @@ class Offer:
     def told(self) -> str:
         digits = 0 if self.ms >= 10 else 1
         return f"{self.point.name}: {self.ms:.{digits}f} ms and FLIP {self.flip:.2g} at most"
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """The point that draws, and why."""
-
-    offer: Offer  # the chosen one
-    runner_up: Offer | None  # the one that would be next
-    refused: dict[str, str]  # names of points that cannot draw the scene, and the reason
-    notes: tuple[str, ...]  # lines for people
 
 
 def error_scale(canvas: tuple[int, int], objects: int) -> float:
@@ -196,8 +181,8 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
     return sorted(result, key=lambda o: (o.ms, o.flip))
 
 
-def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> Choice:
-    """The fastest offer that keeps the error, or the one of least error that keeps the time.
+def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> tuple[Offer, list[str]]:
+    """The fastest offer that keeps the error, or the one of least error that keeps the time; and lines why.
 
     Of offers that promise nearly the same error, within 2 %, the faster one is better. With both limits the
     fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
@@ -222,7 +207,7 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
     runner_up = min(others, key=lambda o: (o not in good, getattr(o, by)), default=None)
     if runner_up is not None:
         notes.append(f"runner-up: {runner_up.told()}, {_lacks(runner_up, limits) or worse}")
-    return Choice(first, runner_up, refused, tuple(notes))
+    return first, notes
 
 
 def _lacks(offer: Offer, limits: Limits) -> str:
@@ -243,9 +228,6 @@ def _nearest(offers: Sequence[Offer], limits: Limits) -> str:
     else:
         nearest = f"the fastest is {min(offers, key=lambda o: o.ms).told()}"
     return f"nothing draws this scene within {' and '.join(asked)}; {nearest}"
-
-
-# ---------------------------------------------------------------- predicted times
 
 
 def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:

@@ -16,14 +16,14 @@ import struct
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.files import write_output
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import decoded, encoded
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import EMPTY, Wanted
@@ -74,7 +74,7 @@ class TriangleMesh(NamedTuple):
 class Sampler:
     """The field of a Program of solids, asked at points."""
 
-    def __init__(self, program: Program, exact: bool = False) -> None:
+    def __init__(self, program: Program, exact: bool) -> None:
         from scenelang.drawing.closed import field_of
 
         network, elements = field_of(program, exact), program.brought()
@@ -164,15 +164,6 @@ def sheets() -> Sheets:
     return table
 
 
-def _others(numbers: Index, known: Index) -> Index:
-    """The different numbers that are not among known ones, both in order; four times as fast as numpy's."""
-    numbers = np.sort(numbers)
-    fresh = np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]
-    if len(known):
-        fresh &= known[np.searchsorted(known, numbers).clip(0, len(known) - 1)] != numbers
-    return np.asarray(numbers[fresh])
-
-
 class Grid:
     """Cells of one size, by numbers, with the field's values at their corners."""
 
@@ -196,12 +187,12 @@ class Grid:
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values, self.holed = np.zeros(0, np.intp), np.zeros(0), False
         while True:
-            fresh = _others((self.cells[:, None] + self.bits).ravel(), self.nodes)
+            fresh = np.setdiff1d(self.cells[:, None] + self.bits, self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
             order = np.argsort(nodes)
             self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
             self.nodes, self.cells = nodes[order], np.sort(self.cells)
-            left = _others(self._around(), self.cells)  # the field may be steeper than it should be
+            left = np.setdiff1d(self._around(), self.cells)  # the field may be steeper than it should be
             if len(left):
                 self.cells = np.concatenate([self.cells, left])
             elif len(taken := self._pinched()):
@@ -251,12 +242,12 @@ class Grid:
         return np.concatenate(taken)
 
 
-def surface_of(program: Program, resolution: int, how: How) -> tuple[TriangleMesh, dict[str, str]]:
+def surface_of(program: Program, resolution: int, exact: bool) -> tuple[TriangleMesh, dict[str, str]]:
     """The surface of what is opaque in a Program of solids, and warnings by code.
 
     Raises `RenderError` for too many cells.
     """
-    sampler = Sampler(program, how.backend == "exact")
+    sampler = Sampler(program, exact)
     said = {"W0551": "a mesh has no media: what is volumetric is left out"} if sampler.field.media else {}
     empty = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.intp), np.zeros((0, 3)))
     if not (sampler.high > sampler.low).all():
@@ -296,7 +287,7 @@ def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
     low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
-    zero, _, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
+    zero, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
     p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
@@ -387,37 +378,26 @@ def _obj(mesh: TriangleMesh) -> bytes:
 
 def _glb(mesh: TriangleMesh) -> bytes:
     """Khronos Group, glTF 2.0 Specification, 2021; its colours are linear."""
-    parts = [mesh.vertices.astype("<f4"), decoded(mesh.colours).astype("<f4"), mesh.triangles.astype("<u4")]
+    places, colours = mesh.vertices.astype("<f4"), decoded(mesh.colours).astype("<f4")
+    parts = [places, colours, mesh.triangles.astype("<u4").ravel()]
     starts = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
-    views = [
-        {"buffer": 0, "byteOffset": at, "byteLength": p.nbytes} for at, p in zip(starts, parts, strict=False)
-    ]
-    kinds = (5126, "VEC3"), (5126, "VEC3"), (5125, "SCALAR")
-    accessors = [
-        {
-            "bufferView": i,
-            "componentType": kind,
-            "type": form,
-            "count": part.size // (3 if form == "VEC3" else 1),
-        }
-        for i, (part, (kind, form)) in enumerate(zip(parts, kinds, strict=True))
-    ]
-    accessors[0] |= {"min": parts[0].min(0).tolist(), "max": parts[0].max(0).tolist()}
+    views, accessors = list[dict[str, Any]](), list[dict[str, Any]]()
+    for part, start, (form, kind) in zip(
+        parts, starts, (*[("VEC3", 5126)] * 2, ("SCALAR", 5125)), strict=False
+    ):
+        accessors.append({"bufferView": len(views), "componentType": kind, "type": form, "count": len(part)})
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": part.nbytes})
+    accessors[0] |= {"min": places.min(0).tolist(), "max": places.max(0).tolist()}
     surface = {"attributes": {"POSITION": 0, "COLOR_0": 1}, "indices": 2, "material": 0}
-    text = json.dumps(
-        {
-            "asset": {"version": "2.0", "generator": "scenelang"},
-            "scene": 0,
-            "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [surface]}],
-            "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}}],
-            "accessors": accessors,
-            "bufferViews": views,
-            "buffers": [{"byteLength": starts[-1]}],
-        },
-        separators=(",", ":"),
-    ).encode()
+    rough = {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}}
+    whole: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "scenelang"},
+        "buffers": [{"byteLength": starts[-1]}],
+    }
+    whole |= {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}]}
+    whole |= {"meshes": [{"primitives": [surface]}], "materials": [rough]}
+    whole |= {"bufferViews": views, "accessors": accessors}
+    text = json.dumps(whole, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + starts[-1])
     body = struct.pack("<I4s", starts[-1], b"BIN\0") + b"".join(part.tobytes() for part in parts)

@@ -27,27 +27,16 @@ from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import TileCache
-from scenelang.output.frames import Clip, Shot, frame_key, put_frame
-from scenelang.output.workers import AHEAD, Link
+from scenelang.output.frames import Clip, Drawable, Shot, frame_key, put_frame
+from scenelang.output.workers import Link
 
 if TYPE_CHECKING:
-    from distributed import Future as Task
-
     from scenelang.drawing.image import Image, Output
 
 
 DRAFT = 4  # pixels across that one of a draft stands for
 Progress = Callable[[float], None]
 _version = lru_cache(version)
-
-
-@dataclass(frozen=True, slots=True)
-class Drawable:
-    number: int  # from 0
-    key: str  # digest of all that determines its pixels
-    shot: Shot  # the frame
-    program: Program | None  # what the network draws; None for the reference
-    place: str = "cpu"  # the renderer: numpy, or a torch device
 
 
 @dataclass(slots=True)
@@ -102,17 +91,13 @@ class Painter:
 
     def draw(self, frame: Drawable, progress: Progress | None = None) -> Image:
         """Draw a frame; the same picture as `scenelang.render` gives for it on this device, bit for bit."""
+        from scenelang.drawing.render import draw, draw_exact
+
         if frame.program is None:
-            from scenelang.drawing.render import draw_exact
-
             return draw_exact(self.how.sampled(frame.shot.scene), spans=frame.shot.spans)
-        from scenelang.drawing.render import draw
-
         how = self.how._replace(threads=self.split(frame.program))
-        drawing = draw(
-            frame.program, how, place=frame.place, split=how.threads, kept=self.kept, progress=progress
-        )
-        return drawing.image
+        place, split = frame.place, how.threads
+        return draw(frame.program, how, place=place, split=split, kept=self.kept, progress=progress).image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -264,7 +249,6 @@ class Cluster:
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
         self._each_s = BATCH_S  # estimated time of a frame
-        self._under_way: dict[Task[Any], list[Errand]] = {}
 
     @property
     def count(self) -> int:
@@ -272,20 +256,20 @@ class Cluster:
 
     @property
     def waiting(self) -> int:
-        while self._under_way and self._link.ready:
+        while self._link.ready:
             self._receive()
-        return len(self._batch) + sum(map(len, self._under_way.values()))
+        return len(self._batch) + sum(map(len, self._link.under_way.values()))
 
     def submit(self, program: Program, errand: Errand) -> None:
         self._batch.append((program_bytes(program), errand))
         large = sum(len(data) for data, _ in self._batch) > MOST_BYTES
         if large or len(self._batch) >= max(1, min(MOST_BATCH, int(BATCH_S / self._each_s))):
-            while len(self._under_way) >= AHEAD * self.count:
+            while self._link.full:
                 self._receive()
             self._send()
 
     def take(self) -> None:
-        """Send an incomplete batch, and write the next files that come back; raises as `Link.result`."""
+        """Send an incomplete batch, and write the next files that come back; raises as `Link.take`."""
         self._send()
         self._receive()
 
@@ -293,9 +277,8 @@ class Cluster:
         self._link.close()
 
     def _receive(self) -> None:
-        future = self._link.next()
-        errands = self._under_way.pop(future)
-        seconds, result = self._link.result(future)
+        errands, taken = self._link.take()
+        seconds, result = taken()
         self._each_s = 0.5 * (self._each_s + seconds / len(errands))
         for errand, files in zip(errands, result, strict=True):
             folder = Path(errand.file).parent
@@ -303,7 +286,7 @@ class Cluster:
 
     def _send(self) -> None:
         if self._batch:
-            self._under_way[self._link.send(draw_batch, self._batch)] = [errand for _, errand in self._batch]
+            self._link.send([errand for _, errand in self._batch], draw_batch, self._batch)
             self._batch, self.batches = [], self.batches + 1
 
 

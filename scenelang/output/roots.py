@@ -21,8 +21,8 @@ def zeros(
     g: Floats,
     steps: int,
     halved: bool = False,
-) -> tuple[Floats, Floats, Floats]:
-    """Points (d, n) where a function is 0, and the ends, inside and outside, of what is left to look in.
+) -> tuple[Floats, Floats]:
+    """Points (d, n) where a function is 0, and the ends outside of what is left to look in.
 
     Args:
         at: values (n,) at points (d, n); one of a step is a jump, for which ways are ``halved``.
@@ -37,5 +37,4 @@ def zeros(
         f, g = np.where(same, value, f / 2), np.where(same, g / 2, value)
         a, b = np.where(same, middle, a), np.where(same, b, middle)
     zero = a + (0.5 if halved else f / (f - g)) * (b - a)
-    inside = f < 0
-    return zero, np.where(inside, a, b), np.where(inside, b, a)
+    return zero, np.where(f < 0, b, a)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from typing import Final
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final, cast
 
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
@@ -46,8 +48,14 @@ def to_svg(
         RenderError: the model has no outlines, its weights are missing, or the backend is the reference.
         ProgramError, OSError, ValueError, TypeError: as for `render`.
     """
-    result, how = diagnostics if diagnostics is not None else Diagnostics(), _checked(backend)
-    return svg_text(_program(program_or_scene, size, result), how, result)
+    diagnostics = diagnostics if diagnostics is not None else Diagnostics()
+    program = _program(program_or_scene, size, backend, diagnostics, flat=True)
+    with _reported():
+        text, blended = svg_of(program, backend == "exact")
+    if blended:
+        fact = "colours that `smooth` mixes become those of the nearer object"
+        diagnostics.add("W0550", fact, None, help="an SVG has no such gradients; a picture has")
+    return text
 
 
 def to_mesh(
@@ -73,83 +81,56 @@ def to_mesh(
         RenderError: too many cells, or as for `to_svg`.
         ProgramError, OSError, ValueError, TypeError: as for `render`.
     """
-    result, how = diagnostics if diagnostics is not None else Diagnostics(), _checked(backend)
+    diagnostics = diagnostics if diagnostics is not None else Diagnostics()
     if not 8 <= resolution <= FINEST:
         raise ValueError(f"a resolution of {resolution}, where 8 to {FINEST} are allowed")
-    return solid_mesh(_program(program_or_scene, None, result, UNSEEN), resolution, how, result)
-
-
-def svg_text(program: Program, how: How, diagnostics: Diagnostics) -> str:
-    """The SVG of a Program; raises as `to_svg`."""
-    _check(program, flat=True, diagnostics=diagnostics)
-    try:
-        text, blended = svg_of(program, how)
-    except (ModelError, ProgramError) as error:
-        raise RenderError(str(error)) from None
-    if blended:
-        fact = "colours that `smooth` mixes become those of the nearer object"
-        diagnostics.add("W0550", fact, None, help="an SVG has no such gradients; a picture has")
-    return text
-
-
-def solid_mesh(program: Program, resolution: int, how: How, diagnostics: Diagnostics) -> TriangleMesh:
-    """The mesh of a Program; raises as `to_mesh`."""
-    _check(program, flat=False, diagnostics=diagnostics)
-    try:
-        mesh, warnings = surface_of(program, resolution, how)
-    except (ModelError, ProgramError) as error:
-        raise RenderError(str(error)) from None
+    program = _program(program_or_scene, None, backend, diagnostics, flat=False)
+    with _reported():
+        mesh, warnings = surface_of(program, resolution, backend == "exact")
     if not len(mesh.triangles):
-        diagnostics.add(
-            "E0552", "nothing is left for a mesh", None, help="a mesh has what is opaque and solid"
-        )
+        help = "a mesh has what is opaque and solid"
+        diagnostics.add("E0552", "nothing is left for a mesh", None, help=help)
         raise SceneError(diagnostics)
+    finer = f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
     for code, fact in warnings.items():
-        finer = (
-            None if code == "W0551" else f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
-        )
-        diagnostics.add(code, fact, None, help=finer)
+        diagnostics.add(code, fact, None, help=None if code == "W0551" else finer)
     return mesh
 
 
-def _program(
-    program_or_scene: Program | Scene | str | os.PathLike[str],
-    size: tuple[int, int] | None,
-    diagnostics: Diagnostics,
-    without: tuple[str, ...] = (),
-) -> Program:
-    held = program_or_scene
-    if isinstance(held, Program) or (
-        not isinstance(held, Scene) and os.fspath(held).endswith(".safetensors")
-    ):
-        program = given(held, size, "neural")[0]
-        assert isinstance(program, Program)
-        return program
-    scene, spans = opened(held, diagnostics, size)
-    if scene.animation is not None and not isinstance(held, Scene):
-        refuse_animation(os.fspath(held), diagnostics)
-        raise SceneError(diagnostics)
+@contextmanager
+def _reported() -> Iterator[None]:
     try:
-        return compile_scene(scene, spans=spans, diagnostics=diagnostics, without=without)
-    except FileNotFoundError as error:
-        raise RenderError(f"a model has no weights here: {error.filename}") from None
+        yield
+    except (ModelError, ProgramError) as error:
+        raise RenderError(str(error)) from None
 
 
-def refuse_animation(name: str, diagnostics: Diagnostics) -> None:
-    """Report that a file would have to hold an animation."""
-    help = "one frame of it can be written: --frame 0, or scenelang.load(path, frame=0)"
-    diagnostics.add("E0550", f"`{name}` is an animation, and the file holds one frame", None, help=help)
-
-
-def _checked(backend: Backend) -> How:
+def _program(
+    held: Program | Scene | str | os.PathLike[str],
+    size: tuple[int, int] | None,
+    backend: Backend,
+    diagnostics: Diagnostics,
+    flat: bool,
+) -> Program:
+    """What has outlines, if flat, or else a surface; raises as `to_svg` and `to_mesh`."""
     if backend == "reference":
         raise RenderError(
             "outlines and surfaces are those of the model's field; the reference has pictures alone"
         )
-    return How(backend).checked()
-
-
-def _check(program: Program, *, flat: bool, diagnostics: Diagnostics) -> None:
+    How(backend).checked()
+    name = "" if isinstance(held, Program | Scene) else os.fspath(held)
+    if isinstance(held, Program) or name.endswith(".safetensors"):
+        program = cast("Program", given(held, size, "neural")[0])
+    else:
+        scene, spans = opened(held, diagnostics, size)
+        if name and scene.animation is not None:
+            refuse_animation(name, diagnostics)
+            raise SceneError(diagnostics)
+        without = () if flat else UNSEEN
+        try:
+            program = compile_scene(scene, spans=spans, diagnostics=diagnostics, without=without)
+        except FileNotFoundError as error:
+            raise RenderError(f"a model has no weights here: {error.filename}") from None
     if (program.stage is None) != flat:
         fact = "an SVG of solids" if flat else "a mesh of a flat scene"
         other = "write a mesh, such as .glb, or a picture" if flat else "write an .svg or a picture"
@@ -159,6 +140,13 @@ def _check(program: Program, *, flat: bool, diagnostics: Diagnostics) -> None:
         manifest = load_manifest(program.model)
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
-    if manifest.renderer not in ("framed", "solid") or manifest.lifting != "exact":
+    if not manifest.framed:
         raise RenderError(f"model `{program.model}` draws pictures alone")
     keep_memory()
+    return program
+
+
+def refuse_animation(name: str, diagnostics: Diagnostics) -> None:
+    """Report that a file would have to hold an animation."""
+    help = "one frame of it can be written: --frame 0, or scenelang.load(path, frame=0)"
+    diagnostics.add("E0550", f"`{name}` is an animation, and the file holds one frame", None, help=help)

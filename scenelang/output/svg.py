@@ -12,15 +12,15 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.gradient import Gradient
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import How, RenderError
+from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
@@ -34,6 +34,7 @@ BLOCK: Final = 8  # nodes along a side of blocks that are looked at first
 STEEP: Final = 1.1  # how much faster than exact ones learned distances change at most
 STEPS: Final = 5  # that find an outline between two nodes
 SHARP_DEG: Final = 25.0  # between normals of neighbours on an outline: a corner
+FITS: Final = 8  # of a curve, before it is cut
 NEAR: Final = 0.05  # units that curves may lie off outlines
 ROUND: Final = 2.0  # times as much: circles
 BEVEL: Final = 0.3  # units: shorter pieces between two corners are left out
@@ -114,7 +115,7 @@ def _seen(fold: Sequence[Operand]) -> Iterator[Layer]:
 class Shapes:
     """Distances of folds of a Program, by its network or by formulas, in units of the drawing."""
 
-    def __init__(self, program: Program, exact: bool = False) -> None:
+    def __init__(self, program: Program, exact: bool) -> None:
         from scenelang.drawing.closed import field_of
 
         self.program, self.network = program, field_of(program, exact)
@@ -175,7 +176,7 @@ class Region:
         half = shapes.half[:, 0, 0]
         corners = np.array([[low[0], -high[1]], [high[0], -low[1]]]) * shapes.unit + half
         self.low, self.high = corners.clip(-2 * BORDER, shapes.size + 2 * BORDER)
-        shell = np.asarray(getattr(self.bound.parts, "shell", 0.0))  # how thick leaves are, 0 for whole ones
+        shell = self.bound.parts.shell  # how thick leaves are, 0 for whole ones
         fine = np.where(shell > 0, np.minimum(shell / 2, 1 / 8), 1 / 8) * self.bound.frames.scale
         self.step = float(np.clip(fine.min() * shapes.unit, FINEST, 0.5))
 
@@ -230,27 +231,17 @@ class Region:
         return list(zip(np.split(points, cuts, 1), np.split(normals, cuts, 1), strict=True))
 
 
-# Of the sides of a cell, top, right, bottom and left, those where an outline enters and leaves it, by the
-# corners that are inside as bits: top left 1, top right 2, bottom right 4, bottom left 8.
-_WAYS: Final = {
-    1: "30", 2: "01", 3: "31", 4: "12", 5: "3012", 6: "02", 7: "32",
-    8: "23", 9: "20", 10: "0123", 11: "21", 12: "13", 13: "10", 14: "03",
-}  # fmt: skip
-
-
 def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
     """Closed outlines on a grid whose border is outside, as pairs of neighbours inside and outside (n, 2)."""
-    rows, columns = inside.shape
-    flat, number = inside.ravel().astype(np.intp), np.arange(rows * columns).reshape(rows, columns)
-    corner = [number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]]
-    kind = np.sum([flat[nodes] << bit for bit, nodes in enumerate(corner)], 0)
-    # sides by their first node, those that go right before those that go down
-    side = [corner[0], corner[1] + rows * columns, corner[3], corner[0] + rows * columns]
-    after: dict[int, int] = {}
-    for case, ways in _WAYS.items():
-        some = np.nonzero(kind == case)
-        for a, b in zip(ways[::2], ways[1::2], strict=True):
-            after.update(zip(side[int(a)][some].tolist(), side[int(b)][some].tolist(), strict=True))
+    flat, way = inside.ravel(), np.array([1, inside.shape[1], -1, -inside.shape[1]])
+    node, to = np.nonzero(flat[(np.arange(flat.size)[:, None] + way) % flat.size] < flat[:, None])
+    beside = (
+        node + way[(to + 1) % 4]
+    )  # the next pair of a cell; corners inside that face each other are apart
+    across = beside + way[to]
+    then = np.where(flat[across], (across, (to + 3) % 4), (beside, to))
+    then = np.where(flat[beside], then, (node, (to + 1) % 4))
+    after = dict(zip((4 * node + to).tolist(), (4 * then[0] + then[1]).tolist(), strict=True))
     result = []
     while after:
         start, at = after.popitem()
@@ -258,112 +249,84 @@ def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
         while at != start:
             loop.append(at)
             at = after.pop(at)
-        node = np.array(loop)
-        down, node = np.divmod(node, rows * columns)
-        ends = np.stack([node, node + np.where(down > 0, columns, 1)], 1)
-        result.append(np.where(flat[ends[:, :1]] > 0, ends, ends[:, ::-1]))
+        node, to = np.divmod(loop, 4)
+        result.append(np.stack([node, node + way[to]], 1))
     return result
-
-
-def _meet(p: Floats, along: Floats, then: Floats, past: Floats, most: float) -> Floats:
-    """Points (n, 2) where lines meet, by a point and a direction each; the middle where that is far off."""
-    turn = along[:, 0] * past[:, 1] - along[:, 1] * past[:, 0]
-    share = ((then - p)[:, 0] * past[:, 1] - (then - p)[:, 1] * past[:, 0]) / np.where(turn, turn, 1e-9)
-    middle, result = (p + then) / 2, p + share[:, None] * along
-    return np.where(np.hypot(*(result - middle).T)[:, None] < most, result, middle)
 
 
 def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
     """A closed outline between its corners: points (n, 2), ends among them, and directions there (n, 2).
 
-    A corner lies where the tangents of two neighbours meet. Without any the outline is cut into quarters.
+    A corner lies where the tangents of two neighbours meet; a short side is one that a learned corner lost.
     """
-    p, along = points.T, np.stack([-normals[1], normals[0]], 1)
-    if ((np.roll(p, -1, 0) - p) * along).sum() < 0:
+    p, along, count = points.T, np.stack([-normals[1], normals[0]], 1), points.shape[1]
+    way = np.roll(p, -1, 0) - p
+    if (way * along).sum() < 0:
         along = -along
-    ahead, then = np.roll(p, -1, 0), np.roll(along, -1, 0)
-    most = 3 * float(np.median(np.hypot(*(ahead - p).T)))
-    sharp = np.flatnonzero((along * then).sum(1) < np.cos(np.radians(SHARP_DEG)))
-    if not len(sharp):
-        cuts = [len(p) * i // 4 for i in range(5)]
-        smooth = np.sum([np.roll(along, i, 0) for i in (-2, -1, 0, 1, 2)], 0)
-        parts = [np.arange(a, b + 1) % len(p) for a, b in pairwise(cuts)]
-        return [(p[part], smooth[part] / np.hypot(*smooth[part].T)[:, None]) for part in parts]
-    places = _meet(p[sharp], along[sharp], ahead[sharp], then[sharp], most)
-    # of corners the points before and behind them
-    corners = [(int(i), int(i + 1) % len(p), place) for i, place in zip(sharp, places, strict=True)]
-    at = 0
-    while at < len(corners):  # a short side is what a learned corner has lost
-        (i, _, one), (_, j, other) = corners[at - 1], corners[at]
-        if len(corners) < 3 or np.hypot(*(other - one)) > BEVEL:
-            at += 1
-            continue
-        corners[at] = i, j, _meet(p[[i]], along[[i]], p[[j]], along[[j]], most)[0]
-        del corners[at - 1]
-        at = max(at - 1, 0)
+    most = 3 * float(np.median(np.hypot(*way.T)))
+
+    def meet(i: npt.NDArray[np.intp], j: npt.NDArray[np.intp]) -> Floats:
+        """Where tangents meet (n, 2); the middle where that is far off."""
+        between, turn = p[j] - p[i], _crossed(along[i], along[j])
+        share = _crossed(between, along[j]) / np.where(turn, turn, 1e-9)
+        middle, result = (p[i] + p[j]) / 2, p[i] + share[:, None] * along[i]
+        return np.where(np.hypot(*(result - middle).T)[:, None] < most, result, middle)
+
+    before = np.flatnonzero((along * np.roll(along, -1, 0)).sum(1) < np.cos(np.radians(SHARP_DEG)))
+    if not len(before):
+        parts = [np.arange(count * i // 4, count * (i + 1) // 4 + 1) % count for i in range(4)]
+        return [(p[part], along[part]) for part in parts]
+    behind = (before + 1) % count
+    place = meet(before, behind)
+    far = np.flatnonzero(np.hypot(*(place - np.roll(place, 1, 0)).T) > BEVEL)
+    if len(far) > 1:
+        before, behind = before[far], behind[np.roll(far, -1) - 1]
+        place = meet(before, behind)
     result = []
-    for (_, i, one), (j, _, other) in zip([corners[-1], *corners], corners, strict=False):
-        part = (i + np.arange((j - i) % len(p) + 1)) % len(p)
-        own = along[part]
+    for one, i, j, other in zip(np.roll(place, 1, 0), np.roll(behind, 1), before, place, strict=True):
+        own = along[part := (i + np.arange((j - i) % count + 1)) % count]
         result.append((np.concatenate([[one], p[part], [other]]), np.concatenate([own[:1], own, own[-1:]])))
     return result
 
 
+def _crossed(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def fitted(p: Floats, along: Floats) -> list[Floats]:
-    """Lines (1, 2) and cubics (3, 2), each by the points behind its first, that pass points (n, 2).
+    """Lines (1, 2) and cubics (3, 2), each by the points behind its first, along points (n, 2).
 
     The directions (n, 2) at the ends of curves are kept.
     """
-    chord = p[-1] - p[0]
+    chord, step = p[-1] - p[0], np.hypot(*np.diff(p, axis=0).T)
     length = float(np.hypot(*chord))
-    off = abs(chord[0] * (p - p[0])[:, 1] - chord[1] * (p - p[0])[:, 0])
-    if len(p) == 2 or (length > 0 and off.max() < NEAR * length):
+    if len(p) == 2 or (length > 0 and abs(_crossed(chord, p - p[0])).max() < NEAR * length):
         return [p[-1:]]
-    start, end = along[0], -along[-1]
-    step = np.hypot(*np.diff(p, axis=0).T)
     u = np.concatenate([[0.0], step.cumsum()]) / step.sum()
-    for turn in range(5):
-        v = 1 - u
-        b = np.stack([v**3, 3 * u * v**2, 3 * u**2 * v, u**3])
-        ways = b[1, :, None] * start, b[2, :, None] * end
-        rest = p - (b[0] + b[1])[:, None] * p[0] - (b[2] + b[3])[:, None] * p[-1]
-        c = np.array([[(one * other).sum() for other in ways] for one in ways])
-        x = np.array([(one * rest).sum() for one in ways])
-        det = c[0, 0] * c[1, 1] - c[0, 1] ** 2
-        sizes = np.array([x[0] * c[1, 1] - x[1] * c[0, 1], c[0, 0] * x[1] - c[0, 1] * x[0]]) / (det or 1.0)
-        if not (det > 1e-12 and sizes.min() > 1e-3 * length and sizes.max() < 3 * step.sum()):
+    ends, error = p[[0, 0, -1, -1]], np.full(len(p), np.inf)
+    for _ in range(FITS):
+        b = np.stack([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3], 1)
+        ways = b[:, 1] * _crossed(along, along[0]), -b[:, 2] * _crossed(along, along[-1])
+        sizes = np.linalg.lstsq(np.stack(ways, 1), _crossed(along, p - b @ ends), rcond=None)[0]
+        if not (sizes.min() > 1e-3 * length and sizes.max() < 3 * step.sum()):
             sizes[:] = step.sum() / 3
-        q = np.stack([p[0], p[0] + sizes[0] * start, p[-1] + sizes[1] * end, p[-1]])
-        there = b.T @ q
-        error = np.hypot(*(there - p).T)
+        q = ends + np.stack([0 * chord, sizes[0] * along[0], -sizes[1] * along[-1], 0 * chord])
+        off = b @ q - p
+        error = np.hypot(*off.T)
         if error.max() < NEAR:
             return [q[1:]]
-        if turn == 4 or error.max() > 40 * NEAR:
-            break
-        d1, d2 = 3 * np.diff(q, axis=0), 6 * np.diff(q, 2, axis=0)
-        slope = np.stack([v**2, 2 * u * v, u**2]).T @ d1
-        bend = np.stack([v, u]).T @ d2
-        below = (slope * slope).sum(1) + ((there - p) * bend).sum(1)
-        u = np.clip(u - ((there - p) * slope).sum(1) / np.where(abs(below) > 1e-9, below, np.inf), 0.0, 1.0)
+        slope = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u**2], 1) @ np.diff(3 * q, axis=0)
+        u = (u - (slope * off).sum(1) / (slope * slope).sum(1).clip(1e-9)).clip(0.0, 1.0)
     cut = int(error[1:-1].argmax()) + 1
-    middle = along[max(1, cut - 2) : min(len(p) - 1, cut + 3)].sum(0)
     along = along.copy()
-    along[cut] = middle / max(float(np.hypot(*middle)), 1e-9)
+    along[cut] = along[max(1, cut - 2) : min(len(p) - 1, cut + 3)].sum(0)
+    along[cut] /= max(float(np.hypot(*along[cut])), 1e-9)
     return fitted(p[: cut + 1], along[: cut + 1]) + fitted(p[cut:], along[cut:])
 
 
-def _number(value: float) -> str:
-    text = f"{value:.2f}".rstrip("0").rstrip(".")
-    text = "0" if text == "-0" else text
-    return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
-
-
-def _joined(numbers: Sequence[float]) -> str:
-    """Numbers with no more between them than is needed."""
-    result = ""
-    for text in map(_number, numbers):
-        result += text if not result or text.startswith("-") else f" {text}"
-    return result
+def _said(*numbers: float) -> str:
+    """Numbers in hundredths, with no more between them than is needed."""
+    return " ".join(f"{round(number, 2) + 0.0:g}" for number in numbers).replace(" -", "-")
 
 
 def path_of(points: Floats, normals: Floats) -> str:
@@ -372,30 +335,17 @@ def path_of(points: Floats, normals: Floats) -> str:
     middle = p.mean(0)
     a = np.concatenate([2 * (p - middle), np.ones((len(p), 1))], 1)
     x, y, rest = np.linalg.lstsq(a, ((p - middle) ** 2).sum(1), rcond=None)[0]
-    radius = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
-    if abs(np.hypot(*(p - middle - [x, y]).T) - radius).max() < ROUND * NEAR:
-        r, d = _number(radius), _number(2 * radius)
-        first = _joined([middle[0] + x - radius, middle[1] + y])
-        way = int(((p - np.roll(p, 1, 0))[:, 0] * (p + np.roll(p, 1, 0))[:, 1]).sum() < 0)
-        return f"M{first}a{r} {r} 0 1 {way} {d} 0a{r} {r} 0 1 {way}-{d} 0z"
+    r = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
+    if abs(np.hypot(*(p - middle - [x, y]).T) - r).max() < ROUND * NEAR:
+        way = int(_crossed(p, np.roll(p, 1, 0)).sum() < 0)
+        first = _said(middle[0] + x - r, middle[1] + y)
+        return f"M{first}a{_said(r, r, 0, 1, way, 2 * r, 0)}a{_said(r, r, 0, 1, way, -2 * r, 0)}z"
     parts = [curve for piece in _pieces(points, normals) for curve in fitted(*piece)]
     at = np.round(parts[-1][-1], 2)
-    result, last = f"M{_joined(at)}", ""
-    for number, curve in enumerate(parts):
-        move = np.round(curve, 2) - at
+    result = f"M{_said(*at)}"
+    for curve in parts[: -1 if len(parts[-1]) == 1 else None]:
+        result += ("c" if len(curve) == 3 else "l") + _said(*(np.round(curve, 2) - at).ravel())
         at = np.round(curve[-1], 2)
-        if len(curve) == 3:
-            word, values = "c", move.ravel().tolist()
-        elif number == len(parts) - 1:
-            continue
-        else:
-            flat = abs(move[0]) < 0.005
-            word, values = (
-                ("h", [move[0, 0]]) if flat[1] else ("v", [move[0, 1]]) if flat[0] else ("l", move[0])
-            )
-        text = _joined(values)
-        result += (word if word != last else "" if text.startswith("-") else " ") + text
-        last = word
     return result + "z"
 
 
@@ -422,15 +372,11 @@ class Inks:
         if worn != NO_TEXTURE:
             paint = self.shapes.paints[row]
             assert paint is not None
-            stops = getattr(paint.element, "stops", ())
-            made = self._gradient(row, paint.element.name, stops) if stops else None
-            fill = self._refer(made or self._picture(row, region))
-        opacity = "" if self.opacity[row] >= 1 else f' fill-opacity="{_number(self.opacity[row])}"'
+            made = self._gradient(row, paint.element) if isinstance(paint.element, Gradient) else None
+            made = made or self._picture(row, region)
+            fill = f"url(#{self.defined.setdefault(made, f'p{len(self.defined) + 1}')})"
+        opacity = "" if self.opacity[row] >= 1 else f' fill-opacity="{_said(self.opacity[row])}"'
         return f'fill="{fill}"{opacity}'
-
-    def _refer(self, made: str) -> str:
-        name = self.defined.setdefault(made, f"p{len(self.defined) + 1}")
-        return f"url(#{name})"
 
     def _local(self, row: int, p: Floats) -> Floats:
         """Leaf coordinates (2, M) of a row at points (2, M)."""
@@ -439,40 +385,31 @@ class Inks:
         q = field.frames.local(field.xp, np.full(p.shape[1], row), world.astype(np.float32))
         return np.asarray(q, np.float64)[:, 0]
 
-    def _gradient(self, row: int, name: str, stops: Sequence[tuple[float, ...]]) -> str | None:
+    def _gradient(self, row: int, gradient: Gradient) -> str | None:
         """A gradient; None where its lines are bent."""
-        size = self.shapes.size
-        q = self._local(row, np.array([[0, 1, 0, 1, 0.5], [0, 0, 1, 1, 0.5]]) * size[:, None])
-        if (
-            abs(q[:, 1] + q[:, 2] - q[:, 0] - q[:, 3]).max() + abs(q[:, 0] + q[:, 3] - 2 * q[:, 4]).max()
-            > 1e-4
-        ):
+        whole = self.shapes.whole
+        p = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1], [0.5, 0.5, 1]]) * [*self.shapes.size, 1]
+        matrix = whole.parts.texture[row].astype(np.float64).reshape(2, 3)
+        there = self._local(row, p[:, :2].T).T @ matrix[:, :2].T + matrix[:, 2]
+        way = np.linalg.lstsq(p, there, rcond=None)[0]
+        if abs(p @ way - there).max() > 1e-4 or not abs(np.linalg.det(way[:2])) > 1e-12:
             return None
-        (a, b, u), (c, d, v) = self.shapes.whole.parts.texture[row].astype(np.float64).reshape(2, 3)
-        there = np.array([[a, b], [c, d]]) @ q + [[u], [v]]
-        way = np.stack([(there[:, 1] - there[:, 0]) / size[0], (there[:, 2] - there[:, 0]) / size[1]], 1)
-        if not abs(np.linalg.det(way)) > 1e-12:
-            return None
-        back = np.linalg.inv(way)
-        shift = -back @ there[:, 0]
-        moved = " ".join(f"{value:.6g}" for value in [*back.T.ravel(), *shift])
-        texture = self.shapes.whole.textures[self.looks[row][2]]
-        offsets = np.array([stop[0] for stop in stops])
-        shown = np.array([stop[1:] for stop in stops], np.float32).T
+        back = np.linalg.inv(np.concatenate([way, [[0], [0], [1]]], 1))[:, :2]
+        moved = " ".join(f"{value:.6g}" for value in back.ravel())
+        texture, stops = whole.textures[self.looks[row][2]], np.array(gradient.stops)
         if any(step[0] == "hue" for step in texture.steps):  # which bends the way from colour to colour
             more = np.linspace(0, 1, 17)
-            shown = np.concatenate([shown, [np.interp(more, offsets, channel) for channel in shown]], 1)
-            offsets = np.concatenate([offsets, more])
-            order = np.argsort(offsets, kind="stable")
-            offsets, shown = offsets[order], shown[:, order].astype(np.float32)
-        shown = stepped(self.shapes.whole.xp, shown, texture.steps)
+            between = [more, *(np.interp(more, stops[:, 0], channel) for channel in stops.T[1:])]
+            stops = np.concatenate([stops, np.stack(between, 1)])
+            stops = stops[np.argsort(stops[:, 0], kind="stable")]
+        shown = stepped(whole.xp, stops[:, 1:].T.astype(np.float32), texture.steps).T
         listed = "".join(
             f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>'
-            for at, rgb in zip(offsets, shown.T, strict=True)
+            for at, rgb in zip(stops[:, 0], shown, strict=True)
         )
-        ends = 'x1="-1" x2="1"' if name == "linear" else 'cx="0" cy="0" r="1"'
+        ends = 'x1="-1" x2="1"' if gradient.name == "linear" else 'cx="0" cy="0" r="1"'
         form = f'id="%s" gradientUnits="userSpaceOnUse" {ends} gradientTransform="matrix({moved})"'
-        return f"<{name}Gradient {form}>{listed}</{name}Gradient>"
+        return f"<{gradient.name}Gradient {form}>{listed}</{gradient.name}Gradient>"
 
     def _picture(self, row: int, region: Region) -> str:
         """A pattern of one picture, which a texture shows within a region."""
@@ -496,11 +433,11 @@ class Inks:
         return f'<pattern id="%s" patternUnits="userSpaceOnUse" x="{x}" y="{y}" {held}>{picture}</pattern>'
 
 
-def svg_of(program: Program, how: How) -> tuple[str, bool]:
+def svg_of(program: Program, exact: bool) -> tuple[str, bool]:
     """A Program of the plane as SVG, and whether blended colours became the nearer object's; raises
     `RenderError` where there are no outlines.
     """
-    shapes = Shapes(program, how.backend == "exact")
+    shapes = Shapes(program, exact)
     inks, (width, height), body = Inks(shapes), program.canvas, []
     across, down = (f"{side:g}" for side in shapes.size)
     if program.background is not None:
@@ -522,10 +459,5 @@ def svg_of(program: Program, how: How) -> tuple[str, bool]:
         defined = "\n".join(made.replace("%s", name, 1) for made, name in inks.defined.items())
         body.insert(0, f"<defs>\n{defined}\n</defs>")
     size = f'width="{width}" height="{height}" viewBox="0 0 {across} {down}"'
-    linked = (
-        ' xmlns:xlink="http://www.w3.org/1999/xlink"'
-        if any("<image" in made for made in inks.defined)
-        else ""
-    )
-    text = "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg"{linked} {size}>', *body, "</svg>", ""])
-    return text, blended > 0
+    linked = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    return "\n".join([f"<svg {linked} {size}>", *body, "</svg>", ""]), blended > 0

@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
-from itertools import islice
+from itertools import cycle, islice, product
 from numbers import Real
 from pathlib import Path
 from typing import Any, Final, Literal, Unpack
@@ -48,53 +48,13 @@ from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
-from scenelang.output.frames import Clip, Shot, Store, Target, TargetError, find_target, is_pattern
-from scenelang.output.painting import Drawable, Painter
+from scenelang.output.frames import Clip, Drawable, Shot, Store, Target, TargetError, find_target, is_pattern
+from scenelang.output.painting import Painter
 
 MOST_ROWS: Final = 1_000_000
 MOST_LISTED: Final = 10_000  # values or ranges of a param between commas
 _DIGITS: Final = 6  # digits of a value, relative to the width of its range
 _RANGE: Final = re.compile(r"(.*?)\.\.(<?)(.*?)(?:/\s*(\d{1,7})|\s+step\s+(.+))?", re.DOTALL)
-
-
-class Rows(Record):
-    """Values of params, a row for each picture."""
-
-    grid: Mapping[str, tuple[str, ...]]  # texts of each param's values; the last param changes fastest
-    random: tuple[Knob, ...] = ()  # params with random values
-    count: int = 0  # number of rows; the grid repeats
-    seed: int = 0  # of the random values
-    given: Sequence[Mapping[str, str]] = ()  # explicit rows, instead of all this
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        if self.given:
-            return tuple(dict.fromkeys(name for row in self.given for name in row))
-        return (*self.grid, *(knob.name for knob in self.random))
-
-    def __len__(self) -> int:
-        return len(self.given) or self.count
-
-    def __getitem__(self, index: int) -> Mapping[str, str]:
-        if self.given:
-            return self.given[index]
-        result, rest = {}, index
-        for name, texts in reversed(list(self.grid.items())):
-            rest, at = divmod(rest, len(texts))
-            result[name] = texts[at]
-        result = {name: result[name] for name in self.grid}
-        for knob in self.random:
-            items = tuple(self._drawn(knob, axis, index) for axis in knob.axes)
-            result[knob.name] = _text(knob, Vec(items) if knob.inner else items[0])
-        return result
-
-    def __iter__(self) -> Iterator[Mapping[str, str]]:
-        return map(self.__getitem__, range(len(self)))
-
-    def _drawn(self, knob: Knob, axis: Axis, index: int) -> Any:
-        share = random.Random(f"{self.seed}/{axis.label}/{index}").random()
-        place = int(share * len(axis.choices)) if axis.choices else share
-        return value_at(axis, place, knob.value)
 
 
 def rows_of(
@@ -103,35 +63,49 @@ def rows_of(
     drawn: Mapping[str, str],
     count: int | None = None,
     seed: int = 0,
-) -> Rows:
-    """Rows of a grid, by default as many, and random values of ``drawn``: a range, or "" for its own."""
-    result: dict[str, tuple[str, ...]] = {}
+) -> tuple[list[dict[str, str]], int]:
+    """Rows of a grid, by default as many, and random values of ``drawn``: a range, or "" for its own.
+
+    The last param changes fastest, and the grid repeats; its number of values comes second, 0 without others.
+    """
+    cells: dict[str, tuple[str, ...]] = {}
     for name, asked in grid.items():
         stmt = param_named(evaluation, name)
         texts = values_of(evaluation, stmt, asked) if isinstance(asked, str) else map(text_of, asked)
-        result[name] = tuple(islice(texts, MOST_ROWS + 1))
-        if len(result[name]) > MOST_ROWS:
+        cells[name] = tuple(islice(texts, MOST_ROWS + 1))
+        if len(cells[name]) > MOST_ROWS:
             raise ParamError(f"more than {MOST_ROWS:,} values of `{name}`")
-        if not result[name]:
+        if not cells[name]:
             raise ParamError(f"no values for `{name}`")
     for name in drawn:
-        if name in result:
+        if name in cells:
             raise ParamError(f"param `{name}` both in the grid and drawn at random")
-    knobs = tuple(_narrowed(evaluation, param_named(evaluation, name), text) for name, text in drawn.items())
-    cells = math.prod(map(len, result.values()))
-    if not result and not knobs:
+    knobs = [_narrowed(evaluation, param_named(evaluation, name), text) for name, text in drawn.items()]
+    whole = math.prod(map(len, cells.values()))
+    if not cells and not knobs:
         raise ParamError("no param to change")
-    if count is None and not result:
+    if count is None and not cells:
         raise ParamError("a count is needed where all values are drawn at random")
-    total = cells if count is None else count
-    if result and total < cells:
-        raise ParamError(f"{plural(total, 'picture')}, where the grid has {cells:,}")
-    if total > cells and not knobs:
-        fact = f"{plural(total, 'picture')}, where the grid has {cells:,}"
-        raise ParamError(f"{fact} and nothing is drawn at random")
+    total = whole if count is None else count
+    if (cells and total < whole) or (total > whole and not knobs):
+        fact = f"{plural(total, 'picture')}, where the grid has {whole:,}"
+        raise ParamError(fact + " and nothing is drawn at random" * (total > whole))
     if not 0 < total <= MOST_ROWS:
         raise ParamError(f"{total:,} pictures, where 1 to {MOST_ROWS:,} can be made")
-    return Rows(result, knobs, total, seed)
+    rows = [dict(zip(cells, row, strict=True)) for row in islice(cycle(product(*cells.values())), total)]
+    for knob in knobs:
+        for index, row in enumerate(rows):
+            row[knob.name] = _drawn(knob, seed, index)
+    return rows, len(list(cells.values())[-1]) if len(cells) > 1 else 0
+
+
+def _drawn(knob: Knob, seed: int, index: int) -> str:
+    """A random value of a param in a row."""
+    items = []
+    for axis in knob.axes:
+        share = random.Random(f"{seed}/{axis.label}/{index}").random()
+        items.append(value_at(axis, int(share * len(axis.choices)) if axis.choices else share, knob.value))
+    return _text(knob, Vec(tuple(items)) if knob.inner else items[0])
 
 
 def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[str]:
@@ -162,8 +136,7 @@ def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[s
 
 def _spread(evaluation: Evaluation, stmt: tree.Param, match: re.Match[str]) -> Iterator[str]:
     first, without, last, parts, step = match.groups()
-    low, high, unit = _ends(evaluation, stmt, first, last)
-    knob = _knob(evaluation, stmt, low, high)
+    knob, low, high, unit = _ends(evaluation, stmt, first, last)
     if parts is None:
         by = 1.0 if step is None else unpack(_number(evaluation, stmt, step))[0]
         stepped = RangeValue(low, high, bool(without), by, unit)
@@ -186,15 +159,11 @@ def _narrowed(evaluation: Evaluation, stmt: tree.Param, text: str) -> Knob:
     match = _RANGE.fullmatch(text)
     if match is None or match[2] or match[4] or match[5]:
         raise ParamError(f"`{text}` is not a range such as 0..1")
-    return _knob(evaluation, stmt, *_ends(evaluation, stmt, match[1], match[3])[:2])
+    return _ends(evaluation, stmt, match[1], match[3])[0]
 
 
-def _knob(evaluation: Evaluation, stmt: tree.Param, *ends: float) -> Knob:
-    return Knob(stmt, _default(evaluation, stmt), (Axis(stmt.name.text, min(ends), max(ends)),), False)
-
-
-def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tuple[float, float, str]:
-    """Both ends of a range in base units, and their kind."""
+def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tuple[Knob, float, float, str]:
+    """A param with values in a range, and both its ends in base units, with their kind."""
     like = _default(evaluation, stmt)
     if like.__class__ not in UNITS:
         raise ParamError(f"a range for `{stmt.name.text}`, which is not a number")
@@ -208,7 +177,8 @@ def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tu
         ends = [own if end is None else end for end, own in zip(ends, (low, high), strict=True)]
     low, high = (end for end in ends if end is not None)
     check_width(stmt.name.text, low, high)
-    return low, high, unpack(like)[1]
+    knob = Knob(stmt, like, (Axis(stmt.name.text, min(low, high), max(low, high)),), False)
+    return knob, low, high, unpack(like)[1]
 
 
 def _number(evaluation: Evaluation, stmt: tree.Param, text: str) -> Any:
@@ -275,16 +245,6 @@ class Line(Record):
         return (self.picture, *self.values, self.digest, self.error)
 
 
-def check_table(path: Path) -> None:
-    """Raise `TableError` where a table of this name cannot be written."""
-    if path.suffix.lower() not in (".csv", PARQUET):
-        raise TableError(f"`{path}` is not a table; one ends in .csv or {PARQUET}")
-    if not path.parent.is_dir():
-        raise TableError(f"cannot write `{path}`: there is no folder `{path.parent}`")
-    if path.suffix.lower() == PARQUET and find_spec("pyarrow") is None:
-        raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
-
-
 def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> bytes:
     """Contents of a table of this name."""
     heads = (*_FRONT, *names, *_BACK)
@@ -297,41 +257,21 @@ def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> byte
     return text.getvalue().encode()
 
 
-def read_table(path: Path, names: Sequence[str]) -> list[Line]:
-    """Read the rows of a CSV table; raises `TableError` where it is of other params, or no table."""
-    try:
-        text = read_regular(path, _MOST_BYTES).decode("utf-8")
-        rows = list(csv.reader(io.StringIO(text, newline="")))
-    except (ValueError, csv.Error) as error:
-        raise TableError(f"`{path}` is not a table: {error}") from None
-    heads = [*_FRONT, *names, *_BACK]
-    if not rows or rows[0] != heads or any(len(row) != len(heads) for row in rows):
-        raise TableError(f"`{path}` is not a table of these params")
-    return [Line(row[0], tuple(row[1:-2]), *row[-2:]) for row in rows[1:]]
-
-
 def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
     import pyarrow as arrow
     import pyarrow.parquet
 
     fields, arrays = [], []
     for name, texts in zip(heads, zip(*(line.cells for line in lines), strict=True), strict=True):
-        values, unit = (texts, "") if name in (*_FRONT, *_BACK) else _typed(texts)
-        arrays.append(arrow.array(values))
-        fields.append(arrow.field(name, arrays[-1].type, metadata={"unit": unit} if unit else None))
+        column = [(text, "") if name in (*_FRONT, *_BACK) else _value(text) for text in texts]
+        kinds = {(type(value), unit) for value, unit in column if value is not None}
+        values, unit = [value for value, _ in column], next(iter(kinds), (None, ""))[1]
+        arrays.append(arrow.array(values if len(kinds) <= 1 else texts))  # None for defaults
+        own = {"unit": unit} if unit and len(kinds) == 1 else None
+        fields.append(arrow.field(name, arrays[-1].type, metadata=own))
     buffer = io.BytesIO()
     pyarrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), buffer)
     return buffer.getvalue()
-
-
-def _typed(texts: Sequence[str]) -> tuple[Sequence[Any], str]:
-    """Values of a column, None for defaults, and the unit of its numbers; the texts where kinds differ."""
-    result = [_value(text) for text in texts]
-    kinds = {type(value) for value, _ in result if value is not None}
-    units = {unit for value, unit in result if value is not None}
-    if len(kinds) > 1 or len(units) > 1:
-        return texts, ""
-    return [value for value, _ in result], next(iter(units), "")
 
 
 def _value(text: str) -> tuple[Any, str]:
@@ -348,51 +288,36 @@ def _value(text: str) -> tuple[Any, str]:
     return text, ""
 
 
-class Variants(Clip):
-    """Scenes of rows, by the number of the row: one frame of a parsed scene, run for each row's values."""
-
-    def __init__(self, source: Source, rows: Rows, frame: int, diagnostics: Diagnostics) -> None:
-        self._source, self._rows, self._frame = source, rows, frame
-        super().__init__(source.evaluation(diagnostics), diagnostics)
-        self._memory = None  # rows share no objects
-
-    def shot(self, number: int) -> Shot:
-        assert isinstance(self._evaluation, Evaluation)
-        self._evaluation.inputs.values = self._source.values | dict(self._rows[number])
-        return replace(super().shot(self._frame), number=number)
-
-    def mend(self) -> None:
-        """Forget the errors of a row, so that others can be run."""
-        old, self.diagnostics = self.diagnostics, Diagnostics()
-        for d in old:
-            if d.severity == "warning":
-                self.diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
-        self._evaluation = self._source.evaluation(self.diagnostics)
-
-
 TEXTS: Final = {"scene": ".nsg", "program": ".safetensors"}
 """Suffixes of files next to a picture that are not pictures themselves."""
 _REPORTED: Final = 3  # rows whose errors are reported in full
 
 
-class SweepTable:
-    """Table of a sweep, updated as rows are compiled; raises `TableError` in the folder of another sweep.
+class Variants(Clip):
+    """Scenes of rows, by the number of the row: one frame of a parsed scene, run for each row's values.
 
-    It is written before anything is drawn, and again when all rows are compiled, before pictures are moved to
-    their places. So pictures of another sweep are noticed, wherever that sweep was stopped.
+    Their table is written before anything is drawn, and again when all rows are compiled, before pictures are
+    moved to their places. So pictures of another sweep are noticed, wherever that sweep was stopped; in its
+    folder this raises `TableError`.
     """
 
     def __init__(
         self,
+        source: Source,
+        rows: Sequence[Mapping[str, str]],
+        frame: int,
+        diagnostics: Diagnostics,
         target: Target,
-        rows: Rows,
-        clip: Variants,
-        outputs: Sequence[Output],
-        texts: Sequence[str],
+        outputs: Sequence[Kind],
         stem: str,
     ) -> None:
-        self.target, self.clip, self.outputs, self.texts = target, clip, outputs, texts
-        self.file, self.names = target.path / f"{stem}.csv", rows.names
+        super().__init__(source.evaluation(diagnostics), diagnostics)
+        self._source, self._rows, self._frame = source, rows, frame
+        self._memory = None  # rows share no objects
+        self.target, self._asked = target, outputs
+        self.outputs: tuple[Output, ...] = tuple(name for name in BESIDE if name in outputs)
+        self.file = target.path / f"{stem}.csv"
+        self.names = tuple(dict.fromkeys(name for row in rows for name in row))
         self.told: dict[int, Sequence[Diagnostic]] = {}  # errors of the first rows that have any, by number
         self.lines = [
             Line(target.file(at).name, tuple(row.get(name, "") for name in self.names))
@@ -410,7 +335,15 @@ class SweepTable:
                 fact = f"pictures of these names without a table, `{others[0].name}` among them"
                 raise TableError(f"`{self.target.path}` has {fact}")
             return []
-        old = read_table(self.file, self.names)
+        try:
+            text = read_regular(self.file, _MOST_BYTES).decode("utf-8")
+            cells = list(csv.reader(io.StringIO(text, newline="")))
+        except (ValueError, csv.Error) as error:
+            raise TableError(f"`{self.file}` is not a table: {error}") from None
+        heads = [*_FRONT, *self.names, *_BACK]
+        if not cells or cells[0] != heads or any(len(row) != len(heads) for row in cells):
+            raise TableError(f"`{self.file}` is not a table of these params")
+        old = [Line(row[0], tuple(row[1:-2]), *row[-2:]) for row in cells[1:]]
         for at, (line, now) in enumerate(zip(old, self.lines, strict=False)):
             if line.values != now.values:
                 fact = f"{', '.join(line.values)} where {', '.join(now.values)} are asked for"
@@ -419,41 +352,48 @@ class SweepTable:
             raise TableError(f"`{self.file}` has {len(old):,} rows, and {len(self.lines):,} are asked for")
         return old
 
+    def shot(self, number: int) -> Shot:
+        assert isinstance(self._evaluation, Evaluation)
+        self._evaluation.inputs.values = {**self._source.values, **self._rows[number]}
+        return replace(super().shot(self._frame), number=number)
+
     def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
         """Note a row that gives a scene; returns the files next to its picture."""
         line = self.lines[frame.number]
         old = self._old[frame.number] if frame.number < len(self._old) else line
         if old.digest == frame.key:
-            self._adopt(frame, store)
+            file, stored = self.target.file(frame.number), store.file(frame.key)
+            files = {output_file(stored, name): output_file(file, name) for name in self.outputs}
+            files[stored] = file
+            if all(path.is_file() for path in files.values()):
+                for into, path in files.items():
+                    store.adopt(into, path)
         elif old.digest:
             raise TableError(
                 f"`{self.file}` is of another scene, model, size or version: row {frame.number} differs"
             )
         self._note(frame.number, Line(line.picture, line.values, frame.key))
         result = {}
-        if "scene" in self.texts:
+        if "scene" in self._asked:
             result[TEXTS["scene"]] = frame.shot.scene.to_nsg().encode()
-        if "program" in self.texts:
+        if "program" in self._asked:
             if frame.program is None:
                 raise RenderError("the reference has no programs to write")
             result[TEXTS["program"]] = program_bytes(frame.program)
         return result
 
     def failed(self, number: int, error: SceneError) -> None:
-        """Note a row whose values give no scene."""
+        """Note a row whose values give no scene, and forget its errors, so that others can be run."""
         errors = [d for d in error.diagnostics if d.severity == "error"]
         if len(self.told) < _REPORTED:
             self.told[number] = errors
         line = self.lines[number]
         self._note(number, Line("", line.values, "", f"{errors[0].code}: {errors[0].message}"))
-        self.clip.mend()
-
-    def _adopt(self, frame: Drawable, store: Store) -> None:
-        file, stored = self.target.file(frame.number), store.file(frame.key)
-        files = {output_file(stored, name): output_file(file, name) for name in self.outputs} | {stored: file}
-        if all(path.is_file() for path in files.values()):
-            for into, path in files.items():
-                store.adopt(into, path)
+        old, self.diagnostics = self.diagnostics, Diagnostics()
+        for d in old:
+            if d.severity == "warning":
+                self.diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
+        self._evaluation = self._source.evaluation(self.diagnostics)
 
     def _note(self, number: int, line: Line) -> None:
         self.lines[number] = line
@@ -592,14 +532,20 @@ def render_many(
         SceneError: the scene has errors whatever the values are.
         RenderError, OSError, ValueError, TypeError: as for `scenelang.animate`.
     """
-    given: object = path
-    if not isinstance(given, str | os.PathLike):
+    place: object = path
+    if not isinstance(place, str | os.PathLike):
         fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
         raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
     target = _target(os.fspath(out), stem)
     if table is not None:
-        check_table(Path(table))
+        kind, folder = Path(table).suffix.lower(), Path(table).parent
+        if kind not in (".csv", PARQUET):
+            raise TableError(f"`{Path(table)}` is not a table; one ends in .csv or {PARQUET}")
+        if not folder.is_dir():
+            raise TableError(f"cannot write `{Path(table)}`: there is no folder `{folder}`")
+        if kind == PARQUET and find_spec("pyarrow") is None:
+            raise TableError(f"{PARQUET} needs pyarrow: pip install 'scenelang[parquet]'")
     if sheet is not None:
         image_format(sheet)
     diagnostics = Diagnostics()
@@ -608,56 +554,34 @@ def render_many(
     first = source.evaluation(diagnostics, frame=frame)
     if first.run(frame)[0] is None or diagnostics.errors:  # those of its syntax are of no row
         raise SceneError(diagnostics)
-    rows = _rows(first, values, grid or {}, random, count, seed)
-    for name in rows.names:
-        if name in fixed:
-            raise ParamError(f"param `{name}` with one value for all pictures, and with others")
-    clip = Variants(source, rows, frame, diagnostics)
-    beside: list[Output] = [name for name in BESIDE if name in outputs]
-    painter = Painter(clip, How(**how).checked(), outputs=tuple(beside), single=True)
-    sweep_table = SweepTable(
-        target, rows, clip, painter.outputs, [name for name in TEXTS if name in outputs], stem
-    )
-    run = make(
-        painter, target, range(len(rows)), jobs=jobs, cluster=cluster,
-        beside=sweep_table.beside, failed=sweep_table.failed, progress=progress,
-    )  # fmt: skip
-    names, lines = rows.names, sweep_table.lines
-    if table is not None:
-        write_output(table, table_bytes(Path(table), names, lines))
-    if sheet is not None:
-        last = len(tuple(rows.grid.values())[-1]) if len(rows.grid) > 1 else 0  # a row of the sheet
-        write_sheet(Path(sheet), target.path, names, lines, last)
-    return Sweep(sweep_table.file, names, lines, sweep_table.told, clip.diagnostics.items, run)
-
-
-def _target(out: str, stem: str) -> Target:
-    if is_pattern(out):
-        return find_target(out)
-    path = Path(out)
-    if path.is_file() or (path.suffix and not path.is_dir() and not out.endswith(("/", "\\"))):
-        raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
-    return Target("sequence", path, f"{stem.replace('%', '%%')}-%06d.png")
-
-
-def _rows(
-    first: Evaluation,
-    values: Iterable[Mapping[str, Any]],
-    grid: Mapping[str, str | Iterable[Any]],
-    random: Iterable[str] | Mapping[str, str],
-    count: int | None,
-    seed: int,
-) -> Rows:
-    given = tuple({name: text_of(value) for name, value in row.items()} for row in values)
+    given = [{name: text_of(value) for name, value in row.items()} for row in values]
     drawn = dict(random) if isinstance(random, Mapping) else dict.fromkeys(random, "")
-    if not given:
-        return rows_of(first, grid, drawn, count, seed)
-    if grid or drawn or count is not None:
+    if given and (grid or drawn or count is not None):
         raise ParamError("values are given as they are, and as a grid or at random")
     if len(given) > MOST_ROWS:
         raise ParamError(f"{len(given):,} pictures, where at most {MOST_ROWS:,} can be made")
-    rows = Rows({}, given=given)
-    for name in rows.names:
+    for name in dict.fromkeys(name for row in given for name in row):
         if name not in first.inputs.known:
             param_named(first, name)
-    return rows
+    rows, across = (given, 0) if given else rows_of(first, grid or {}, drawn, count, seed)
+    for name in fixed:
+        if any(name in row for row in rows):
+            raise ParamError(f"param `{name}` with one value for all pictures, and with others")
+    checked = How(**how).checked()
+    clip = Variants(source, rows, frame, diagnostics, target, outputs, stem)
+    run = make(
+        Painter(clip, checked, outputs=clip.outputs, single=True), target, range(len(rows)), jobs=jobs,
+        cluster=cluster, progress=progress,
+    )  # fmt: skip
+    if table is not None:
+        write_output(table, table_bytes(Path(table), clip.names, clip.lines))
+    if sheet is not None:
+        write_sheet(Path(sheet), target.path, clip.names, clip.lines, across)
+    return Sweep(clip.file, clip.names, clip.lines, clip.told, clip.diagnostics.items, run)
+
+
+def _target(out: str, stem: str) -> Target:
+    path, pattern, folder = Path(out), is_pattern(out), out.endswith(("/", "\\"))
+    if not pattern and (path.is_file() or (path.suffix and not path.is_dir() and not folder)):
+        raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
+    return find_target(out if pattern or folder else f"{out}/", stem, 6)

@@ -26,7 +26,7 @@ from scenelang.language.reports import SceneError, render_text
 from scenelang.language.session import Defines
 from scenelang.output.animate import make
 from scenelang.output.frames import Clip, FrameRange
-from scenelang.output.painting import Drawable, Painter
+from scenelang.output.painting import Painter
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -57,11 +57,7 @@ class Outcome:
     draft: bool = False  # the picture is coarse, and a better one follows
     same: bool = False  # nothing was drawn: the picture is the previous one
     diagnostics: list[Diagnostic] = field(default_factory=list)  # of the scene
-    # times of the steps; `load_s` is torch's import
-    compile_s: float = 0.0
-    load_s: float = 0.0
-    draw_s: float = 0.0
-    save_s: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)  # time of each step
     files: list[Path] = field(default_factory=list)  # written files
 
 
@@ -114,34 +110,32 @@ class Easel:
         if self.target is not None and (clip.animates or self.target.kind == "sequence"):
             run = make(painter, self.target, numbers, progress=checking(before))
             outcome.good, outcome.files = True, run.files
-            outcome.compile_s, outcome.draw_s, outcome.save_s = run.compile_s, run.draw_s, run.encode_s
+            outcome.seconds = {"compile": run.compile_s, "draw": run.draw_s, "save": run.encode_s}
             return
         frame = painter.prepare(clip.shot(self.frame), single=True)
-        outcome.load_s = painter.load_s
-        outcome.compile_s = time.perf_counter() - started - painter.load_s
+        outcome.seconds["compile"] = time.perf_counter() - started - painter.load_s
+        if painter.load_s:
+            outcome.seconds["load torch"] = painter.load_s
         if frame.key == self._key and self.out.exists():
             outcome.image, outcome.good, outcome.same = self._image, True, True
             return
         if self._took_s > DRAFT_S:
-            self._draft(painter, frame, replace(outcome, draft=True))
+            started, draft = time.perf_counter(), replace(outcome, draft=True, seconds={**outcome.seconds})
+            draft.image = painter.draft(frame)
+            draft.seconds["draw"] = time.perf_counter() - started
+            if draft.image is not None:
+                self._save(draft, draft.image, None)  # the file is not the picture of a scene now
+                self.drafted(draft)
         started = time.perf_counter()
         outcome.image = painter.draw(frame, checking(before))
-        outcome.draw_s = self._took_s = time.perf_counter() - started
+        outcome.seconds["draw"] = self._took_s = time.perf_counter() - started
         self._image = outcome.image
         self._save(outcome, outcome.image, frame.key)
-
-    def _draft(self, painter: Painter, frame: Drawable, outcome: Outcome) -> None:
-        started = time.perf_counter()
-        outcome.image = painter.draft(frame)
-        outcome.draw_s = time.perf_counter() - started
-        if outcome.image is not None:
-            self._save(outcome, outcome.image, None)  # the file is not the picture of a scene now
-            self.drafted(outcome)
 
     def _save(self, outcome: Outcome, image: Image, key: str | None) -> None:
         started, self._key = time.perf_counter(), None
         image.save(self.out)
-        outcome.save_s = time.perf_counter() - started
+        outcome.seconds["save"] = time.perf_counter() - started
         outcome.good, outcome.files, self._key = True, [self.out], key
 
     def _open(self, diagnostics: Diagnostics) -> Clip:
@@ -220,14 +214,14 @@ class Screen:
 
     def clear(self) -> None:
         if self.terminal:
-            self._write(_CLEAR)
+            print(_CLEAR, end="", flush=True)
 
     def say(self, line: str) -> None:
-        self._write(line + "\n")
+        print(line, flush=True)
 
     def say_diagnostics(self, diagnostics: list[Diagnostic]) -> None:
         """Print diagnostics with carets."""
-        self._write(render_text(diagnostics, self.colour))
+        print(render_text(diagnostics, self.colour), end="", flush=True)
 
     def show(self, picture: PIL.Image.Image) -> None:
         """Show a picture, no larger than the screen; after an error report it once and show no more."""
@@ -254,10 +248,6 @@ class Screen:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # between two libraries
             console.print(shown(over_grey(picture), width=size[0], height=size[1]))
-        sys.stdout.flush()
-
-    def _write(self, text: str) -> None:
-        sys.stdout.write(text)
         sys.stdout.flush()
 
 

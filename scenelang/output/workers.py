@@ -61,6 +61,7 @@ class Link:
         dask.config.set({LOGGED: 1, _LARGE: 1 << 40})  # else arguments stay in memory and cause warnings
         self.address = address
         self._libraries = libraries
+        self.under_way: dict[Future[Any], Any] = {}  # names of calls
         self._own: _Local | None = None
         try:
             if address.partition(":")[0] == LOCAL:
@@ -86,23 +87,31 @@ class Link:
         return known or self._first
 
     @property
-    def ready(self) -> bool:
-        """True where `next` returns at once."""
-        return bool(self._done.has_ready())
+    def full(self) -> bool:
+        """True where no further call should be sent before one is taken."""
+        return len(self.under_way) >= AHEAD * self.count
 
-    def send(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Submit a call of one of our functions; the worker compares fingerprints first."""
+    @property
+    def ready(self) -> bool:
+        """True where `take` returns at once."""
+        return bool(self.under_way) and bool(self._done.has_ready())
+
+    def send(self, name: Any, function: Callable[..., Any], *arguments: Any) -> None:
+        """Submit a call of one of our functions under a name; the worker compares fingerprints first."""
         ours = self._libraries, fingerprint(self._libraries)
         future = self._client.submit(_checked, *ours, function, *arguments, pure=False)
+        self.under_way[future] = name
         self._done.add(future)
-        return future
 
-    def next(self) -> Future[Any]:
-        """Wait for the next task that is done."""
-        return next(self._done)
+    def take(self) -> tuple[Any, Callable[[], Any]]:
+        """Wait for the next call that is done: its name, and a function that returns its result.
 
-    def result(self, future: Future[Any]) -> Any:
-        """Result of a task that is done; raises its exception, `GivenUp`, or `RenderError`."""
+        That one raises the call's exception, `GivenUp`, or `RenderError`.
+        """
+        future = next(self._done)
+        return self.under_way.pop(future), partial(self._result, future)
+
+    def _result(self, future: Future[Any]) -> Any:
         from distributed.comm.core import CommClosedError
         from distributed.scheduler import KilledWorker
 
@@ -142,22 +151,16 @@ def by_workers(
     """Map one of our functions over named arguments, each taken when it can be sent, by workers of a `Link`.
 
     Yields names in the order in which they are done, each with a function that returns the result or raises
-    as `Link.result`, to be called before the next name is taken.
+    as `Link.take` says, to be called before the next name is taken.
     """
     link = Link(address, libraries)
-    under_way: dict[Future[Any], K] = {}
-
-    def taken() -> tuple[K, Callable[[], R]]:
-        future = link.next()
-        return under_way.pop(future), partial(link.result, future)
-
     try:
         for name, item in items:
-            under_way[link.send(function, item)] = name
-            while under_way and (link.ready or len(under_way) >= AHEAD * link.count):
-                yield taken()
-        while under_way:
-            yield taken()
+            link.send(name, function, item)
+            while link.ready or link.full:
+                yield link.take()
+        while link.under_way:
+            yield link.take()
     finally:
         link.close()
 

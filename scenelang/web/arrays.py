@@ -178,11 +178,7 @@ Step = list[Any]
 
 
 def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_codes: np.ndarray) -> list[Row]:
-    """Rows of a Program as JSON data, see docs/architecture.md.
-
-    Raises:
-        ProgramError: a vector is not one that a scene compiles to.
-    """
+    """Rows of a Program as JSON data, see docs/architecture.md; raises `ProgramError` for foreign vectors."""
     layout = LAYOUTS[manifest.dimension]
     parts = layout.unpack(program.vectors)
     forms = [at for at, element in enumerate(program.elements) if not element.material]

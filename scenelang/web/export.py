@@ -146,19 +146,15 @@ def view_of(
     form: PageProgram | None = None,
     animation: Animation | None = None,
 ) -> PagePayload:
-    """The view of a Program that was compiled for a shipped model.
+    """The view of a Program of a shipped model, with names and texts of its files and the form of its scene.
 
-    Args:
-        source: names and texts of the files that it was compiled from.
-        form: of the scene that it was compiled from; without one its numbers never change.
-
-    Raises:
-        ProgramError: it was compiled for other weights, or no page can draw its model.
+    Without a form its numbers never change. Raises `ProgramError` for other weights, or where no page can
+    draw the model.
     """
     manifest, store = load_manifest(program.model), Store()
     if manifest.renderer not in ("framed", "solid"):
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
-    if manifest.lifting != "exact":
+    if not manifest.framed:
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)

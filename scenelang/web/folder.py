@@ -105,14 +105,10 @@ class Folder:
         return text.replace("\r\n", "\n").replace("\r", "\n"), _digest(data)
 
     def write(self, name: str, text: str, base: str | None) -> str:
-        """Write a file whole, with the line ends that it has; returns its digest.
+        """Write a file whole, with the line ends that it has; its digest.
 
-        Args:
-            base: the digest of the current file; None where there is none.
-
-        Raises:
-            Changed: the file has another digest.
-            Refused: it cannot be written, or is, or lies behind, a link.
+        Raises `Changed` where the file's digest is not ``base``, None for no file, and `Refused` where it
+        cannot be written, or is, or lies behind, a link.
         """
         path = self.place(name)
         for part in (path, *path.parents[: len(Path(name).parts) - 1]):

@@ -22,28 +22,16 @@ from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import Stage, stage_data
-from scenelang.language import scene
+from scenelang.language import scene, words
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Place
-from scenelang.language.evaluation import Evaluation
+from scenelang.language.evaluation import Evaluation, is_colour
 from scenelang.language.expressions import prepare
 from scenelang.language.nodes import MOST
 from scenelang.language.scene import Brought, Color, Matrix, Object, Scale, Translate, objects_of
 from scenelang.language.scopes import find, head_of
 from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
-from scenelang.language.words import (
-    ANIMATED,
-    FUNCTIONS,
-    GRADIENTS,
-    LANGUAGE,
-    LETTERS,
-    OPERATIONS,
-    SETTINGS,
-    SOLID_TRANSFORMS,
-    STAGE,
-    TRANSFORMS,
-)
 
 Json = Any
 T = TypeVar("T", Element, Element | Gradient)
@@ -284,8 +272,8 @@ class Writer:
             case nodes.NameRef():
                 if (bound := scope.find(expr.name.text)) is not None:
                     return self.value(bound, scope)
-                if expr.name.text in ANIMATED:
-                    return ["t", [*ANIMATED].index(expr.name.text)]
+                if expr.name.text in words.ANIMATED:
+                    return ["t", [*words.ANIMATED].index(expr.name.text)]
                 constant = CONSTANTS[expr.name.text]
                 if isinstance(constant, Vec):
                     return ["[", *map(plain, constant.items)]
@@ -304,7 +292,7 @@ class Writer:
                     return ["width", self._font(bound), *self._text("width", expr.args, scope)]
                 if bound is not None:
                     return ["call", *self.call(bound, expr.args, scope)]
-                word = FUNCTIONS[name]
+                word = words.FUNCTIONS[name]
                 args = [arg.value for arg in expr.args] if word.variadic else bind(word.params, expr.args)
                 return [name, *self.given(args, scope)]
             case nodes.Index():
@@ -323,7 +311,7 @@ class Writer:
         name, shading = written.name.text, written.shading
         alias, dot, rest = name.partition(".")
         element: Element | Gradient | None = self.textures.get(name)
-        if name in GRADIENTS:
+        if name in words.GRADIENTS:
             element = Gradient(name)  # whose stops are among the operations
         if dot and (file := scope.find(alias)) is not None and file.file is not None:
             element = self.brought.materials[file.file.materials[rest]]
@@ -393,11 +381,11 @@ class Writer:
 
     def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
         name = stmt.name.text
-        bound = None if name in LANGUAGE else scope.find(name)
+        bound = None if name in words.LANGUAGE else scope.find(name)
         head = head_of(stmt, bound, kind)
         if head == "setting":
-            args = self.given(bind(SETTINGS[name].params, stmt.args), scope)
-            if name in STAGE and self.manifest.dimension == 2:
+            args = self.given(bind(words.SETTINGS[name].params, stmt.args), scope)
+            if name in words.STAGE and self.manifest.dimension == 2:
                 return ["no", f"model `{self.manifest.name}` is flat and has no {name}"]
             word = (name,) if name == "animate" else ("set", name)
             return None if name == "canvas" else [*word, *args]
@@ -419,10 +407,10 @@ class Writer:
 
     def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
-        table = OPERATIONS if inks else TRANSFORMS
+        table = words.OPERATIONS if inks else words.TRANSFORMS
         if name not in table:
             return ["no", f"`{name}` does not stand here"]
-        if name in SOLID_TRANSFORMS and self.manifest.dimension == 2:
+        if name in words.SOLID_TRANSFORMS and self.manifest.dimension == 2:
             return ["no", f"`{name}` leaves the plane"]
         if name == "scale" and len(args) == 1 and (args[0].name is None or args[0].name.text == "s"):
             return ["move", "even", self.expression(args[0].value, scope)]
@@ -448,7 +436,7 @@ class Writer:
 
     def _text(self, word: str, args: Sequence[nodes.Argument] | None, scope: Scope) -> list[Json]:
         """Arguments of a line of letters."""
-        given = bind(LETTERS[word].params, args)
+        given = bind(words.LETTERS[word].params, args)
         aligned = [one for one in given[2:] if isinstance(one, nodes.String)]  # which is no text
         result = self.given(given[: 3 - len(aligned)], scope)
         return [*result, *(["'", one.value] for one in aligned)]
@@ -518,8 +506,7 @@ def form_of(
 ) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
-    Args:
-        elements: those of the Program of that run; they come first among shapes and paints, in their order.
+    The Program's elements come first among shapes and paints, in their order.
     """
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
     with deep_stack():
@@ -562,7 +549,7 @@ def form_of(
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
     usual, fields = stage_data(Stage()), {}
-    for name, word in STAGE.items():
+    for name, word in words.STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
         columns = zip(usual[name], word.kinds, ranges, strict=True)
@@ -573,9 +560,7 @@ def _stage() -> Json:
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
     """The data of a param for its control on a page."""
     value = file.env[file.scope.names[stmt.name.text].slot]
-    default = stmt.default
-    coloured = isinstance(default, nodes.CallExpr) and default.name.text in ("rgb", "hsv")
-    colour = "color" if coloured or isinstance(default, nodes.Color) else "vector"
+    colour = "color" if is_colour(stmt.default) else "vector"
     kind = colour if isinstance(value, Vec) else _KINDS[value.__class__]
     data: dict[str, Any] = {"name": name, "kind": kind, "value": _json(value)}
     if stmt.range is not None:

@@ -31,8 +31,8 @@ from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.output.animate import Progress, make
-from scenelang.output.frames import Clip, Shot, find_target, frame_key
-from scenelang.output.painting import Drawable, Painter
+from scenelang.output.frames import Clip, Drawable, Shot, find_target, frame_key
+from scenelang.output.painting import Painter
 from scenelang.web.export import PagePayload, page, scene_view, still
 from scenelang.web.folder import Answer, JobFailed
 

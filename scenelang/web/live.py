@@ -369,11 +369,9 @@ class Live:
         self._cancel(lambda slot, id, file: id == wanted)
 
     def _start(self, slot: Slot, id: Any, name: str, job: Json, pool: Pool, done: Took | None = None) -> None:
-        """Start a job for a file, with the text that the page has; the one that has its slot is cancelled.
+        """Start a job for a file, as the page has it; the one in its slot is cancelled.
 
-        Args:
-            id: the page's name of it; None where it has none.
-            done: called with the answer before the page gets it.
+        The page may know it by an ``id``; ``done`` is called with the answer before the page gets it.
         """
         known, root = self.open[name], self._play.folder.root
         job = {"params": {}, "frame": 0, "size": None, **job, "name": name, "text": known.text}

@@ -42,11 +42,7 @@ class Leaf(NamedTuple):
 
 
 def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
-    """The parts ``shader`` and ``network`` of a view.
-
-    Raises:
-        ProgramError: the network has more features of an object, or more state, than a distance.
-    """
+    """The parts ``shader`` and ``network`` of a view; `ProgramError` if it knows more than distances."""
     config = network.config
     if not config.features == config.state == 1:
         raise ProgramError("a network that knows more than distances, which no page draws")

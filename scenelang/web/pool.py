@@ -73,10 +73,9 @@ class Pool:
             self._idle.append(self._threads.submit(Worker, self._nice))
 
     async def run(self, job: dict[str, Any], limit_s: float, said: Said | None = None) -> Answer:
-        """Do a job in a process; where this is cancelled the process is ended.
+        """Do a job in a process, which ends where this is cancelled; raises `JobFailed` if that fails.
 
-        Raises:
-            JobFailed: it failed, took more than ``limit_s`` seconds without the wait, or its process ended.
+        It also fails after ``limit_s`` seconds, the wait not counted, and where its process ends.
         """
         loop = asyncio.get_running_loop()
 

@@ -64,9 +64,7 @@ def policy(nonce: str, host: str) -> str:
 class Guard:
     """Middleware that lets requests through that have the token, come from the page and name this machine.
 
-    Args:
-        hosts: names of this machine besides those of its loopback.
-        anywhere: accept any IP address as a name of this machine, as it serves other machines too.
+    ``hosts`` are its names besides those of its loopback; ``anywhere`` any IP address is one, too.
     """
 
     def __init__(self, app: ASGIApp, token: str, hosts: Iterable[str] = (), anywhere: bool = False) -> None:

@@ -95,10 +95,7 @@ def _gates(paint: int, kind: int) -> str:
 
     def largest(first: int, count: int) -> str:
         gates = [f"dot(cells[at + {first + i}].xyz, vec3(d, before, 1.0))" for i in range(count)]
-        result = gates[0]
-        for gate in gates[1:]:
-            result = f"max({result}, {gate})"
-        return f"return clamp({result}, 0.0, 1.0);"
+        return f"return clamp({_highest(gates)}, 0.0, 1.0);"
 
     parts = {"taking": (1, 1), "painting": (2, paint), "kind": (2 + paint, kind)}
     head = "(int at, float d, float before)"

@@ -159,8 +159,8 @@ def test_messages_name_the_place() -> None:
     for name, words in (
         ("a huge shape", "tensor `codes` has no shape"),
         ("codes without end", "tensor `codes` holds numbers that are not finite"),
-        ("codes a number too long", "tensor `codes` is float32 [4, 5]; 4 rows of 4 floats are needed"),
-        ("offsets of a shape too large", "tensor `codes` is F32 [4, 5], which does not take 64 bytes"),
+        ("codes a number too long", "tensor `codes` is float32 [4, 5]; 6 rows of 4 floats are needed"),
+        ("offsets of a shape too large", "tensor `codes` is F32 [4, 5], which does not take 96 bytes"),
         ("a key given twice", "the list of tensors: the key `codes` is given twice"),
     ):
         with pytest.raises(ModelError) as caught:
@@ -168,7 +168,7 @@ def test_messages_name_the_place() -> None:
         assert words in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming"])
+@pytest.mark.parametrize("name", ["shapes2d-reading", "shapes2d-streaming-learned"])
 @pytest.mark.parametrize(
     "extra", ["codes", "renderer.more", "lifting.more", "lifting.geometry.affine.layers.3.weight"]
 )

@@ -17,7 +17,7 @@ SCENES = {
     "late": MOVING.replace("0.6", "2 - frame"),
     "solids": SOLIDS,
     "orbit": "animate(1, 3); camera(eye = [6 * sin(1turn * u), 1, 5]);\n" + SOLIDS,
-    "learned": 'model "shapes2d-streaming"; canvas(32, 32); background(#fff); square { }',
+    "learned": 'model "shapes2d-streaming"; canvas(64, 64); background(#fff); square { }',
     "wrong": "square { scale(foo); }",
     "grown": "animate(1, 4); square { scale(0.2 + 0.1 * u); }\n",
 }
@@ -59,7 +59,7 @@ render a.nsg -o a.png --max-ms 9 --backend exact   | 2 | --max-ms chooses how to
 render a.nsg -o a.png --max-ms 9 --samples one     | 2 | leave out --backend and --samples
 render a.nsg -o a.png --max-ms 9 --device cuda     | 2 | leave out --device cuda
 render a.nsg -o a.png --max-flip 2                 | 2 | 2.0 is not in the range
-render a.nsg -o a.png --backend reference --samples one | 2 | the reference always takes four samples
+render a.nsg -o a.png --backend reference --samples one | 2 | the reference always takes all samples
 render a.nsg -o a.png --backend exact --device cuda | 2 | not by device cuda
 render grown.nsg -o a.gif --max-ms 20              | 2 | for single pictures; --frame draws one
 watch none.nsg                                     | 2 | there is no file `none.nsg`

@@ -112,11 +112,11 @@ def test_what_is_not_there(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("scenelang.drawing.image.find_spec", lambda name: None)
     result = folder.run("render", name, "-o", "p.exr", code=2)
     assert "pip install 'scenelang[exr]'" in result.stderr
-    encoders.find_ffmpeg.cache_clear()
+    encoders.find_codec.cache_clear()
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert folder.run("render", name, "-o", "a.mp4", code=2).stderr == f"Error: {encoders.MISSING}\n"
-    encoders.find_ffmpeg.cache_clear()
+    encoders.find_codec.cache_clear()
     assert os.listdir() == ["a.nsg"]
 
 

@@ -94,3 +94,10 @@ def test_a_text_is_its_letters_in_every_form() -> None:
     program = compile_scene(scene)
     assert program.objects == ("square", "abc.u0041", "abc.u0067", "abc.u0078")
     assert parse_program(program_bytes(program)).digest() == program.digest()
+
+
+def test_letters_grow_and_become_shells() -> None:
+    for skin in ("", "grow(0.1);", "shell(0.08);", "grow(-0.03); shell(0.06);"):
+        scene = nsg.loads(f"{IMPORT} abc.u0067 {{ {skin} scale(0.7); material flat {{ color(#148); }} }}")
+        found, exact = nsg.render(scene), nsg.render(scene, backend="reference")
+        assert psnr(found, exact) > 46

@@ -101,7 +101,7 @@ def test_a_named_device_is_torch_s() -> None:
 
 
 def test_networks_of_whole_pictures_are_torch_s() -> None:
-    scene = nsg.loads("canvas(32, 32); star;")
+    scene = nsg.loads("canvas(64, 64); star;")
     assert choose_drawer(compile_scene(scene, model="shapes2d-streaming")).library == "torch"
     with pytest.raises(RenderError, match="unknown model `none`"):
         choose_drawer(replace(program(STAR), model="none"))
@@ -138,7 +138,7 @@ def test_ways_to_sample_that_are_refused() -> None:
     scene = nsg.loads(f"canvas(16, 16); background(#fff); {STAR}")
     with pytest.raises(ValueError, match="unknown samples `two`; there are `adaptive`, `four`, `quick`, "):
         nsg.render(scene, samples="two")  # type: ignore[arg-type]
-    with pytest.raises(RenderError, match="the reference always takes four samples a pixel"):
+    with pytest.raises(RenderError, match="the reference always takes all samples of a pixel"):
         nsg.render(scene, backend="reference", samples="one")
     manifest = load_manifest("shapes2d")
     manifest = replace(manifest, name="small", renderer="streaming", sizes=((16, 16),), white=True)

@@ -19,7 +19,7 @@ from scenelang.drawing.image import Image, decoded, encoded
 from scenelang.drawing.metrics import psnr
 from scenelang.inverse import search
 from scenelang.inverse.fit import Fit, problems_of
-from scenelang.inverse.problem import Moment, Problem, Together
+from scenelang.inverse.problem import Moment, Problem
 from scenelang.inverse.search import Axis, Blur, Found, Knob, SearchBox, Target, blurred, space_of, target_of
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source, rewritten
@@ -272,7 +272,7 @@ square { scale(0.5); translate(x, u); material flat { color(#000000); } }
 """
 
 
-def problem(targets: dict[int, np.ndarray]) -> Together:
+def problem(targets: dict[int, np.ndarray]) -> Problem:
     """The last comparison with targets by frame."""
     source = Source(text=SourceFile("a.nsg", SLIDES)).parsed(Diagnostics())
     moments = [Moment(source, frame) for frame in targets]
@@ -340,11 +340,11 @@ def test_covered_area_changes_as_the_square_does() -> None:
     """A square of radius s covers s² / 2 of the canvas, whose sides are 2; corners are cut a little."""
     moment, size = Moment(Source(text=SourceFile("a.nsg", GROWS)).parsed(Diagnostics())), 0.2 + 0.52 * 0.6
     white, space = Target(np.ones((32, 32, 3)), np.ones((32, 32))), space_of(moment.evaluated({})[0])
-    drawn = Problem(moment, space, white, (32, 32), soft=True, samples="four")
-    low, high = (drawn.picture(np.array([0.43, 0.52 + step])) for step in (-0.02, 0.02))
+    drawn = Problem([moment], space, [white], (32, 32), soft=True, samples="four")
+    low, high = (drawn.pictures(np.array([0.43, 0.52 + step])) for step in (-0.02, 0.02))
     assert low is not None
     assert high is not None
-    assert (low - high).mean() / 0.04 == pytest.approx(0.6 * size, rel=0.06)
+    assert (low[0] - high[0]).mean() / 0.04 == pytest.approx(0.6 * size, rel=0.06)
 
 
 PARAMS = """\

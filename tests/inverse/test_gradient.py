@@ -9,7 +9,7 @@ import torch
 from scenelang.compiler.program import Program
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
-from scenelang.inverse.problem import Moment, Problem, Together
+from scenelang.inverse.problem import Moment, Problem
 from scenelang.inverse.search import Point, Target, over, space_of
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source
@@ -40,18 +40,19 @@ SCENES = {
 }
 
 
-def problem(text: str) -> Problem:
+def problem(text: str, frames: int = 1) -> Problem:
     source = Moment(Source(text=SourceFile("a.nsg", text)).parsed(Diagnostics()))
     rng = np.random.default_rng(3)
     target = Target(rng.random((40, 48, 3)), rng.random((40, 48)), (0.2, 0.9, 0.4))
-    return Problem(source, space_of(source.evaluated({})[0]), target, (48, 40), soft=True)
+    space = space_of(source.evaluated({})[0])
+    return Problem([source] * frames, space, [target] * frames, (48, 40), soft=True)
 
 
 def here(drawn: Problem) -> Point:
     return drawn.space.point({})
 
 
-def residuals_change(drawn: Problem) -> None:
+def residuals_change(drawn: Problem, twice: Problem) -> None:
     """As slopes say: from params on, through evaluation, compilation and the levels of the pyramid.
 
     A decoder has kinks closer to each other than the ends of these differences.
@@ -59,15 +60,14 @@ def residuals_change(drawn: Problem) -> None:
     u = here(drawn)
     found = drawn.slopes(u)
     assert found is not None
-    whole = Together([drawn])
-    assert whole(u) is not None
+    assert drawn(u) is not None
     expected = np.zeros_like(found[0])
     for axis in range(3):
-        ends = [whole(u + sign * 3e-4 * np.eye(3)[axis]) for sign in (1, -1)]
+        ends = [drawn(u + sign * 3e-4 * np.eye(3)[axis]) for sign in (1, -1)]
         assert ends[0] is not None
         assert ends[1] is not None
         expected[:, axis] = (ends[0] - ends[1]) / 6e-4
-    both = Together([drawn, drawn]).slopes(u)
+    both = twice.slopes(u)
     assert both is not None
     assert np.square(both[0]).sum(0) == pytest.approx(np.square(found[0]).sum(0))
     off = abs(found[0] - expected)
@@ -79,9 +79,9 @@ def residuals_change(drawn: Problem) -> None:
 def test_slopes_are_what_differences_of_the_same_picture_are(name: str) -> None:
     """All but some pixels on a kink of a decoder or a clamp, which lie between both ends of a difference."""
     drawn = problem(SCENES[name])
-    program = drawn.program(here(drawn))
+    (program,) = drawn.programs(here(drawn))
     assert program is not None
-    rates, known = Rates(drawn.program, drawn.space).at(here(drawn), program)
+    rates, known = Rates(lambda u: drawn.programs(u)[0], drawn.space).at(here(drawn), program)
     assert known.all()
     soft, base, step = SoftPlane(program, dtype=torch.float64), numbers_of(program), 1e-7
     found = soft(base, rates)[1]
@@ -95,7 +95,7 @@ def test_slopes_are_what_differences_of_the_same_picture_are(name: str) -> None:
     picture = SoftPlane(program, drawn.under)(base, np.zeros((len(base), 0)))[0]
     network = draw_objects(softened(program.model, 2 / 40), program, samples="one", skip=False).image
     assert picture == pytest.approx(over(network, drawn.under), abs=2e-5)
-    residuals_change(drawn)
+    residuals_change(drawn, problem(SCENES[name], frames=2))
 
 
 def test_of_groups_and_cuts_of_a_width_there_are_no_slopes() -> None:
@@ -113,10 +113,10 @@ def test_params_that_move_different_numbers_are_compiled_together() -> None:
 
     def program(u: Point) -> Program | None:
         compiled.append(u)
-        return drawn.program(u)
+        return drawn.programs(u)[0]
 
     rates, u = Rates(program, drawn.space), here(drawn)
-    found = drawn.program(u)
+    (found,) = drawn.programs(u)
     assert found is not None
     apart, together = (rates.at(u, found)[0] for _ in range(2))
     assert len(compiled) == 3 + 1

@@ -47,7 +47,7 @@ def test_scenes_are_what_their_set_says(name: str) -> None:
     )
     assert warped == (config.warp > 0 or config.shuffled)
     assert any(getattr(s, word) != "default" for s in made for word in STAGE) == config.staged
-    drawn = {"sphere", "torus"} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
+    drawn = {*config.leaves} if not config.meshes else {"zoo.bunny", "zoo.monkey", "zoo.teapot"}
     assert {solid.geometry for solid in solids} == drawn
     for s in made:
         compile_scene(s)  # raises where it is refused
@@ -169,7 +169,7 @@ def test_every_scene_of_a_set_compiles() -> None:
 def test_sets_of_textures_are_of_models_that_have_some() -> None:
     """One has squares that move and grow, with flips, turns and hues; the other has everything."""
     plain, textured = (sets_of(load_manifest(name)) for name in ("shapes2d-streaming", "shapes2d"))
-    assert set(textured) - set(plain) == {"textures2d", "textures2d-mixed"}
+    assert set(textured) - set(plain) == {"textures2d", "textures2d-mixed", "skins", "leaves2d"}
     for name, shapes, ops in (
         ("textures2d", {"square"}, {"flip", "rotate", "hue"}),
         ("textures2d-mixed", {*GEOMETRIES}, {*OPERATIONS} - {"stop"}),

@@ -265,11 +265,11 @@ def test_known_shapes_lead_to_the_library() -> None:
     text = (library.find(library.SHAPES) or Path()).read_text("utf-8")
     assert [call for call in SHAPES.values() if f"\nmodule {call.partition('(')[0]}(" not in text] == []
     for text, code, help in (
-        ("circle { scale(0.5); }", "E0204", 'import "std/shapes" as s; then s.'),
-        ("Circle(0.2);", "E0204", 'import "std/shapes" as s; then s.'),
+        ("circle { scale(0.5); }", "E0204", "in the plane write disc { scale(r); }"),
+        ("Ring(0.2);", "E0204", 'import "std/shapes" as s; then s.'),
         ("octagon() {}", "E0204", 'import "std/shapes" as s; then s.'),
         ("line;", "E0204", 'import "std/shapes" as s; then s.'),
-        ('import "std/shapes" as form; let s = 1; circle;', "E0204", "form.disc(r)"),
+        ('import "std/shapes" as form; let s = 1; ring;', "E0204", "form.ring(r, width)"),
     ):
         (only,) = nsg.check_text(f"nsg 1;\n{text}").errors
         assert (only.code, (only.help or "")[: len(help)]) == (code, help)

@@ -54,6 +54,7 @@ def test_a_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
         ("let a = 9 ^ 9 ^ 9 ^ 9;", "E0306"),
         ("let a = 0..1e308 step 1e-308; for (i in a) {}", "E0306"),
         ("animate(1e9, 1e9);", "E0311"),
+        (f'import "std/letters" as abc; abc.text("{"A" * 10_001}");', "E0370"),
     ):
         codes = run_text(text).codes
         wrong += [(text, codes)] if codes != [code] else []

@@ -17,10 +17,10 @@ from PIL import Image
 
 from scenelang.output.encoders import (
     Census,
-    Mapper,
     NoFfmpeg,
     Palette,
-    find_ffmpeg,
+    find_codec,
+    mapped,
     write_apng,
     write_gif,
     write_video,
@@ -141,7 +141,7 @@ def test_palettes_hold_small_coloured_things() -> None:
     colours = census.choose()
     assert len(colours) <= 255
     assert np.abs(colours.astype(int) - (255, 0, 0)).sum(axis=1).min() < 60
-    index = Mapper(colours, False)(picture)
+    index = mapped(picture, colours, False)
     wide = colours.astype(int)
     for y, x in ((0, 0), (100, 100), (199, 3)):
         away = ((wide - picture[y, x]) ** 2).sum(axis=1)
@@ -210,7 +210,7 @@ def test_frames_are_read_one_at_a_time(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.fixture
 def ffmpeg() -> str:
     try:
-        return find_ffmpeg()
+        return find_codec(".mp4")[0]
     except NoFfmpeg as error:
         pytest.skip(str(error))
 

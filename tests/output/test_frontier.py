@@ -122,7 +122,7 @@ LADDER = [point("fast", 2, 0.05), point("middle", 10, 0.01), point("slow", 50, 0
 
 
 def chosen(limits: Limits, points: list[Point] = LADDER, scale: float = 1.0, load: Load = LOAD) -> str:
-    return choose(offers(points, load, (256, 256), scale), limits, {}).offer.point.name
+    return choose(offers(points, load, (256, 256), scale), limits, {})[0].point.name
 
 
 def test_the_choice_is_the_cheapest_that_suffices() -> None:
@@ -190,15 +190,14 @@ def test_what_nothing_draws_is_told_with_what_comes_nearest() -> None:
 
 
 def test_the_choice_tells_why_and_what_was_next() -> None:
-    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Limits(None, 0.03), {})
-    assert choice.runner_up is not None
-    assert choice.runner_up.point.name == "slow"
-    assert choice.notes[0].endswith("the fastest of 3 that keep FLIP 0.03")
-    assert choice.notes[1].endswith("slower")
-    choice = choose(offers(LADDER, LOAD, (256, 256), 1.0), Limits(30, None), {})
-    assert choice.notes[0].endswith("the most exact of 2 that keep 30 ms")
-    assert choice.notes[1].startswith("runner-up: fast")
-    assert choice.notes[1].endswith("no more exact")
+    for limits, why, name, worse in (
+        (Limits(None, 0.03), "the fastest of 3 that keep FLIP 0.03", "slow", "slower"),
+        (Limits(30, None), "the most exact of 2 that keep 30 ms", "fast", "no more exact"),
+    ):
+        notes = choose(offers(LADDER, LOAD, (256, 256), 1.0), limits, {})[1]
+        assert notes[0].endswith(why)
+        assert notes[1].startswith(f"runner-up: {name}")
+        assert notes[1].endswith(worse)
 
 
 def test_points_that_cannot_draw_a_scene_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

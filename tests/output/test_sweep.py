@@ -273,7 +273,7 @@ def test_what_cannot_be_asked(evaluation: Evaluation) -> None:
 
 
 def test_a_grid_is_every_combination_once(evaluation: Evaluation) -> None:
-    rows = list(rows_of(evaluation, {"k": "0..1/3", "fine": ""}, {}))
+    rows = rows_of(evaluation, {"k": "0..1/3", "fine": ""}, {})[0]
     assert [tuple(row.values()) for row in rows] == [
         (k, fine) for k in ("0", "0.5", "1") for fine in ("false", "true")
     ]
@@ -284,14 +284,14 @@ DRAWN = dict.fromkeys(("k", "n", "turn", "ink", "fine", "word", "side"), "")
 
 def test_random_values_are_values_of_their_params(evaluation: Evaluation) -> None:
     """Each row evaluates, which checks units, ranges, steps and choices."""
-    for row in rows_of(evaluation, {}, DRAWN, 40):
+    for row in rows_of(evaluation, {}, DRAWN, 40)[0]:
         evaluation.inputs.values = row
         assert evaluation.run(0)[0] is not None, evaluation.diagnostics.items
 
 
 def test_random_values_hang_on_seed_number_and_name(evaluation: Evaluation) -> None:
     def columns(count: int, seed: int, *names: str) -> list[tuple[str, ...]]:
-        rows = list(rows_of(evaluation, {}, dict.fromkeys(names, ""), count, seed))
+        rows = rows_of(evaluation, {}, dict.fromkeys(names, ""), count, seed)[0]
         return [tuple(row[name] for row in rows) for name in names]
 
     assert columns(5, 1, "k")[0] == columns(9, 1, "turn", "k")[1][:5]
@@ -300,7 +300,7 @@ def test_random_values_hang_on_seed_number_and_name(evaluation: Evaluation) -> N
 
 
 def test_random_values_are_uniform(evaluation: Evaluation) -> None:
-    rows = list(rows_of(evaluation, {}, {"k": "", "n": "", "free": "10..20"}, 3000))
+    rows = rows_of(evaluation, {}, {"k": "", "n": "", "free": "10..20"}, 3000)[0]
     tenths = Counter(int(10 * float(row["k"])) for row in rows)
     assert all(230 < tenths[tenth] < 370 for tenth in range(10))  # 300, six standard deviations
     assert all(480 < number < 720 for number in Counter(row["n"] for row in rows).values())
@@ -309,6 +309,6 @@ def test_random_values_are_uniform(evaluation: Evaluation) -> None:
 
 def test_a_grid_and_random_values(evaluation: Evaluation) -> None:
     """The grid is gone through again and again, and what is drawn differs each time."""
-    rows = list(rows_of(evaluation, {"n": "1,3"}, {"k": ""}, 6))
+    rows = rows_of(evaluation, {"n": "1,3"}, {"k": ""}, 6)[0]
     assert [row["n"] for row in rows] == ["1", "3"] * 3
     assert len({row["k"] for row in rows}) == 6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
@@ -119,7 +119,12 @@ def command(
     if kind == "human":
         text = _for_people(scenes, left, most, quiet, wants_color(stream, color), width_of(stream))
     else:
-        text = _for_machines(left, kind, most)
+        from importlib.metadata import version
+
+        from scenelang.language import machine
+
+        render = getattr(machine, f"render_{kind}")
+        text = render(in_order(left)[:most], *[version("scenelang")] * (kind == "sarif"))
     click.echo(text, nl=False, err=to_stderr, color=True)
     if all_frames and scenes.unseen:
         unseen = plural(scenes.unseen, "frame")
@@ -164,18 +169,6 @@ def _for_people(
     fixable = sum(d.fix is not None and scenes.owner(d) is not None for d in left)
     text = render_text(left, paint, width=width, most=most, summary=not quiet, fixer="--fix", fixable=fixable)
     return text if quiet else f"{text}For more, try `scenelang explain {in_order(left)[0].code}`.\n"
-
-
-def _for_machines(left: Sequence[Diagnostic], kind: Format, most: int | None) -> str:
-    from importlib.metadata import version
-
-    from scenelang.language import machine
-
-    shown = in_order(left)[:most]
-    if kind == "sarif":
-        return machine.render_sarif(shown, version("scenelang"))
-    render: Callable[[Sequence[Diagnostic]], str] = getattr(machine, f"render_{kind}")
-    return render(shown)
 
 
 class Scenes(Record, frozen=False):

@@ -188,10 +188,11 @@ def _shape(
     verbose: bool,
 ) -> None:
     """Write the outlines or the surface of one scene."""
-    from scenelang.cli.inputs import prepare_all, read_input
+    from scenelang.cli.inputs import prepare_all
     from scenelang.compiler.compile import compile_scene
     from scenelang.language.diagnostics import Diagnostics
-    from scenelang.output.shapes import UNSEEN, refuse_animation, solid_mesh, svg_text
+    from scenelang.output.mesh import WRITERS
+    from scenelang.output.shapes import UNSEEN, refuse_animation, to_mesh, to_svg
 
     curves = Path(out).suffix.lower() == DRAWING
     known = {*_OF_SHAPES, "size" if curves else "resolution"}
@@ -206,39 +207,32 @@ def _shape(
     path = Path(out)
     if not path.parent.is_dir():
         raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
-    clock, first, result = Clock(), None, Diagnostics()
-    if not files[0].endswith(PROGRAM):
-        try:
-            first = read_input(files[0], request, clock, how)
-        except OSError as error:
-            raise Trouble(describe(error)) from None
-        if first.evaluation is not None and first.evaluation.animates and request.frame is None:
-            refuse_animation(files[0], first.diagnostics)
-    (job,), code = prepare_all(files, request, clock, how, strict=strict, first=first)
+    clock, result = Clock(), Diagnostics()
+    (job,), code = prepare_all(files, request, clock, how, strict=strict)
     if job is None or job.failed(strict) or job.program is None:
         ctx.exit(code)
+    if job.evaluation is not None and job.evaluation.animates and request.frame is None:
+        refuse_animation(files[0], result)
+        raise SceneError(result)
     with clock("curves" if curves else "mesh"):
         if curves:
-            drawing = svg_text(job.program, how, result)
+            data = to_svg(job.program, backend=how.backend, diagnostics=result).encode()
         else:
             program = job.program
             if job.scene is not None:
                 program = compile_scene(job.scene, spans=job.spans, without=UNSEEN)
-            mesh = solid_mesh(program, resolution, how, result)
+            mesh = to_mesh(program, resolution=resolution, backend=how.backend, diagnostics=result)
+            job.notes.append(f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")
+            data = WRITERS[path.suffix.lower()](mesh)
     say_diagnostics(result)
     if strict and result.items:
         ctx.exit(1)
     try:
-        if curves:
-            write_output(path, drawing.encode())
-        else:
-            mesh.save(path)
+        write_output(path, data)
     except OSError as error:
         raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
     if verbose:
-        if not curves:
-            job.notes.append(f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")
-        lines = "".join(f"\n  {note}" for note in (*job.notes, f"{path.stat().st_size:,} bytes"))
+        lines = "".join(f"\n  {note}" for note in (*job.notes, f"{len(data):,} bytes"))
         click.echo(f"{job.name} -> {path}{lines}\n{clock.report()}", err=True)
 
 

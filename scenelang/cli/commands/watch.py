@@ -64,26 +64,21 @@ def command(
     while True:
         before = stamps(easel.paths)
         try:
-            _draw(easel, screen, before)
+            outcome = easel.draw(before)
         except Outdated:
             settle(easel.paths)
             continue
+        except (OSError, RenderError) as error:
+            gone = isinstance(error, FileNotFoundError) and error.filename
+            said = f"Error: {describe(error) if isinstance(error, OSError) else error}"
+            if gone and Path(gone) == easel.file:
+                said = f"{easel.file} is gone; waiting for it"
+            screen.clear()
+            screen.say(f"{time.strftime('%H:%M:%S')} {said}")
+        else:
+            _report(easel, screen, outcome)
         # what changed since it was read, even before it was known to be read, is drawn at once
         wait({path: before[path] if path in before else easel.seen[path] for path in easel.paths})
-
-
-def _draw(easel: Easel, screen: Screen, before: dict[Path, tuple[int, int, int] | None]) -> None:
-    clock = time.strftime("%H:%M:%S")
-    try:
-        outcome = easel.draw(before)
-    except (OSError, RenderError) as error:
-        screen.clear()
-        if isinstance(error, FileNotFoundError) and error.filename and Path(error.filename) == easel.file:
-            screen.say(f"{clock} {easel.file} is gone; waiting for it")
-        else:
-            screen.say(f"{clock} Error: {describe(error) if isinstance(error, OSError) else error}")
-        return
-    _report(easel, screen, outcome)
 
 
 def _report(easel: Easel, screen: Screen, outcome: Outcome) -> None:
@@ -117,11 +112,9 @@ def _shown(outcome: Outcome) -> PIL.Image.Image | None:
 def _told(outcome: Outcome, out: Path) -> str:
     """A line about a drawing that is good."""
     if outcome.same:
-        return f"{out}: the same picture ({1000 * outcome.compile_s:.0f} ms)"
+        return f"{out}: the same picture ({1000 * outcome.seconds['compile']:.0f} ms)"
     name = f"{outcome.files[0]}{' (draft)' * outcome.draft}"
     if len(outcome.files) > 1:
         name = f"{name} … {outcome.files[-1].name}"
-    stages = {"compile": outcome.compile_s, "load torch": outcome.load_s}
-    stages |= {"draw": outcome.draw_s, "save": outcome.save_s}
-    told = ", ".join(f"{stage} {1000 * s:.0f}" for stage, s in stages.items() if s or stage != "load torch")
-    return f"{name}: {1000 * sum(stages.values()):.0f} ms ({told})"
+    told = ", ".join(f"{step} {1000 * seconds:.0f}" for step, seconds in outcome.seconds.items())
+    return f"{name}: {1000 * sum(outcome.seconds.values()):.0f} ms ({told})"

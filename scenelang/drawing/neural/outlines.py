@@ -37,45 +37,34 @@ class Table(NamedTuple):
     near: npt.NDArray[np.intp]  # pieces, cell by cell
 
 
-def cut(curves: Floats, flat: float = FLAT) -> tuple[Floats, npt.NDArray[np.intp]]:
-    """Pieces (m, 3, 2) of curves, as flat as asked, and the curve of each."""
+def _cut(curves: Floats) -> Floats:
+    """Pieces (m, 3, 2) of curves, each as flat as `FLAT`."""
     a, b, c = curves.swapaxes(0, 1)
-    count = np.ceil(np.sqrt(np.hypot(*(a - 2 * b + c).T) / (4 * flat))).astype(int).clip(1, 64)
+    count = np.ceil(np.sqrt(np.hypot(*(a - 2 * b + c).T) / (4 * FLAT))).astype(int).clip(1, 64)
     which = np.repeat(np.arange(len(curves)), count)
     step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
     s, e = ((step + k)[:, None] / count[which, None] for k in (0, 1))
     a, u, w = a[which], 2 * (b - a)[which], (a - 2 * b + c)[which]
     ends = [a + t * (u + t * w) for t in (s, e)]
-    return np.stack([ends[0], a + u * (s + e) / 2 + w * s * e, ends[1]], 1), which
+    return np.stack([ends[0], a + u * (s + e) / 2 + w * s * e, ends[1]], 1)
 
 
 def _tangents(pieces: Floats) -> tuple[Floats, Floats]:
     """Directions (m, 2) at starts and ends of pieces: where two meet, the mean of both."""
     a, b, c = pieces.swapaxes(0, 1)
     before, after = _unit(c - b, c - a), _unit(b - a, c - a)  # at ends, at starts
-    own = np.round(np.stack([a, c]) / MEET)
-    starts: dict[tuple[float, ...], int] = {}
-    for at, key in enumerate(map(tuple, own[0].tolist())):
-        starts.setdefault(key, at)
+    follows = np.append(np.hypot(*(a[1:] - c[:-1]).T) <= MEET, False)
     at_start, at_end = after.copy(), before.copy()
-    for at, key in enumerate(map(tuple, own[1].tolist())):
-        after_it = (
-            at + 1 if at + 1 < len(a) and tuple(own[0, at + 1].tolist()) == key else starts.get(key, -1)
-        )
-        if after_it < 0:
-            gaps = np.hypot(*(a - c[at]).T)
-            after_it = int(gaps.argmin())
-            if gaps[after_it] > MEET:
-                continue
-        at_end[at] = at_start[after_it] = before[at] + after[after_it]
+    for at, end in enumerate(c):
+        then = at + 1 if follows[at] else int(np.hypot(*(a - end).T).argmin())
+        if follows[at] or np.hypot(*(a[then] - end)) <= MEET:
+            at_end[at] = at_start[then] = before[at] + after[then]
     return at_start, at_end
 
 
 def _unit(way: Floats, otherwise: Floats) -> Floats:
-    length = np.hypot(*way.T)[:, None]
-    away = np.hypot(*otherwise.T)[:, None]
-    ways = way / np.maximum(length, 1e-12), otherwise / np.maximum(away, 1e-12)
-    return np.asarray(np.where(length > 1e-9, *ways))
+    chosen = np.where(np.hypot(*way.T)[:, None] > 1e-9, way, otherwise)
+    return np.asarray(chosen / np.hypot(*chosen.T)[:, None].clip(1e-12))
 
 
 def _edges(cells: int) -> Floats:
@@ -88,7 +77,7 @@ def _edges(cells: int) -> Floats:
 @lru_cache(maxsize=2048)
 def table_of(element: Element, sides: tuple[int, ...] = SIDES) -> Table:
     """The table of one outline; ``sides`` are those of the grids that lead to its own."""
-    pieces, _ = cut(curves_of(element))
+    pieces = _cut(curves_of(element))
     a, b, c = pieces.swapaxes(0, 1)
     ax, ay = a.T
     ex, ey = (c - a).T

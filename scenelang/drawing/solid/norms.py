@@ -42,7 +42,7 @@ class Norms(NamedTuple):
     @property
     def products(self) -> int:
         """How many products an answer takes."""
-        return int(self.w.shape[0] * (self.w.shape[1] + 1))
+        return len(self.b) * (len(self.features) + 1)
 
 
 def norms(xp: Arrays, lines: Array, radius: Array, far: float) -> Norms:
