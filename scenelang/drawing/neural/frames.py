@@ -196,13 +196,13 @@ class Skins(NamedTuple):
     1. All are in leaf units, float32 (N,) or numbers of one object.
     """
 
-    first: Number
-    wall: Number
-    last: Number
-    late: Number
+    first: Array
+    wall: Array
+    last: Array
+    late: Array
 
     @property
-    def reach(self) -> Number:
+    def reach(self) -> Array:
         """How much farther out objects reach (N,), below 0 where they shrink."""
         return self.first + self.wall + self.last
 

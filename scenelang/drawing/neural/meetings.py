@@ -108,7 +108,7 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
 class Turn(NamedTuple):
     """Pairs of one slot, or groups that end, one in each of some columns; what they join is n states."""
 
-    which: slice | Index  # where the pairs lie, or numbers of the groups
+    which: Any  # a slice where the pairs lie, or numbers (n,) of the groups
     columns: slice | Index  # ascending
     at: slice | Index  # states that they join: level l of column i is state ``l * columns + i``
     ending: Index | None  # states of groups that end; None of pairs
@@ -323,7 +323,8 @@ class _Gates(NamedTuple):
     def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""
         over = None if self.over is None else self.over[which]
-        return _Gates(*(part[..., which] for part in self[:-2]), over, self.slope)
+        parts: Any = *(part[..., which] for part in self[:-2]), over, self.slope
+        return _Gates(*parts)
 
     def through(self, state: Interval, coverage: Interval) -> Interval | None:
         """How much is seen through operands of a coverage (n,), of states (n,) before them."""

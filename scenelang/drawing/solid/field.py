@@ -279,7 +279,7 @@ class SolidField:
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
         """Build the decoders of distances, and each object's index among them."""
         xp, network = self.xp, self.network
-        grown = {brought[i] for i in np.flatnonzero(self.skinned)}
+        grown = {brought[i] for i in np.flatnonzero(self.skinned).tolist()}
         keys = [
             code.tobytes() if element is None else element
             for code, element in zip(codes, brought, strict=True)

@@ -47,7 +47,7 @@ def decoder_box(shapes: tuple[tuple[int, ...], ...], numbers: bytes, *rest: Any)
     """
     ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)])
     flat = np.frombuffer(numbers, np.float32)
-    parts = [flat[a:b].reshape(shape) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)]
+    parts: Any = [flat[a:b].reshape(shape) for a, b, shape in zip(ends, ends[1:], shapes, strict=False)]
     if rest:
         return surrounding(lambda q: answers(NUMPY, q, Norms(*parts, *rest), False)[0])
     return surrounding(lambda q: NUMPY.smooth(q, Smooth(zip(parts[::2], parts[1::2], strict=True)))[0])
@@ -219,12 +219,12 @@ class SolidNetwork:
 
     def box(self, layers: Smooth | Norms) -> np.ndarray:
         """The least and the greatest leaf coordinates (2, 3) of what a decoder shows."""
-        normed = isinstance(layers, Norms)
-        arrays = layers[:3] if normed else [part for layer in layers for part in layer]
-        parts = [np.asarray(self.xp.to_numpy(part), np.float32) for part in arrays]
-        return decoder_box(
-            tuple(p.shape for p in parts), b"".join(p.tobytes() for p in parts), *layers[3:] if normed else ()
+        arrays: Any = (
+            layers[:3] if isinstance(layers, Norms) else [part for layer in layers for part in layer]
         )
+        rest = layers[3:] if isinstance(layers, Norms) else ()
+        parts = [np.asarray(self.xp.to_numpy(part), np.float32) for part in arrays]
+        return decoder_box(tuple(p.shape for p in parts), b"".join(p.tobytes() for p in parts), *rest)
 
     def edged(self, layers: Smooth | Norms) -> bool:
         """Whether a decoder shows edges, which lines inside make; rays may clip them."""
