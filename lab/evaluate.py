@@ -36,7 +36,7 @@ SHOWN = 12  # worst cases
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class SceneFigures:
     """One scene's figures."""
 
     index: int  # in its set
@@ -62,7 +62,7 @@ def sheet(
     model: Model,
     name: str,
     seed: int,
-    cases: list[Case],
+    cases: list[SceneFigures],
     side: int | None = None,
     kept: Path | None = None,
 ) -> Image:
@@ -98,7 +98,7 @@ def evaluate_set(
     kept: Path | None = None,
     threads: int = 1,
     report: Report = silent,
-) -> tuple[dict[str, Any], list[Case]]:
+) -> tuple[dict[str, Any], list[SceneFigures]]:
     """Draw a set and compare; returns a summary for JSON, and the cases of the lowest PSNR.
 
     ``side`` is the canvas's shorter one in pixels; ``kept`` is a folder of exact pictures.
@@ -138,14 +138,14 @@ def evaluate_set(
 
 def _case(
     model: Model, scene_at: Callable[[int], Scene], index: int, kept: Path | None, threads: int
-) -> Case:
+) -> SceneFigures:
     scene = scene_at(index)
     program, picture = draw_scene(model, scene, threads)
     exact = exact_of(scene, model.manifest, kept)
     uncapped = psnr(over_white(picture), over_white(exact), UNCAPPED_DB)
     last = COMBINE[int(program.tokens[-1]) & OPERATOR] if program.tokens.any() else "all_union"
-    return Case(index, last, len(program), {**compare(picture, exact), "psnr_uncapped": uncapped})
+    return SceneFigures(index, last, len(program), {**compare(picture, exact), "psnr_uncapped": uncapped})
 
 
-def _summary(cases: list[Case]) -> dict[str, Any]:
+def _summary(cases: list[SceneFigures]) -> dict[str, Any]:
     return {"count": len(cases), **summarise([case.figures for case in cases])}

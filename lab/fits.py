@@ -18,7 +18,7 @@ from scenelang.assets.records import Record
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import over_white, psnr
-from scenelang.inverse.fit import Number, fit
+from scenelang.inverse.fit import FittedNumber, fit
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import loads
 from scenelang.output.cost import reference_of
@@ -49,7 +49,7 @@ _NUMBER: Final = re.compile(r"(?<![\w.#-])-?\d+(?:\.\d+)?(?:e-?\d+)?(rad|deg)?(?
 _WORD: Final = re.compile(r"\b(\w+)(?:\(| = )")
 
 
-class Case(Record):
+class FitCase(Record):
     """A scene to be fitted."""
 
     set: str
@@ -102,13 +102,13 @@ def measure(
     }
 
 
-def _off(number: Number, truth: float) -> float:
+def _off(number: FittedNumber, truth: float) -> float:
     """Distance of a value from the true one, in shares of its range, modulo a full turn."""
     off = abs((number.value - number.low) / (number.high - number.low) - truth)
     return min(off, 1 - off) if math.isclose(number.high - number.low, math.tau, rel_tol=1e-6) else off
 
 
-def random_case(manifest: Manifest, index: int, count: int, seed: int, side: int) -> Case:
+def random_case(manifest: Manifest, index: int, count: int, seed: int, side: int) -> FitCase:
     """A scene with so many params, drawn again until its start is far off and every param is felt."""
     for attempt in range(10_000):
         rng = np.random.default_rng([seed, index, count, attempt])
@@ -117,7 +117,7 @@ def random_case(manifest: Manifest, index: int, count: int, seed: int, side: int
     raise RuntimeError(f"no scene of {count} params whose start is far off")
 
 
-def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Case | None:
+def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> FitCase | None:
     names, ranges = (SOLID if manifest.dimension == 3 else PLANE), _RANGES[manifest.dimension]
     name = names[index % len(names)]
     made = random_solid(rng, SOLID_SETS[name]) if manifest.dimension == 3 else random_scene(rng, SETS[name])
@@ -166,7 +166,7 @@ def _case(manifest: Manifest, rng: Rng, index: int, count: int, side: int) -> Ca
         target = exact(side, values)
     except ValueError:  # the eye is inside something opaque
         return None
-    return Case(name, text, truth, (np.floor(target * 255 + 0.5) / 255).view(Image), start_db)
+    return FitCase(name, text, truth, (np.floor(target * 255 + 0.5) / 255).view(Image), start_db)
 
 
 def _given(share: float, low: float, high: float) -> Any:

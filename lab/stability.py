@@ -55,7 +55,7 @@ def kit_of(manifest: Manifest) -> Kit:
     return SOLIDS if manifest.dimension == 3 else TEXTURES if manifest.elements else FLAT
 
 
-class Errors(NamedTuple):
+class PictureErrors(NamedTuple):
     """A picture against the exact one."""
 
     psnr: float  # dB, at most 50
@@ -90,12 +90,12 @@ def exact_picture(
     return picture, alpha[..., 0] > 0, edge
 
 
-def compare(picture: Image, reference: tuple[Array, Any, Any]) -> Errors:
+def compare(picture: Image, reference: tuple[Array, Any, Any]) -> PictureErrors:
     """Errors of a picture against what `exact_picture` gave."""
     exact_one, covered, edge = reference
     gap = np.asarray(picture, np.float64)[..., :3] - exact_one
     total = float(np.abs(gap).mean(2).sum())
-    return Errors(
+    return PictureErrors(
         psnr(picture, exact_one),
         flip(picture, exact_one),
         total / max(1, edge.sum()),

@@ -40,7 +40,7 @@ FIRST, MORE = (60, 1200), (30, 3000)  # steps and points of every start; and of 
 FRESH = 15  # steps between new points
 
 
-class Leaf(NamedTuple):
+class SymmetricLeaf(NamedTuple):
     """A shape of dihedral symmetry, with a vertex at +x, at radius 1."""
 
     order: int
@@ -70,16 +70,16 @@ class Leaf(NamedTuple):
 
 
 LEAVES: Final = {
-    "square": Leaf(4, math.cos(math.pi / 4)),
-    "triangle": Leaf(3, math.cos(math.pi / 3)),
-    "star": Leaf(5, 0.381966),
-    "pentagon": Leaf(5, math.cos(math.pi / 5)),
-    "disc": Leaf(16, 0.0),
-    "hexagon": Leaf(6, math.cos(math.pi / 6)),
+    "square": SymmetricLeaf(4, math.cos(math.pi / 4)),
+    "triangle": SymmetricLeaf(3, math.cos(math.pi / 3)),
+    "star": SymmetricLeaf(5, 0.381966),
+    "pentagon": SymmetricLeaf(5, math.cos(math.pi / 5)),
+    "disc": SymmetricLeaf(16, 0.0),
+    "hexagon": SymmetricLeaf(6, math.cos(math.pi / 6)),
 }
 
 
-class Decoder:
+class SymmetricDecoder:
     """A decoder whose numbers are linear in few parameters.
 
     ``layers`` are orbits of both hidden layers, a letter each: ``g`` has 2n units, ``v`` and ``e`` have n,
@@ -175,7 +175,7 @@ class Start:
 
     def __init__(self, leaf: str, layers: tuple[str, str], seed: int) -> None:
         self.leaf = LEAVES[leaf]
-        self.decoder = Decoder(self.leaf.order, layers)
+        self.decoder = SymmetricDecoder(self.leaf.order, layers)
         self.rng = np.random.default_rng([seed, sum(map(ord, leaf + "".join(layers)))])
         self.parameters = self.decoder.start(self.rng)
         self.damping = 0.01
@@ -203,7 +203,7 @@ class Start:
         return loss / count
 
 
-class Fit(NamedTuple):
+class FitSettings(NamedTuple):
     """Settings of the fit of a leaf's decoder."""
 
     layers: tuple[str, str]  # orbits of the hidden layers
@@ -259,12 +259,12 @@ def hiding(a: list[Floats], b: list[Floats], third: list[Floats], width: int) ->
 
 
 FITS: Final = {
-    "square": Fit(("gge", "ge1"), 7, 60),
-    "triangle": Fit(("ggg", "ggv"), 10, 60),
-    "star": Fit(("ggg", "ge11"), 4, 100),
-    "pentagon": Fit(("ggg", "ge1"), 12, 60),
-    "disc": Fit(("ve", "e1"), 4, 60),
-    "hexagon": Fit(("ve", "ve1"), 5, 30),
+    "square": FitSettings(("gge", "ge1"), 7, 60),
+    "triangle": FitSettings(("ggg", "ggv"), 10, 60),
+    "star": FitSettings(("ggg", "ge11"), 4, 100),
+    "pentagon": FitSettings(("ggg", "ge1"), 12, 60),
+    "disc": FitSettings(("ve", "e1"), 4, 60),
+    "hexagon": FitSettings(("ve", "ve1"), 5, 30),
 }
 """The starts whose ends ship."""
 DISC: Final = (0.2, -0.1, 0.4, 0.0)

@@ -40,10 +40,10 @@ from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.neural.files import load_arrays
 
 ROUNDS = 5  # of which the least counts: others interrupt
-Rival = Callable[[int], "Frame"]
+Rival = Callable[[int], "FrameTimes"]
 
 
-class Frame(NamedTuple):
+class FrameTimes(NamedTuple):
     """Times of a frame; ``picture`` is (H, W, 3)."""
 
     seconds: float
@@ -141,12 +141,12 @@ def here(net: Any, made: Sequence[Program], threads: int = 0) -> Rival:
     """Draws the frames of Programs in this process, in wall time if a number of threads is given."""
     clock = time.perf_counter if threads else time.process_time
 
-    def draw(index: int) -> Frame:
+    def draw(index: int) -> FrameTimes:
         program = copy.copy(made[index])
         started = clock()
         drawn = draw_objects(net, program, threads=threads or 1)
         seconds = clock() - started
-        return Frame(seconds, drawn.pairs, drawn.refined, drawn.met, np.asarray(drawn.image))
+        return FrameTimes(seconds, drawn.pairs, drawn.refined, drawn.met, np.asarray(drawn.image))
 
     return draw
 
@@ -176,17 +176,17 @@ def elsewhere(root: str, name: str, frames: int, library: str) -> Iterator[Rival
             assert process.stdin is not None
             assert process.stdout is not None
 
-            def draw(index: int) -> Frame:
+            def draw(index: int) -> FrameTimes:
                 print(index, file=process.stdin, flush=True)
-                return Frame(*json.loads(process.stdout.readline()), np.load(f"{folder}/picture.npy"))
+                return FrameTimes(*json.loads(process.stdout.readline()), np.load(f"{folder}/picture.npy"))
 
             yield draw
             process.stdin.close()
 
 
-def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
+def race(rivals: Sequence[Rival], frames: int) -> list[list[FrameTimes]]:
     """The frames of each rival; they draw in turn, several times, of which the least counts."""
-    result: list[list[Frame]] = [[] for _ in rivals]
+    result: list[list[FrameTimes]] = [[] for _ in rivals]
     for index in range(frames + 1):
         turns = [[rival(index) for rival in rivals] for _ in range(ROUNDS)]
         for own, drawn in zip(result, zip(*turns, strict=True), strict=True):
@@ -195,18 +195,18 @@ def race(rivals: Sequence[Rival], frames: int) -> list[list[Frame]]:
     return [own[1:] for own in result]
 
 
-def told(title: str, frames: Sequence[Frame]) -> str:
+def told(title: str, frames: Sequence[FrameTimes]) -> str:
     seconds, pairs, refined, met = (statistics.median(f[at] for f in frames) for at in range(4))
     counts = f"{pairs:,.0f} pairs met, {met:,.0f} pixels asked, {refined:,.0f} of them four times"
     first = statistics.median(frame.first for frame in frames)
     return f"{title}: {1e3 * seconds:.2f} ms, {1e3 * first:.2f} drawn first; {counts}"
 
 
-def middle(frames: Sequence[Frame]) -> dict[str, float]:
+def middle(frames: Sequence[FrameTimes]) -> dict[str, float]:
     return {what: statistics.median(getattr(f, what) for f in frames) for what in ("seconds", "pairs")}
 
 
-def against(ours: Sequence[Frame], theirs: Sequence[Frame], title: str) -> str:
+def against(ours: Sequence[FrameTimes], theirs: Sequence[FrameTimes], title: str) -> str:
     """Comparison of two rivals, frame by frame."""
     ratio = statistics.median(b.seconds / a.seconds for a, b in zip(ours, theirs, strict=True))
     off = [abs(a.picture - b.picture).max(2) for a, b in zip(ours, theirs, strict=True)]

@@ -83,7 +83,7 @@ def primitive(leaf: Leaf, more: float = 0.0) -> str:
     return " ".join([core, *(f"matrix {numbers(rows)}" for rows in maps), "}"])
 
 
-class Formulas:
+class PovrayFunctions:
     """Functions that are declared as they are asked for."""
 
     def __init__(self) -> None:
@@ -145,7 +145,7 @@ def joined(word: str, *shapes: str) -> str:
     return f"{word} {{ {' '.join(shapes)} }}"
 
 
-def cells(root: Fold, formulas: Formulas) -> list[tuple[str, Leaf]]:
+def cells(root: Fold, formulas: PovrayFunctions) -> list[tuple[str, Leaf]]:
     """Shapes that do not overlap, each with the leaf that has its look: a chain of leaves, folded.
 
     A later object is cut out of those before it; a medium with a gap, as a ray would meet one of two surfaces
@@ -219,7 +219,7 @@ def staged(stage: Stage, canvas: tuple[int, int]) -> str:
 
 def exported(root: Fold, stage: Stage, canvas: tuple[int, int]) -> str:
     """A scene in POV-Ray's language."""
-    formulas = Formulas()
+    formulas = PovrayFunctions()
     bodies = [body(shape, leaf) for shape, leaf in cells(root, formulas)]
     return "\n".join([HEAD, *formulas.lines, staged(stage, canvas), *bodies, ""])
 

@@ -38,7 +38,7 @@ from scenelang.drawing.small import draw_small
 ROUNDS = 3
 
 
-class Formulas(Stream):
+class ExactStream(Stream):
     """Exact distances in place of learned ones, also of regions."""
 
     def distance(self, which: Any, q: Any, exactly: bool) -> Interval:
@@ -68,7 +68,7 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     canvas = scene.canvas
 
     def exact() -> Band:
-        return Band(Formulas(*given, known_errors(manifest)), canvas, range(canvas[1]), np.zeros(4))
+        return Band(ExactStream(*given, known_errors(manifest)), canvas, range(canvas[1]), np.zeros(4))
 
     ways: dict[str, Callable[[], Any]] = {
         "frame": lambda: draw_small(program).image,

@@ -61,7 +61,7 @@ BATCHES = 2  # of the most samples, in its converged picture
 Picture = np.ndarray[Any, Any]  # (H, W, 3), encoded
 
 
-class Frame(NamedTuple):
+class TimedPicture(NamedTuple):
     """A picture, the seconds that it took, and those of starting."""
 
     picture: Picture
@@ -72,7 +72,7 @@ class Frame(NamedTuple):
 class Renderer(NamedTuple):
     """A renderer's ways to draw a scene, by their names, and its converged picture of it."""
 
-    ways: dict[str, Callable[[], Frame]]
+    ways: dict[str, Callable[[], TimedPicture]]
     converged: Callable[[], Picture]
 
 
@@ -121,16 +121,16 @@ def ours(known: dict[str, Net], scene: Scene) -> Renderer:
     """All of these in the same march, and the reference."""
     graph = graph_of(scene)
 
-    def by(net: Net, samples: Samples) -> Frame:
+    def by(net: Net, samples: Samples) -> TimedPicture:
         program, field = compile_scene(scene, model=MODEL, codes=net.codes), net.field
         image, seconds = timed(lambda: draw_objects(field, program, threads=1, samples=samples).image)
-        return Frame(over_white(image), seconds)
+        return TimedPicture(over_white(image), seconds)
 
-    def exact(per_side: int) -> Frame:
+    def exact(per_side: int) -> TimedPicture:
         image, seconds = timed(lambda: reference_image(graph, per_side=per_side))
-        return Frame(over_white(image), seconds)
+        return TimedPicture(over_white(image), seconds)
 
-    ways: dict[str, Callable[[], Frame]] = {
+    ways: dict[str, Callable[[], TimedPicture]] = {
         f"{name}, {samples}": partial(by, net, samples)
         for name, net in known.items()
         for samples in net.samples
@@ -150,16 +150,16 @@ def by_povray(scene: Scene) -> Renderer:
         return timed(lambda: povray.traced(some, canvas, *options), resource.RUSAGE_CHILDREN)
 
     @cache  # where there are no media, they are not sampled
-    def way(grid: str, steps: int) -> Frame:
+    def way(grid: str, steps: int) -> TimedPicture:
         started = draw(steps, (1, 1))[1]
         light, seconds = draw(steps, scene.canvas, *grid.split())
-        return Frame(encoded(light), seconds - started, started)
+        return TimedPicture(encoded(light), seconds - started, started)
 
     def converged() -> Picture:
         dense = draw(MOST, (DENSE * width, DENSE * height))[0]
         return encoded(dense.reshape(height, DENSE, width, DENSE, 3).mean((1, 3)))
 
-    ways: dict[str, Callable[[], Frame]] = {
+    ways: dict[str, Callable[[], TimedPicture]] = {
         f"POV-Ray, {grid}, {steps} in media": partial(way, grid, steps if "media {" in text else MOST)
         for steps, grids in LADDERS.items()
         for grid in grids
@@ -180,10 +180,10 @@ def by_mitsuba(scene: Scene) -> Renderer:
     def light(spp: int, seed: int) -> tuple[np.ndarray, float]:
         return timed(lambda: mitsuba_scenes.picture(scene_, seed, spp))
 
-    def way(spp: int) -> Frame:
+    def way(spp: int) -> TimedPicture:
         first = light(spp, 1)[1]  # by vectors it is compiled for each number of samples
         picture, seconds = light(spp, 0)
-        return Frame(encoded(picture), seconds, loading_s + max(0.0, first - seconds))
+        return TimedPicture(encoded(picture), seconds, loading_s + max(0.0, first - seconds))
 
     def converged() -> Picture:
         return encoded(np.mean([light(SPP[-1], 2 + i)[0] for i in range(BATCHES)], 0))

@@ -24,7 +24,7 @@ from pydantic.dataclasses import dataclass as checked
 from torch import Tensor, nn
 
 from lab.about import about
-from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, random_scenes, shown
+from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, random_scenes, shown
 from lab.designs.students import (
     ExactCodes,
     ReadingStudent,
@@ -91,7 +91,7 @@ def read_long(name: str) -> LongFile:
     return TypeAdapter[LongFile](LongFile).validate_json(config_data(name))
 
 
-class Point(NamedTuple):
+class CurvePoint(NamedTuple):
     """A point of the curve."""
 
     step: int
@@ -110,7 +110,7 @@ class LongTraining:
         self.step, self.seconds, self.loss = 0, 0.0, math.nan
         self.side = 0  # resolution of the last step
         self._young = 0  # steps since the average began
-        self.curve: list[Point] = []
+        self.curve: list[CurvePoint] = []
         self.teacher: ExactCodes | None = None
         self.begun = ""  # SHA-256 of the weights that it began from
         checkpoint = folder / "checkpoint.safetensors"
@@ -147,7 +147,7 @@ class LongTraining:
             if due and phase.side:
                 spent = self.seconds + time.process_time() - started
                 psnr = round(self.measure(), 3)
-                self.curve.append(Point(self.step, round(spent, 1), self.measured_side, psnr))
+                self.curve.append(CurvePoint(self.step, round(spent, 1), self.measured_side, psnr))
             spent = time.process_time() - started
             self.seconds, used = self.seconds + spent, used + spent
             yield self.loss
@@ -218,7 +218,7 @@ class LongTraining:
         error = (result - exact).square().flatten(2).mean(2)  # (B, N)
         return (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
 
-    def _lifting_loss(self, scenes: Scenes) -> Tensor:
+    def _lifting_loss(self, scenes: SceneBatch) -> Tensor:
         """Squared error of a learned lifting's vectors against exact ones, of which it has the length."""
         assert self.teacher is not None
         with torch.no_grad():
@@ -256,7 +256,7 @@ class LongTraining:
         self._teach({k.removeprefix("teacher."): v for k, v in tensors.items() if k.startswith("teacher.")})
         unpack_training(tensors, self._networks, self.optimiser, self.generator)
         self.step, self.side, self._young = header["step"], header["side"], header["young"]
-        self.seconds, self.curve = header["seconds"], [Point(*point) for point in header["curve"]]
+        self.seconds, self.curve = header["seconds"], [CurvePoint(*point) for point in header["curve"]]
         self.begun = header["begun"]
 
     def _begin(self, path: Path) -> None:
@@ -275,7 +275,7 @@ class LongTraining:
         self.student.load_state_dict(own | taken)
         self.begun = hashlib.sha256(read_regular(path, MOST_BYTES)).hexdigest()
         self.seconds = float(header["seconds"])
-        self.curve = [Point(*point) for point in header.get("curve", [])]
+        self.curve = [CurvePoint(*point) for point in header.get("curve", [])]
 
     def _teach(self, codes: dict[str, Tensor]) -> None:
         if codes:

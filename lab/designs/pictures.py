@@ -35,7 +35,7 @@ class PictureConfig:
 
 
 @dataclass(slots=True)
-class Scenes:
+class SceneBatch:
     leaf: Tensor  # geometry index (B, N), int64
     # (B, N), nearest the leaf, in that order
     twirl: Tensor
@@ -45,9 +45,9 @@ class Scenes:
     tokens: Tensor  # (B, N), int64
     count: Tensor  # (B,) objects in use; the rest is padding
 
-    def pick(self, rows: Tensor) -> Scenes:
+    def pick(self, rows: Tensor) -> SceneBatch:
         """Some of them."""
-        return Scenes(*(getattr(self, name)[rows] for name in self.__slots__))
+        return SceneBatch(*(getattr(self, name)[rows] for name in self.__slots__))
 
     @property
     def used(self) -> Tensor:
@@ -55,7 +55,7 @@ class Scenes:
         return torch.arange(self.leaf.shape[1], device=self.leaf.device) < self.count[:, None]
 
 
-def random_scenes(b: int, config: PictureConfig, g: torch.Generator) -> Scenes:
+def random_scenes(b: int, config: PictureConfig, g: torch.Generator) -> SceneBatch:
     """Draw B scenes."""
     n, device = config.objects, g.device
 
@@ -73,7 +73,7 @@ def random_scenes(b: int, config: PictureConfig, g: torch.Generator) -> Scenes:
     tokens = torch.randint(0, 4, (b, n), generator=g, device=device)
     tokens[torch.rand(b, generator=g, device=device) < config.unions] = 0
     tokens[:, 0] = 0
-    return Scenes(
+    return SceneBatch(
         leaf=torch.randint(0, 4, (b, n), generator=g, device=device),
         twirl=uniform(-config.warp, config.warp),
         bend=uniform(-config.warp, config.warp),
@@ -84,20 +84,20 @@ def random_scenes(b: int, config: PictureConfig, g: torch.Generator) -> Scenes:
     )
 
 
-def frames(scenes: Scenes) -> Tensor:
+def frames(scenes: SceneBatch) -> Tensor:
     """Rows of the inverses in the plane (B, N, 2, 3) of the affine maps."""
     linear = torch.linalg.inv(scenes.affine[..., :2, :2])
     return torch.cat([linear, -linear @ scenes.affine[..., :2, 3:]], -1)
 
 
-def local_points(scenes: Scenes, x: Tensor, y: Tensor) -> list[Tensor]:
+def local_points(scenes: SceneBatch, x: Tensor, y: Tensor) -> list[Tensor]:
     """Exact leaf coordinates, two of (B, N, P), of world points x, y, each (B or 1, P)."""
     rows = frames(scenes)[..., None].permute(2, 3, 0, 1, 4)
     q = map_back(rows, (x[:, None], y[:, None]))
     return warp_back(scenes.twirl[..., None], [scenes.bend[..., None]], q)
 
 
-def trace_exactly(scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
+def trace_exactly(scenes: SceneBatch, x: Tensor, y: Tensor) -> tuple[Tensor, list[tuple[Tensor, Tensor]]]:
     """Exact distances (B, N, P) of the objects, and distance (B, P) and colour (B, P, 3) after each."""
     shape = sectors(x.device)[scenes.leaf]  # (B, N, 4)
     d = sector_distance(local_points(scenes, x, y), *(v[..., None] for v in shape.unbind(-1)))
@@ -105,13 +105,13 @@ def trace_exactly(scenes: Scenes, x: Tensor, y: Tensor) -> tuple[Tensor, list[tu
     return d, list(fold(d.unbind(1), scenes.rgb[:, :, None].unbind(1), scenes.tokens.T[..., None]))
 
 
-def stretch(scenes: Scenes) -> Tensor:
+def stretch(scenes: SceneBatch) -> Tensor:
     """World distance per leaf distance (B, N): the smallest singular values in the plane."""
     values: Tensor = torch.linalg.svdvals(scenes.affine[..., :2, :2])[..., 1]
     return values
 
 
-def shown(scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:
+def shown(scenes: SceneBatch, x: Tensor, y: Tensor) -> Tensor:
     """Exact colours (B, P, 3) over white at world points x, y, each (B or 1, P)."""
     d, steps = trace_exactly(scenes, x, y)
     out = torch.ones(*d.shape[::2], 3, device=x.device)
@@ -127,7 +127,7 @@ def pixel_centres(r: int, device: torch.device | str = "cpu") -> tuple[Tensor, T
     return at.repeat(r), -at.repeat_interleave(r)
 
 
-def pictures(scenes: Scenes, r: int) -> Tensor:
+def pictures(scenes: SceneBatch, r: int) -> Tensor:
     """Exact pictures (B, 3, R, R) over white, four samples a pixel as the language defines."""
     x, y = pixel_centres(r, scenes.leaf.device)
     total = torch.zeros(len(scenes.leaf), r * r, 3, device=x.device)
@@ -137,7 +137,7 @@ def pictures(scenes: Scenes, r: int) -> Tensor:
     return (total / 4).transpose(1, 2).reshape(-1, 3, r, r)
 
 
-def exact_vectors(scenes: Scenes, codes: Tensor, material_codes: Tensor) -> Tensor:
+def exact_vectors(scenes: SceneBatch, codes: Tensor, material_codes: Tensor) -> Tensor:
     """Vectors (B, N, 64) as `scenelang.compiler.lifting` makes them, of codes (G, 4) and (K, 12)."""
     b, n = scenes.leaf.shape
     out, at = torch.zeros(b, n, WIDTH, device=codes.device), PLANE_LAYOUT.places

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import torch
 from torch import Tensor, nn
 
-from lab.designs.pictures import Scenes, exact_vectors, pixel_centres
+from lab.designs.pictures import SceneBatch, exact_vectors, pixel_centres
 from lab.training.scenes import GEOMETRIES
 from scenelang.compiler.lifting import GEOMETRY_INPUTS, MATERIAL_INPUTS, PLANE_LAYOUT, WIDTH
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
@@ -100,7 +100,7 @@ class ExactCodes(nn.Module):
         self.codes = nn.Parameter(torch.randn(len(GEOMETRIES), 4))
         self.material_codes = nn.Parameter(torch.randn(1, 12))
 
-    def lift(self, scenes: Scenes) -> Tensor:
+    def lift(self, scenes: SceneBatch) -> Tensor:
         """Vectors (B, N, 64)."""
         return exact_vectors(scenes, self.codes, self.material_codes)
 
@@ -111,7 +111,7 @@ class LearnedLifting(Encoders):
     def __init__(self, config: LiftingConfig) -> None:
         super().__init__(config, len(GEOMETRIES), 1)
 
-    def lift(self, scenes: Scenes) -> Tensor:
+    def lift(self, scenes: SceneBatch) -> Tensor:
         """Vectors (B, N, D)."""
         b, n = scenes.leaf.shape
         g = self.codes[scenes.leaf].view(b * n, -1, 1)  # (B N, d_g, 1)
@@ -141,7 +141,7 @@ class Student(nn.Module, ABC):
         return WIDTH
 
     @abstractmethod
-    def image(self, scenes: Scenes, r: int) -> Tensor:
+    def image(self, scenes: SceneBatch, r: int) -> Tensor:
         """Pictures (B, 3, R, R) over white."""
 
 
@@ -151,7 +151,7 @@ class StreamingStudent(Student):
         sizes: dict[str, Any] = asdict(config.streaming) | {"vector": self.vector}
         self.renderer = Streaming(StreamingConfig(**sizes), grown=grown)
 
-    def image(self, scenes: Scenes, r: int, blend: float = 1.0) -> Tensor:
+    def image(self, scenes: SceneBatch, r: int, blend: float = 1.0) -> Tensor:
         image: Tensor = self.renderer(
             self.lifting.lift(scenes), scenes.tokens, scenes.count, resolution=r, blend=blend
         )
@@ -166,14 +166,14 @@ class ReadingStudent(Student):
         sizes: dict[str, Any] = asdict(config.reading) | {"vector": self.vector}
         self.renderer = Reading(ReadingConfig(**sizes))
 
-    def points(self, scenes: Scenes, x: Tensor, y: Tensor) -> Tensor:
+    def points(self, scenes: SceneBatch, x: Tensor, y: Tensor) -> Tensor:
         """Colours (B, P, 3) over white at world points (B, P)."""
         colours: Tensor = self.renderer(
             self.lifting.lift(scenes), scenes.tokens, torch.stack([x, y], -1), scenes.count
         )
         return colours
 
-    def image(self, scenes: Scenes, r: int) -> Tensor:
+    def image(self, scenes: SceneBatch, r: int) -> Tensor:
         b = len(scenes.leaf)
         x, y = pixel_centres(r, scenes.leaf.device)
         offsets = [(dx, dy) for dx in (-0.5 / r, 0.5 / r) for dy in (-0.5 / r, 0.5 / r)]

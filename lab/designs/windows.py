@@ -15,14 +15,14 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d, one_hot, pad
 
-from lab.designs.pictures import Scenes, trace_exactly
+from lab.designs.pictures import SceneBatch, trace_exactly
 from lab.designs.students import StreamingStudent
 from scenelang.language.words import TOKENS
 
 NEAR = 0.4  # world units: how far from an object's middle a window's middle may lie
 
 
-def windows(scenes: Scenes, side: int, window: int, g: torch.Generator) -> Tensor:
+def windows(scenes: SceneBatch, side: int, window: int, g: torch.Generator) -> Tensor:
     """Upper left corners (B, 2), row and column, multiples of 4: three of four near an object."""
     b, n = scenes.leaf.shape
     which = torch.randint(0, n, (b,), generator=g)
@@ -46,7 +46,7 @@ def grid(b: int, side: int, corner: Tensor | None = None, window: int = 0) -> tu
 
 
 @torch.no_grad()
-def prefixes(scenes: Scenes, x: Tensor, y: Tensor, w: int) -> Tensor:
+def prefixes(scenes: SceneBatch, x: Tensor, y: Tensor, w: int) -> Tensor:
     """Exact pictures (B, N, 3, W, W) over white of all prefixes, of samples as `grid` gives them."""
     steps = trace_exactly(scenes, x, y)[1]
     shown = [torch.where((d < 0)[..., None], c.expand(*d.shape, 3), 1.0) for d, c in steps]
@@ -56,7 +56,13 @@ def prefixes(scenes: Scenes, x: Tensor, y: Tensor, w: int) -> Tensor:
 
 
 def maps(
-    student: StreamingStudent, scenes: Scenes, side: int, corner: Tensor | None, window: int, *, halves: bool
+    student: StreamingStudent,
+    scenes: SceneBatch,
+    side: int,
+    corner: Tensor | None,
+    window: int,
+    *,
+    halves: bool,
 ) -> Tensor:
     """Feature maps (B, N, F, W, W) of the objects, in windows or whole."""
     vectors = student.lifting.lift(scenes)
@@ -76,7 +82,7 @@ def maps(
     return x.reshape(*vectors.shape[:2], *x.shape[1:])
 
 
-def draw(student: StreamingStudent, scenes: Scenes, side: int, found: Tensor, *, halves: bool) -> Tensor:
+def draw(student: StreamingStudent, scenes: SceneBatch, side: int, found: Tensor, *, halves: bool) -> Tensor:
     """Pictures of all prefixes (B, N, 3, W, W) by the student, from the result of `maps`."""
     level: Any = student.renderer.stages[str(side)]
     marks = one_hot(scenes.tokens, len(TOKENS)).float()

@@ -38,7 +38,7 @@ class Figure(float):
         return Figure(float(self) - other)
 
 
-class Word(str):
+class Phrase(str):
     """Text of a record, such as a command."""
 
     def __format__(self, spec: str) -> str:
@@ -61,7 +61,7 @@ def at(name: str, keys: str = "", /, **where: object) -> Any:
         result = result[key]
     if isinstance(result, int | float):
         return Figure(result)
-    return Word(result) if isinstance(result, str) else result
+    return Phrase(result) if isinstance(result, str) else result
 
 
 def kilobytes(name: str) -> Figure:

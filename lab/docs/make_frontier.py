@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lab import DOCS, RESULTS, ROOT
-from lab.frontier.record import Errors, Frontier, Ratio
+from lab.frontier.record import FrameErrors, Frontier, Ratio
 from lab.frontier.ways import FIELD, TITLES
 from scenelang.output.frontier import frontier_path
 
@@ -77,7 +77,7 @@ def savings_text(frontier: Frontier, base: str) -> str:
     )
 
 
-def _mean(value: Errors, digits: int) -> str:
+def _mean(value: FrameErrors, digits: int) -> str:
     spread = f" ± {value.interval:.{digits}f}" if round(value.interval, digits) else ""
     return f"{value.mean:.{digits}f}{spread}"
 

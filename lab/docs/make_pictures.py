@@ -37,7 +37,7 @@ from lab import DOCS
 from lab.charts import budget_chart, stability_chart
 from lab.docs import solid_rivals
 from lab.docs.blocks import pictured
-from lab.evaluate import Case, sheet
+from lab.evaluate import SceneFigures, sheet
 from lab.frontier.chart import frontier_chart
 from lab.frontier.record import Frontier
 from lab.shadows import measure_shadows
@@ -79,7 +79,7 @@ _SHOWN = re.compile(r"^// Shown( \w+)?: (.*)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Source:
+class PictureSource:
     """A scene's file or text, its params and the frame that stands for it."""
 
     path: Path | None = None
@@ -122,12 +122,12 @@ def png(picture: pillow.Image) -> bytes:
     return data.getvalue()
 
 
-def still(source: Source) -> bytes:
+def still(source: PictureSource) -> bytes:
     """One frame as a PNG, with alpha if it has any."""
     return png(nsg.render(source.scene()).to_pil())
 
 
-def moving(source: Source) -> bytes:
+def moving(source: PictureSource) -> bytes:
     """An animation as a WebP, small, over white."""
     first = source.scene(0)
     if first.animation is None:
@@ -175,19 +175,19 @@ def tiled(pictures: list[pillow.Image], columns: int, side: tuple[int, int]) -> 
     return sheet
 
 
-def strips(path: Path) -> dict[str, list[tuple[str, Source]]]:
+def strips(path: Path) -> dict[str, list[tuple[str, PictureSource]]]:
     """(label, scene) of each cell, for each strip of a scene of the reference."""
     result = {}
     for name, cells in _SHOWN.findall(path.read_text("utf-8")):
         parts = [cell.rpartition(": -D ") for cell in cells.split(" | ")]
         result[name.strip() or path.stem] = [
-            (label.strip(), Source(path, params=tuple(re.findall(r"([\w.]+)=(\S+)", values))))
+            (label.strip(), PictureSource(path, params=tuple(re.findall(r"([\w.]+)=(\S+)", values))))
             for label, _, values in parts
         ]
     return result
 
 
-def strip(cells: list[tuple[str, Source]]) -> bytes:
+def strip(cells: list[tuple[str, PictureSource]]) -> bytes:
     """A row of pictures with a label below each."""
     sheet = pillow.new("RGB", (len(cells) * (STRIP_PX + GAP_PX) - GAP_PX, STRIP_PX + LABEL_PX), "white")
     pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
@@ -201,7 +201,9 @@ def strip(cells: list[tuple[str, Source]]) -> bytes:
 
 def gallery() -> bytes:
     """Some examples on a sheet."""
-    scenes = [Source(EXAMPLES / f"{name}.nsg", frame=GALLERY_FRAMES.get(name, 0)).scene() for name in GALLERY]
+    scenes = [
+        PictureSource(EXAMPLES / f"{name}.nsg", frame=GALLERY_FRAMES.get(name, 0)).scene() for name in GALLERY
+    ]
     large = [over_white(nsg.render(sized(scene, SHARPER * 200))) for scene in scenes]
     return png(tiled(large, 4, (200, 200)))
 
@@ -218,7 +220,8 @@ def worst_cases(name: str, count: int, model: str = "shapes2d", folder: str = ""
     """The worst cases of an evaluation: network, exact picture, FLIP map."""
     report = json.loads((DOCS / "results" / folder / f"{name}.json").read_text("utf-8"))
     cases = [
-        Case(c["index"], c["last"], 0, {"psnr": c["psnr"], "flip": c["flip"]}) for c in report["worst_cases"]
+        SceneFigures(c["index"], c["last"], 0, {"psnr": c["psnr"], "flip": c["flip"]})
+        for c in report["worst_cases"]
     ]
     shown = sheet(load_model(model), name, report["seed"], cases[:count]).to_pil()
     shown.thumbnail((1100, 1100))
@@ -320,9 +323,9 @@ def plan() -> dict[str, Callable[[], bytes]]:
     for path in sorted(EXAMPLES.glob("*.nsg")):
         animation = nsg.load(path).animation
         middle = 0 if animation is None else animation.frames - 1 if not animation.loop else 0
-        made[f"{path.stem}.png"] = lambda source=Source(path, frame=middle): still(source)
+        made[f"{path.stem}.png"] = lambda source=PictureSource(path, frame=middle): still(source)
         if animation is not None:
-            made[f"{path.stem}.webp"] = lambda source=Source(path): moving(source)
+            made[f"{path.stem}.webp"] = lambda source=PictureSource(path): moving(source)
     for path in sorted(REFERENCE.glob("*.nsg")):
         for name, cells in strips(path).items():
             made[f"language/{name}.png"] = lambda cells=cells: strip(cells)
@@ -331,7 +334,7 @@ def plan() -> dict[str, Callable[[], bytes]]:
             if name in made:
                 raise SystemExit(f"{page.name}: {name} is drawn twice")
             draw = moving if name.endswith(".webp") else still
-            made[name] = lambda draw=draw, source=Source(text=text): draw(source)
+            made[name] = lambda draw=draw, source=PictureSource(text=text): draw(source)
     made["gallery.png"] = gallery
     made["fit.png"] = fitted
     made["fit-frames.png"] = fitted_frames

@@ -49,7 +49,7 @@ def server() -> Iterator[str]:
             process.wait(20)
 
 
-class Film:
+class Recording:
     """Pictures of a page and how long each is shown."""
 
     def __init__(self, page: Any) -> None:
@@ -78,7 +78,7 @@ class Film:
         )
 
 
-def record(page: Any, film: Film) -> None:
+def record(page: Any, film: Recording) -> None:
     """Use the page."""
     page.locator(".cm-line", has_text="intersect").first.wait_for()
     film.take(LONG_MS, 4000)
@@ -114,7 +114,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))
         page = browser.new_page(viewport=SIZE)
         page.goto(url)
-        film = Film(page)
+        film = Recording(page)
         record(page, film)
         browser.close()
     film.save(OUT)

@@ -22,7 +22,7 @@ import torch
 from lab.about import Report, about, revision, silent
 from lab.evaluate import exact_of
 from lab.frontier.fit import fit_cost
-from lab.frontier.record import Errors, Frontier, Point, Quality, Ratio, Times, front
+from lab.frontier.record import FrameErrors, Frontier, Point, Quality, Ratio, Times, front
 from lab.frontier.ways import PAPER, Draw, Way, paired, ways_of
 from lab.sets.scenes import interval, scenes_of, usual_set
 from scenelang.compiler.compile import compile_scene
@@ -51,7 +51,7 @@ FEW = 118  # of fewer scenes the largest may lie under the quantile by more than
 FEW_MARGIN = 1.5  # of 45 scenes of solids with a quarter alone, one in twenty of another seed was worse
 
 
-class Case(NamedTuple):
+class PromisedScenes(NamedTuple):
     """Scenes that promises are made and tried on: of a set, on a canvas or the set's own."""
 
     name: str
@@ -69,16 +69,16 @@ class Case(NamedTuple):
         return scene if self.canvas is None else scene.model_copy(update={"canvas": self.canvas})
 
 
-CASES: tuple[Case, ...] = (
-    Case("256 x 256", "", None, 1.0, 1.0),
-    Case("128 x 128", "", (128, 128), 1 / 3),
-    Case("512 x 512", "", (512, 512), 1 / 3, 1 / 8),
-    Case("16 objects", "many", None, 1 / 3),
+CASES: tuple[PromisedScenes, ...] = (
+    PromisedScenes("256 x 256", "", None, 1.0, 1.0),
+    PromisedScenes("128 x 128", "", (128, 128), 1 / 3),
+    PromisedScenes("512 x 512", "", (512, 512), 1 / 3, 1 / 8),
+    PromisedScenes("16 objects", "many", None, 1 / 3),
 )
 
 
 @dataclass(slots=True)
-class Record:
+class Timings:
     ms: list[float] = field(default_factory=list)  # of each scene
     # of each scene
     flip: list[float] = field(default_factory=list)
@@ -107,7 +107,7 @@ def measure_frontier(
     torch.set_num_threads(threads)
     manifest = load_manifest(base)
     ways = ways_of(base, threads)
-    records = {way.name: Record() for way in ways}
+    records = {way.name: Timings() for way in ways}
     scene_at = scenes_of(open_model(base), usual_set(manifest), seed, SIDE)
     spare = scene_at(scenes)
     quota = {way.name: _quota(way, spare, scenes, threads) for way in ways}
@@ -172,7 +172,7 @@ def _quota(way: Way, scene: Scene, scenes: int, threads: int) -> int:
 def _one_scene(
     scene: Scene,
     ways: Sequence[Way],
-    records: dict[str, Record],
+    records: dict[str, Timings],
     manifest: Manifest,
     index: int,
     threads: int,
@@ -203,7 +203,7 @@ def _one_scene(
 def _other_cases(
     base: str,
     ways: Sequence[Way],
-    records: dict[str, Record],
+    records: dict[str, Timings],
     scenes: int,
     seed: int,
     threads: int,
@@ -256,10 +256,10 @@ def margin(scenes: int) -> float:
     return MARGIN if scenes >= FEW else FEW_MARGIN
 
 
-def _point(way: Way, record: Record, paper: Record | None) -> Point:
+def _point(way: Way, record: Timings, paper: Timings | None) -> Point:
     errors = quality = None
     if record.flip:
-        errors = Errors(
+        errors = FrameErrors(
             bound=margin(len(record.flip)) * max(map(promised, [record.flip, *record.others])),
             mean=float(np.mean(record.flip)),
             p95=float(np.percentile(record.flip, 95)),
@@ -298,14 +298,14 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     return ordered[rank - 1], ordered[n - rank]
 
 
-def _ratios(base: str, records: dict[str, Record]) -> Iterator[Ratio]:
+def _ratios(base: str, records: dict[str, Timings]) -> Iterator[Ratio]:
     for slow, fast in paired(base):
         if slow in records and fast in records:
             result = _over(records[slow], records[fast])
             yield Ratio(slow, fast, len(result), float(np.mean(result)), interval(result))
 
 
-def _over(slow: Record, fast: Record) -> list[float]:
+def _over(slow: Timings, fast: Timings) -> list[float]:
     """Ratios of the times of two ways, for each scene that both drew."""
     return [a / b for a, b in zip(slow.ms, fast.ms, strict=False)]
 

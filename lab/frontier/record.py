@@ -34,7 +34,7 @@ class Times:
 
 
 @dataclass(frozen=True, slots=True)
-class Errors(shipped.Errors):
+class FrameErrors(shipped.FrameErrors):
     """FLIP of frames, in [0, 1], over scenes."""
 
     __pydantic_config__ = _STRICT
@@ -73,7 +73,7 @@ class Point(shipped.Point):
     """A way to draw and its figures."""
 
     __pydantic_config__ = _STRICT
-    flip: Errors | None
+    flip: FrameErrors | None
     renderer: str  # of the network, or `"reference"`
     spp: Count  # samples a pixel of the reference
     # pixels along a side that it draws, enlarged for the comparison; 0 where it draws any canvas

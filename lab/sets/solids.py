@@ -45,7 +45,7 @@ WARP = 0.8  # of deformed objects
 
 
 @dataclass(frozen=True, slots=True)
-class SolidConfig:
+class SolidSet:
     """Distribution of the scenes of a set."""
 
     objects: tuple[int, int] = (1, 3)  # fewest and most
@@ -63,21 +63,21 @@ class SolidConfig:
     leaves: tuple[str, ...] = ("sphere", "torus")
 
 
-SOLID_SETS: dict[str, SolidConfig] = {
-    "solids3d": SolidConfig(),
-    "diffuse": SolidConfig(media=0.0),
-    "media": SolidConfig(media=1.0),
-    "deformed": SolidConfig(warp=WARP),
-    "booleans": SolidConfig(unions=0.0, objects=(2, 4), spread=0.5),
-    "trees": SolidConfig(trees=True, media=0.3, spread=0.5),
-    "shuffled": SolidConfig(shuffled=True),
-    "skins": SolidConfig(skins=True, unions=0.5, size=0.7),
-    "wide": SolidConfig(canvas=(160, 96)),
-    "staged": SolidConfig(staged=True),
-    "many": SolidConfig(objects=(16, 16), media=0.3, size=0.6),
-    "mixed": SolidConfig(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
-    "leaves3d": SolidConfig(media=0.3, canvas=(256, 256), leaves=EDGED),
-    "meshes3d": SolidConfig(objects=(1, 4), media=0.0, meshes="std/meshes"),
+SOLID_SETS: dict[str, SolidSet] = {
+    "solids3d": SolidSet(),
+    "diffuse": SolidSet(media=0.0),
+    "media": SolidSet(media=1.0),
+    "deformed": SolidSet(warp=WARP),
+    "booleans": SolidSet(unions=0.0, objects=(2, 4), spread=0.5),
+    "trees": SolidSet(trees=True, media=0.3, spread=0.5),
+    "shuffled": SolidSet(shuffled=True),
+    "skins": SolidSet(skins=True, unions=0.5, size=0.7),
+    "wide": SolidSet(canvas=(160, 96)),
+    "staged": SolidSet(staged=True),
+    "many": SolidSet(objects=(16, 16), media=0.3, size=0.6),
+    "mixed": SolidSet(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
+    "leaves3d": SolidSet(media=0.3, canvas=(256, 256), leaves=EDGED),
+    "meshes3d": SolidSet(objects=(1, 4), media=0.0, meshes="std/meshes"),
 }
 
 
@@ -93,7 +93,7 @@ def _warps(rng: Rng, most: float) -> list[Transform]:
     return [transform for transform in every if most and rng.random() < 0.5]
 
 
-def _moves(rng: Rng, config: SolidConfig) -> list[Transform]:
+def _moves(rng: Rng, config: SolidSet) -> list[Transform]:
     x, y, z = (config.size * side for side in _triple(rng, *SIDES))
     turn = Rotate(angle=float(rng.uniform(0, math.tau)), axis=_triple(rng, -1, 1))
     move = Translate(*(config.spread * rng.uniform((-1.2, -0.5, -1.2), (1.2, 0.9, 1.2))).tolist())
@@ -122,7 +122,7 @@ def _stage(rng: Rng) -> dict[str, object]:
     }
 
 
-def random_solid(rng: Rng, config: SolidConfig) -> Scene:
+def random_solid(rng: Rng, config: SolidSet) -> Scene:
     """One scene of a set; it may be that hardly anything of it is seen."""
     unions = rng.random() < config.unions
     zoo = load_elements(config.meshes, "zoo") if config.meshes else None

@@ -18,7 +18,7 @@ from scenelang.drawing.neural.network import EMPTY, TOKENS, FramedConfig
 
 
 @dataclass(slots=True)
-class Trace:
+class StreamTrace:
     """Distances, states and colours after each object, from `Trainee.trace`."""
 
     distance: Tensor  # first feature of each object, world units (B, N, P)
@@ -84,7 +84,7 @@ class Trainee(Framed):
         colours: Tensor,
         tokens: Tensor,
         given: tuple[Tensor, Tensor] | None = None,
-    ) -> Trace:
+    ) -> StreamTrace:
         """Run streams for training, keeping what the image of every prefix shows.
 
         Leaf coordinates q are (B, N, d, P), scale and tokens (B, N), codes (B, N, C), colours (B, N, 3). Each
@@ -112,7 +112,7 @@ class Trainee(Framed):
             )
             depth.append(state[:, 0])
             shown.append(colour.mT)
-        return Trace(
+        return StreamTrace(
             distance=features[:, :, 0],
             alone=features[:, :, 0] * self.edge_slope.exp(),
             depth=torch.stack(depth, 1),

@@ -66,7 +66,7 @@ def points_of(count: int, rng: np.random.Generator) -> Floats:
     return np.asarray(p * (radius / np.linalg.norm(p, axis=0)))
 
 
-class Start:
+class NormStart:
     """One random start: parameters (T,), the lines row by row and then the radius."""
 
     def __init__(self, leaf: str, seed: int) -> None:
@@ -139,10 +139,10 @@ class Start:
         return result, float(self.parameters[-1])
 
 
-def fitted(leaf: str, seed: int) -> tuple[Start, float]:
+def fitted(leaf: str, seed: int) -> tuple[NormStart, float]:
     """The first start of a leaf that comes out right, and its error."""
     for turn in count():
-        start = Start(leaf, 1000 * seed + turn)
+        start = NormStart(leaf, 1000 * seed + turn)
         error = start.run(FIRST)
         if error < NEAR:
             error = start.run(MORE)

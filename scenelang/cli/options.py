@@ -33,7 +33,7 @@ class Request(Record):
     frame: int | None = None  # of an animation, to be drawn as a picture
 
 
-class Film(Record):
+class FilmOptions(Record):
     """Options for animations alone."""
 
     frames: FrameRange | None = None  # None for all
@@ -257,8 +257,8 @@ drawing = partial(
 )
 film = partial(
     _bundle,
-    "film",  # a `Film`
-    Film,
+    "film",  # a `FilmOptions`
+    FilmOptions,
     {
         "frames": text(
             "--frames",

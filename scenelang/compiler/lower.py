@@ -131,7 +131,7 @@ Composite = Scene | schema.Group | schema.Boolean | schema.Chain
 
 
 @dataclass(slots=True)
-class _Open:
+class _OpenComposite:
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
     op: Combine
@@ -173,7 +173,7 @@ class _Lowering:
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
 
     def run(self, scene: Scene) -> Fold:
-        stack = [_Open("union", 0.0, scene, None, _children(scene))]
+        stack = [_OpenComposite("union", 0.0, scene, None, _children(scene))]
         self.origin = scene if scene.model else None
         while True:
             here = stack[-1]
@@ -205,7 +205,7 @@ class _Lowering:
                 self.say("E0405", fact, node, "a group of a single child can be dropped")
                 return Fold("scene", ())
             else:
-                stack.append(_Open(op, k, node, material, _children(node)))
+                stack.append(_OpenComposite(op, k, node, material, _children(node)))
 
     def leaf(self, node: schema.Object, material: schema.Material | None) -> Leaf:
         self.origin = self.origin or node

@@ -269,7 +269,7 @@ def _core(link: Link, operand: Fold) -> int:
     return 1
 
 
-class _Open(Record, frozen=False):
+class _OpenFold(Record, frozen=False):
     """A fold whose children are being visited, and the moves from its children's space to the world."""
 
     fold: Fold
@@ -283,14 +283,14 @@ def push_transforms(graph: Graph, context: Context) -> Graph:
     Moves that do nothing vanish and neighbouring affine maps compose, so that chains stay short at any depth.
     Before: any graph. After: AT_LEAVES, MERGED.
     """
-    stack = [_Open(graph.root, graph.root.moves)]
+    stack = [_OpenFold(graph.root, graph.root.moves)]
     while True:
         here = stack[-1]
         if len(here.links) < len(here.fold.links):
             link = here.fold.links[len(here.links)]
             node = link.node
             if isinstance(node, Fold):
-                stack.append(_Open(node, _tidy(node, here.outward)))
+                stack.append(_OpenFold(node, _tidy(node, here.outward)))
             else:
                 if here.outward:
                     leaf = node.changed(node.look, _tidy(node, here.outward))

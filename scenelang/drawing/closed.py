@@ -20,7 +20,7 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import Floats, FramedArrays, FramedConfig
-from scenelang.drawing.solid.network import Cell, SolidArrays, Wanted
+from scenelang.drawing.solid.network import SolidArrays, SolidCell, Wanted
 from scenelang.drawing.solid.norms import Norms
 
 if TYPE_CHECKING:
@@ -131,13 +131,13 @@ class ClosedSolids(SolidArrays):
         nearest = abs(self.material_codes - material_code[..., None, :]).sum(-1).argmin(-1)
         return np.stack([*(np.ones_like(self.media[nearest]),) * 3, self.media[nearest]], -1)
 
-    def cell(self, token: int, width: float) -> tuple[Cell, ...]:
+    def cell(self, token: int, width: float) -> tuple[SolidCell, ...]:
         """The token in the place of the first weight, the width of blends in that of the second."""
         return self.cut(token, width if token == SMOOTH else 0.0)
 
-    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
+    def cut(self, token: int, width: float) -> tuple[SolidCell, ...]:
         token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
-        return (Cell(token_, width_, none, none, none),) * len(Wanted)
+        return (SolidCell(token_, width_, none, none, none),) * len(Wanted)
 
     def field(self, q: Array, layers: Smooth | Norms, gradient: bool) -> Array:
         assert isinstance(layers, Smooth)
@@ -148,7 +148,9 @@ class ClosedSolids(SolidArrays):
         assert slopes is not None
         return np.stack(slopes(q))
 
-    def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
+    def join(
+        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted
+    ) -> tuple[Array, Array]:
         tokens, joined = cell.own[0], None
         for token in np.unique(tokens):
             result = _joined(token, cell.past[0], memory[0], d)
@@ -169,10 +171,10 @@ class ClosedSolids(SolidArrays):
         assert isinstance(layers, Smooth)
         return GEOMETRIES[self.geometries[layers[0][0]]].edged
 
-    def alone(self, reach: Array, cell: Cell) -> Array:
+    def alone(self, reach: Array, cell: SolidCell) -> Array:
         return 0 * reach + 1
 
-    def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
+    def partials(self, d: Array, state: Array, take: Array, cell: SolidCell) -> tuple[Array, Array]:
         return np.where(cell.own[0] == SUBTRACT, -take, take), 1 - take
 
 

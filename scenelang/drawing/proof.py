@@ -51,10 +51,10 @@ from scenelang.drawing.neural.meetings import (
     Interval,
     Mask,
     Meetings,
+    NestedSlot,
     Nesting,
     Pairs,
     State,
-    Turn,
     flat_nesting,
     meetings_of,
     nesting,
@@ -67,7 +67,7 @@ TAME = 1e-9  # leaf units: an error that is allowed for in any case
 EPS = 32 * 2.0**-52  # relative error of one step: a few dozen roundings of float64
 
 
-class Written(NamedTuple):
+class WrittenObject(NamedTuple):
     """An object as written: its look before it was folded, and its steps, nearest the leaf first."""
 
     look: Look
@@ -178,7 +178,7 @@ def enclosed(
     state = _Exact.empty(NOTHING, nest.states, np.float64, channels)
     operands = State(distance, colour)
 
-    def join(turn: Turn) -> tuple[Mask, Mask]:
+    def join(turn: NestedSlot) -> tuple[Mask, Mask]:
         how = joins if turn.ending is None else groups
         assert how is not None
         operand = state.operands(turn, operands, NOTHING)
@@ -342,7 +342,7 @@ class Stream:
         self._skins = np.array([[skin.grow for skin in skins], [skin.shell / 2 for skin in skins], behind])
         self._skins[0] -= self._skins[2]
         objects, far = placed_leaves(lowered.root), np.hypot(*graph.canvas) / min(graph.canvas)
-        written = {leaf.number: Written(leaf.look, steps) for leaf, steps, _ in objects}
+        written = {leaf.number: WrittenObject(leaf.look, steps) for leaf, steps, _ in objects}
         leaves = [written[leaf.number] for leaf in self._leaves]
         own = list(zip(leaves, reach.tolist(), strict=True))
         self.rounding = np.array([leaf.misplaced(within, far) for leaf, within in own])

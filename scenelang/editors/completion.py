@@ -151,7 +151,7 @@ def colours(document: Document) -> list[types.ColorInformation]:
 
 
 def _colour(node: object, wanted: bool) -> tuple[float, float, float] | None:
-    if isinstance(node, tree.Color):
+    if isinstance(node, tree.ColorLiteral):
         return node.rgb
     letters, given = "rgb", []
     if isinstance(node, tree.Vector) and wanted:
@@ -173,7 +173,7 @@ def _number(expr: tree.Expr) -> float | None:
     if isinstance(expr, tree.Unary) and expr.op == "-":
         inner = _number(expr.operand)
         return None if inner is None else -inner
-    if not isinstance(expr, tree.Number):
+    if not isinstance(expr, tree.NumberLiteral):
         return None
     per_turn = {"": 1.0, "turn": 1.0, "deg": 360.0, "rad": 6.283185307179586}
     return expr.value / per_turn[expr.unit] if expr.unit in per_turn else None
@@ -210,7 +210,7 @@ _MOST_ITEMS: Final = 8
 def dimensions_of(document: Document) -> tuple[int, ...]:
     """The dimension of the model that a document names; both where it names none."""
     for stmt in document.heads:
-        if isinstance(stmt, tree.Model) and isinstance(stmt.name, tree.String):
+        if isinstance(stmt, tree.ModelStatement) and isinstance(stmt.name, tree.String):
             with suppress(KeyError):
                 return (load_manifest(stmt.name.value).dimension,)
     return (*LEAVES,)
@@ -275,7 +275,7 @@ _MOST_PATHS: Final = 200
 _MOST_FILES: Final = 2000
 
 
-class Item(Record):
+class Proposal(Record):
     """A proposal."""
 
     label: str
@@ -331,7 +331,7 @@ class _Maker:
         hidden = () if 3 in dimensions else words.SOLID_TRANSFORMS
         self.transforms = {name: word for name, word in words.TRANSFORMS.items() if name not in hidden}
 
-    def items(self) -> Iterator[Item]:
+    def items(self) -> Iterator[Proposal]:
         cursor, before = self.cursor, self.cursor.before
         last = before[-1] if before else ""
         if cursor.inside in ("comment", "colour"):
@@ -343,7 +343,7 @@ class _Maker:
             number = re.match(r"([0-9]++\.?[0-9]*+|\.[0-9]++)(.+)", typed)
             for unit in UNITS:
                 if number is not None and unit.startswith(number[2]):
-                    yield Item(f"{number[1]}{unit}", Kind.Unit)
+                    yield Proposal(f"{number[1]}{unit}", Kind.Unit)
         elif last == ".":
             yield from self._members(before)
         elif not before:
@@ -351,10 +351,10 @@ class _Maker:
         elif last in ("let", "param", "fn", "module", "nsg", "as", "#") or before[-2:] == ("for", "("):
             return
         elif before[-3:-1] == ("for", "("):
-            yield Item("in", Kind.Keyword, "in ")
+            yield Proposal("in", Kind.Keyword, "in ")
         elif before[0] == "import":
             if len(before) == 2:
-                yield Item("as", Kind.Keyword, "as ")
+                yield Proposal("as", Kind.Keyword, "as ")
         elif last == "material":
             yield from self._materials(self.shadings)
         elif before[-2:-1] == ("material",) and last in self.shadings:
@@ -363,7 +363,7 @@ class _Maker:
             yield from self._children("a")
             yield from (self._keyword(word) for word in ("group", *COMBINE, "chain"))
         elif before[0] == "param" and len(before) > 3 and "in" not in before and _ends_operand(last):
-            yield Item("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
+            yield Proposal("in", Kind.Keyword, "in ", "a", about=words.KEYWORDS["in"].text)
         elif last == ")" and before[0] == "if":
             return
         elif before[0] in ("fn", "module") and ")" not in before and last in ("(", ","):
@@ -372,29 +372,29 @@ class _Maker:
             yield from self._expressions()
             for word, inside in (("for", "${1:i} in ${2:0..<5}"), ("if", "${1:condition}")) if loops else ():
                 about = words.KEYWORDS[word].text
-                yield Item(word, Kind.Keyword, f"{word} ({inside}) ", "n", about=about, snippet=True)
+                yield Proposal(word, Kind.Keyword, f"{word} ({inside}) ", "n", about=about, snippet=True)
         elif ".." in before or "..<" in before:
-            yield Item("step", Kind.Keyword, "step ")
+            yield Proposal("step", Kind.Keyword, "step ")
 
-    def _strings(self) -> Iterator[Item]:
+    def _strings(self) -> Iterator[Proposal]:
         """Contents of a string: names of models, files to import."""
         if self.cursor.before == ("model",):
             for manifest in map(load_manifest, available()):
-                yield Item(manifest.name, Kind.Module, about=manifest.summary)
+                yield Proposal(manifest.name, Kind.Module, about=manifest.summary)
         elif self.cursor.before == ("import",):
-            yield from (Item(name, Kind.File, rank="a") for name in library.names())
+            yield from (Proposal(name, Kind.File, rank="a") for name in library.names())
             own = self.document.path
             folder = own.parent if own is not None else next(iter(self.docs.folders), None)
             for path in islice(scenes_below(folder, _MOST_FILES), _MOST_PATHS) if folder is not None else ():
                 if path != own:
-                    yield Item(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
+                    yield Proposal(os.path.relpath(path, folder).replace(os.sep, "/"), Kind.File)
 
-    def _keyword(self, word: str, rank: str = "p") -> Item:
+    def _keyword(self, word: str, rank: str = "p") -> Proposal:
         known = words.KEYWORDS[word]
         text = known.snippet or f"{word} {{\n\t$0\n}}"
-        return Item(word, Kind.Keyword, text, rank, known.head, known.text, True)
+        return Proposal(word, Kind.Keyword, text, rank, known.head, known.text, True)
 
-    def _statements(self) -> Iterator[Item]:
+    def _statements(self) -> Iterator[Proposal]:
         block = self.cursor.block
         kind = block.kind
         if kind in ("material", "object"):
@@ -408,51 +408,53 @@ class _Maker:
             given = {type(stmt) for stmt in self.document.heads}
             if tree.Version not in given:
                 yield self._keyword("nsg", "c")
-            if tree.Model not in given:
+            if tree.ModelStatement not in given:
                 yield self._keyword("model", "q")
             yield from (self._keyword(word, "q") for word in ("param", "import"))
             yield from _calls(words.SETTINGS, "q")
         yield from self._children("a")
         if kind == "chain":
             for word in COMBINE:
-                yield Item(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
+                yield Proposal(word, Kind.Keyword, f"{word} ", "b", about=words.KEYWORDS[word].text)
         yield from (self._keyword(word) for word in _HEADS if kind != "chain" or word not in COMBINE)
         if kind in ("group", "chain"):
             yield from _calls(self.transforms, "n")
             yield self._keyword("material", "n")
             yield from self._material_values("n")
 
-    def _children(self, rank: str) -> Iterator[Item]:
+    def _children(self, rank: str) -> Iterator[Proposal]:
         for name in sorted(self.geometries):
             text = f"{name} {{ ${{1:scale(0.5);}} }}"
-            yield Item(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES[name], True)
+            yield Proposal(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES[name], True)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind == "module":
                 yield self._symbol(symbol, statement=True)
             elif symbol.kind == "import":
                 yield self._symbol(symbol)
 
-    def _material_values(self, rank: str) -> Iterator[Item]:
+    def _material_values(self, rank: str) -> Iterator[Proposal]:
         may_be = tree.MaterialExpr | tree.NameRef | tree.Member
         for symbol in self.names.visible(self.cursor.offset):
             fits = symbol.kind != "let" or isinstance(getattr(symbol.node, "value", None), may_be)
             if fits and symbol.kind in ("let", "argument", "loop"):
-                yield Item(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
+                yield Proposal(symbol.name, Kind.Variable, f"{symbol.name};", rank, "material value")
 
-    def _materials(self, constant: Collection[str]) -> Iterator[Item]:
+    def _materials(self, constant: Collection[str]) -> Iterator[Proposal]:
         """Materials, and files that may hold others."""
         for name in sorted({*constant, *words.PAINTS}):
             text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
             if name in words.GRADIENTS:
                 text, kind = f"{name} {{ stop(0, ${{1:#d33}}); stop(1, ${{2:#33d}}); }}", "gradient"
-            yield Item(name, Kind.EnumMember, text, "a", kind, (words.MATERIALS | words.PAINTS)[name], True)
+            yield Proposal(
+                name, Kind.EnumMember, text, "a", kind, (words.MATERIALS | words.PAINTS)[name], True
+            )
         for symbol in self.names.visible(self.cursor.offset):
             stmt = symbol.node
             zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None
             if zoo is not None and zoo.materials:
                 yield self._symbol(symbol)
 
-    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> Item:
+    def _symbol(self, symbol: Symbol, *, statement: bool = False) -> Proposal:
         text, snippet = "", False
         if symbol.kind in ("fn", "module"):
             required = [p.name for p in symbol.params if not getattr(p.node, "default", None)]
@@ -462,9 +464,9 @@ class _Maker:
             text = symbol.name
         rank = "b" if symbol.scope.parent is not None else "d"
         word = word_of(symbol)
-        return Item(symbol.name, _KINDS[symbol.kind][2], text, rank, word.head, word.text, snippet)
+        return Proposal(symbol.name, _KINDS[symbol.kind][2], text, rank, word.head, word.text, snippet)
 
-    def _expressions(self) -> Iterator[Item]:
+    def _expressions(self) -> Iterator[Proposal]:
         callee = find_callee(self.docs, self.document, self.cursor)
         if callee is not None:
             yield from self._arguments(callee)
@@ -473,12 +475,12 @@ class _Maker:
                 yield self._symbol(symbol)
         yield from _calls(words.FUNCTIONS, "k", Kind.Function)
         for word in (words.CONSTANTS | words.ANIMATED).values():
-            yield Item(word.name, Kind.Constant, "", "l", about=word.text)
+            yield Proposal(word.name, Kind.Constant, "", "l", about=word.text)
         for name in ("true", "false"):
-            yield Item(name, Kind.Keyword, "", "n")
-        yield Item("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
+            yield Proposal(name, Kind.Keyword, "", "n")
+        yield Proposal("material", Kind.Keyword, "material ", "n", about=words.KEYWORDS["material"].text)
 
-    def _arguments(self, callee: words.Word) -> Iterator[Item]:
+    def _arguments(self, callee: words.Word) -> Iterator[Proposal]:
         """Names of arguments that are not given yet, and values for the current one."""
         call = self.cursor.call
         assert call is not None
@@ -490,40 +492,40 @@ class _Maker:
             for param in left if start else ():
                 if param not in call.given:
                     about = callee.notes.get(param, "")
-                    yield Item(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
+                    yield Proposal(f"{param} =", Kind.Field, f"{param} = ", "a", "argument", about)
             if call.index < len(callee.params) and positional:
                 name = callee.params[call.index]
         yield from self._values(callee.name, name)
 
-    def _values(self, callee: str, param: str | None) -> Iterator[Item]:
+    def _values(self, callee: str, param: str | None) -> Iterator[Proposal]:
         if param == "axis":
             for axis in ("X", "Y", "Z"):
-                yield Item(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
+                yield Proposal(axis, Kind.EnumMember, "", "0", about=words.CONSTANTS[axis].text)
         elif param == "loop":
             for value in ("true", "false"):
-                yield Item(value, Kind.EnumMember, "", "0")
+                yield Proposal(value, Kind.EnumMember, "", "0")
         elif param in ("angle", "fov"):
             for value, unit in (("30", "deg"), ("0.25", "turn"), ("0.5", "rad")):
                 text = f"${{1:{value}}}{unit}"
-                yield Item(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
+                yield Proposal(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
         elif param in ("c", "color") and callee in COLOURED:
-            yield Item("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
+            yield Proposal("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
-                yield Item(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
+                yield Proposal(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
         if (callee, param) in (("background", "c"), ("ground", "y")):
-            yield Item("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
+            yield Proposal("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
 
-    def _members(self, before: tuple[str, ...]) -> Iterator[Item]:
+    def _members(self, before: tuple[str, ...]) -> Iterator[Proposal]:
         alias = before[-2] if len(before) > 1 else ""
         symbol = self.names.scope_at(self.cursor.offset).find(alias)
         if symbol is None or symbol.kind != "import" or not isinstance(symbol.node, tree.Import):
             if before[-3:-2] != (".",) and re.fullmatch(r"[\w\])]+", alias):
                 for name in "xyzrgb":
-                    yield Item(name, Kind.Field)
+                    yield Proposal(name, Kind.Field)
             return
         zoo, worn = self.docs.zoo(self.document, symbol.node), "material" in before[-4:-2]
         for name, group in zoo.groups.items() if zoo is not None and not worn else ():
-            yield Item(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
+            yield Proposal(f"{name}()", Kind.Module, f"{name}() {{ $0 }}", "a", "group", told(group), True)
         statement = len(before) == 2 or (len(before) == 3 and before[0] in COMBINE)
         if zoo is not None and zoo.font is not None and not worn:
             name = "text" if statement else "width"
@@ -531,9 +533,9 @@ class _Maker:
         for element in zoo.elements if zoo is not None else ():
             if element.material == worn and element.form != "outline":
                 name, about = element.name, element.told()
-                yield Item(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
+                yield Proposal(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
             if element.size is not None and not worn:
-                yield Item(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
+                yield Proposal(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
         library = self.docs.imported(self.document, symbol.node.path.value)
         if library is None:
             return
@@ -542,9 +544,9 @@ class _Maker:
                 yield self._symbol(known, statement=statement)
 
 
-def _calls(known: dict[str, words.Word], rank: str, kind: Kind = Kind.Method) -> Iterator[Item]:
+def _calls(known: dict[str, words.Word], rank: str, kind: Kind = Kind.Method) -> Iterator[Proposal]:
     for _, word in sorted(known.items()):
-        yield Item(word.name, kind, word.snippet, rank, word.head, word.text, True)
+        yield Proposal(word.name, kind, word.snippet, rank, word.head, word.text, True)
 
 
 def _begins_item(before: tuple[str, ...]) -> bool:

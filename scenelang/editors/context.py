@@ -36,7 +36,7 @@ _HOLDERS: Final = {*NODES, "module"}
 _COMMENTS: Final = re.compile(r"//[^\n]*+\n?|/\*(?:[\s\S]*?\*/|[\s\S]*)")
 
 
-class Call(Record):
+class OpenCall(Record):
     """A call whose parentheses the cursor is in."""
 
     name: str  # of the callee, perhaps dotted
@@ -46,7 +46,7 @@ class Call(Record):
     given: frozenset[str]  # names of the other arguments so far
 
 
-class Block(Record):
+class OpenBlock(Record):
     """A block around the cursor."""
 
     kind: BlockKind  # the statements that it may hold
@@ -62,8 +62,8 @@ class Cursor(Record):
     end: int
     inside: Literal["comment", "string", "number", "colour", "code"]
     before: tuple[str, ...]  # tokens of the statement before that word
-    call: Call | None
-    block: Block
+    call: OpenCall | None
+    block: OpenBlock
 
 
 def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset()) -> Cursor:
@@ -96,7 +96,7 @@ def cursor_at(tokens: Tokens, offset: int, values: frozenset[str] = frozenset())
     return Cursor(offset, start, end, inside, before, _call(tokens, head, index), block)
 
 
-def _call(tokens: Tokens, head: int, index: int) -> Call | None:
+def _call(tokens: Tokens, head: int, index: int) -> OpenCall | None:
     """The innermost call whose parentheses are open before a token."""
     depth = commas = 0
     given: set[str] = set()
@@ -115,7 +115,7 @@ def _call(tokens: Tokens, head: int, index: int) -> Call | None:
                 given.clear()
                 continue
             name, start = _callee(tokens, head, at)
-            return Call(name, start, commas, named, frozenset(given)) if name else None
+            return OpenCall(name, start, commas, named, frozenset(given)) if name else None
         elif depth == 0 and kind == ",":
             commas += 1
             fresh = False
@@ -141,7 +141,7 @@ def _callee(tokens: Tokens, head: int, opening: int) -> tuple[str, int]:
     return name, start
 
 
-def _block(tokens: Tokens, index: int, values: frozenset[str]) -> Block:
+def _block(tokens: Tokens, index: int, values: frozenset[str]) -> OpenBlock:
     nested = False
     for brace in reversed(tokens.unmatched(index)[0]):
         words = [tokens.text(at) for at in range(tokens.head(brace), brace)]
@@ -156,11 +156,11 @@ def _block(tokens: Tokens, index: int, values: frozenset[str]) -> Block:
             continue
         if first in _HOLDERS:
             kind: BlockKind = "chain" if first == "chain" else "group"
-            return Block(kind, first, nested)
+            return OpenBlock(kind, first, nested)
         if "material" in words[-2:] or "material" in words[-4:-1] or (first in values and len(words) == 1):
-            return Block("material", first, nested)
-        return Block("object", first, nested)
-    return Block("file", "", nested)
+            return OpenBlock("material", first, nested)
+        return OpenBlock("object", first, nested)
+    return OpenBlock("file", "", nested)
 
 
 _LINE: Final = re.compile(r"^[ \t]*//(.*)$")

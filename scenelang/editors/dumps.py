@@ -302,7 +302,7 @@ class Box(NamedTuple):
     word: str = ""  # on that arrow
 
 
-class Drawing(NamedTuple):
+class Diagram(NamedTuple):
     """Boxes, from top to bottom or from left to right."""
 
     boxes: list[Box]
@@ -314,7 +314,7 @@ def _draw_tree(
     nodes: Sequence[tuple[str, T]],
     look: Callable[[T], tuple[Box, Sequence[tuple[str, T]]]],
     most: int,
-) -> Drawing:
+) -> Diagram:
     """A tree, level by level: its first box, its nodes with their words, and each one's box and children."""
     boxes = [Box(head)]
     todo = deque([(0, nodes)])
@@ -327,10 +327,10 @@ def _draw_tree(
             box, below = look(node)
             todo.append((len(boxes), below))
             boxes.append(box._replace(parent=parent, word=word))
-    return Drawing(boxes)
+    return Diagram(boxes)
 
 
-def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Drawing:
+def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Diagram:
     """The tree of a scene with its transforms, materials and boolean words."""
     manifest = find_model(scene, Diagnostics())
     space = SPACES[manifest.dimension if manifest is not None else 2]
@@ -363,7 +363,7 @@ def _rounded(statement: str) -> str:
     return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda match: f"{float(match[0]):.5g}", statement.rstrip(";"))
 
 
-def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
+def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Diagram:
     """A graph after `lower` or any pass."""
 
     def links(fold: Fold) -> list[tuple[str, Node]]:
@@ -382,7 +382,7 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Drawing:
     )
 
 
-def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
+def draw_program(program: Program, most: int = MOST_BOXES) -> Diagram:
     """The stream of a Program: each object and the token that joins it to what came before."""
     head = ("program {} x {}".format(*program.canvas), f"model {program.model}", *stage_text(program.stage))
     boxes, tokens = [Box(head)], token_names(program)
@@ -392,7 +392,7 @@ def draw_program(program: Program, most: int = MOST_BOXES) -> Drawing:
         boxes.append(Box((name, f"row {at}", *where), leaf=True, parent=at, word=tokens[at]))
     if len(program) > most:
         boxes.append(Box((f"{len(program) - most:,} more",), parent=most))
-    return Drawing(boxes, sideways=True)
+    return Diagram(boxes, sideways=True)
 
 
 def _short(lines: list[str]) -> list[str]:
@@ -400,7 +400,7 @@ def _short(lines: list[str]) -> list[str]:
     return lines if more <= 0 else [*lines[:_MOST_LINES], f"{more:,} more"]
 
 
-def to_mermaid(drawn: Drawing) -> str:
+def to_mermaid(drawn: Diagram) -> str:
     """Text for Mermaid, as Markdown pages of code hosts draw it; special characters by their numbers."""
 
     def escaped(text: str) -> str:
@@ -417,7 +417,7 @@ def to_mermaid(drawn: Drawing) -> str:
     return "\n".join([*lines, *arrows, *styles]) + "\n"
 
 
-def to_dot(drawn: Drawing) -> str:
+def to_dot(drawn: Diagram) -> str:
     """Text for Graphviz."""
     lines = [
         "digraph scene {",

@@ -16,7 +16,7 @@ from scenelang.compiler.steps import composed
 from scenelang.editors import completion
 from scenelang.editors.completion import space_of
 from scenelang.editors.context import find_symbol, path_to, word_of
-from scenelang.editors.workspace import Document, Seen, Settings, Workspace
+from scenelang.editors.workspace import ClientSettings, Document, Seen, Workspace
 from scenelang.language import scene_text as to_nsg
 from scenelang.language import tree, words
 from scenelang.language.definitions import Symbol, Use
@@ -209,12 +209,12 @@ def _node_facts(document: Document, node: Any) -> str:
 
 
 _LONGEST: Final = 28
-_PLAIN: Final = (tree.Number, tree.String, tree.Bool, tree.Color, tree.Unary, tree.Vector)
+_PLAIN: Final = (tree.NumberLiteral, tree.String, tree.Bool, tree.ColorLiteral, tree.Unary, tree.Vector)
 _CLEAR: Final = {"translate", "rotate", "scale", "canvas", "color", "min", "max", "rgb", "hsv", "animate"}
 
 
 def inlay_hints(
-    docs: Workspace, document: Document, place: types.Range, settings: Settings
+    docs: Workspace, document: Document, place: types.Range, settings: ClientSettings
 ) -> list[types.InlayHint]:
     """The hints of a range."""
     low, high = document.lines.offset(place.start), document.lines.offset(place.end)

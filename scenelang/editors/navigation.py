@@ -19,7 +19,7 @@ from scenelang.language.words import LANGUAGE, RESERVED, STAGE
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-class Refused(Exception):
+class RenameRefused(Exception):
     """Raised where a name cannot be changed, with the reason."""
 
 
@@ -71,13 +71,13 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
 
 
 def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
-    """The name at an offset; raises `Refused` where it belongs to the language or to a model."""
+    """The name at an offset; raises `RenameRefused` where it belongs to the language or to a model."""
     use = document.names.at(offset)
     if use is None:
         return None
     result = docs.definition(document, use)
     if result is None:
-        raise Refused(f"`{use.text}` is not defined in a scene file")
+        raise RenameRefused(f"`{use.text}` is not defined in a scene file")
     _check_owner(result[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
 
@@ -87,7 +87,7 @@ def rename(
 ) -> types.WorkspaceEdit | None:
     """Rename a definition and all its uses, in all files, in versioned edits where the client takes them.
 
-    Raises `Refused` where the new name is not a name, or would mean something else somewhere.
+    Raises `RenameRefused` where the new name is not a name, or would mean something else somewhere.
     """
     use = document.names.at(offset)
     result = docs.definition(document, use) if use is not None else None
@@ -98,11 +98,11 @@ def rename(
     if new == symbol.name:
         return None
     if not _NAME.fullmatch(new):
-        raise Refused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
+        raise RenameRefused(f"`{new}` is not a name: letters, digits and _, not beginning with a digit")
     if new in RESERVED:
-        raise Refused(f"`{new}` is a keyword")
+        raise RenameRefused(f"`{new}` is a keyword")
     if symbol.kind == "module" and new in LANGUAGE:
-        raise Refused(f"`{new}` is a word of the language and names no module")
+        raise RenameRefused(f"`{new}` is a word of the language and names no module")
     places = list(docs.uses(where, symbol))
     for other, place in places:
         _check_place(other, place, symbol, new)
@@ -120,27 +120,27 @@ def rename(
 
 def _check_owner(where: Document, use: Use) -> None:
     if where.path is not None and library.owns(where.path):
-        raise Refused(f"`{use.text}` belongs to the library that ships")
+        raise RenameRefused(f"`{use.text}` belongs to the library that ships")
 
 
 def _check_place(other: Document, place: Use, symbol: Symbol, new: str) -> None:
-    """Raise `Refused` where the new name already means something else at a place to rename."""
+    """Raise `RenameRefused` where the new name already means something else at a place to rename."""
     if place.role in ("member", "argument"):
         return
     scope = symbol.scope if place.defines else other.names.scope_at(place.start)
     for inner in scope.outwards():
         if (taken := inner.names.get(new)) is not None:
             line = taken.span.locate()[0][0]
-            raise Refused(f"`{new}` is already defined in line {line} of {other.name}")
+            raise RenameRefused(f"`{new}` is already defined in line {line} of {other.name}")
         if inner is symbol.scope:
             return
 
 
 def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) -> None:
-    """Raise `Refused` where the new name, now of something else, would come to mean the definition."""
+    """Raise `RenameRefused` where the new name, now of something else, would come to mean the definition."""
     scope = symbol.scope
     if symbol.owner is not None and any(p.name == new for p in symbol.owner.params):
-        raise Refused(f"`{symbol.owner.name}` has a parameter `{new}` already")
+        raise RenameRefused(f"`{symbol.owner.name}` has a parameter `{new}` already")
     for use in where.names.uses:
         if use.text != new or use.role in ("member", "argument", "property", "material", "model", "path"):
             continue
@@ -150,7 +150,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
         meant = inner.find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
-            raise Refused(f"`{new}` in line {line} of {where.name} would mean this")
+            raise RenameRefused(f"`{new}` in line {line} of {where.name} would mean this")
 
 
 def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:

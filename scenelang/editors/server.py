@@ -29,9 +29,9 @@ from scenelang.assets.element import Element
 from scenelang.editors import completion, context, hover, navigation
 from scenelang.editors.workspace import (
     Checked,
+    ClientSettings,
     Document,
     Lines,
-    Settings,
     Superseded,
     Workspace,
     check,
@@ -197,7 +197,7 @@ class Server(LanguageServer):
         self.docs = Workspace()
         self._draw = draw
         self._drawn: dict[str, str] = {}  # results of `thumbnail`, by digest
-        self.settings = Settings()
+        self.settings = ClientSettings()
         self.was_shut_down = False
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self._running: dict[str, threading.Event] = {}
@@ -212,7 +212,7 @@ class Server(LanguageServer):
             folders = [path_of(params.root_uri)]
         known = [folder.resolve() for folder in folders if folder is not None]
         self.docs = Workspace(encoding, known)  # type: ignore[arg-type]
-        self.settings = Settings.read(params.initialization_options)
+        self.settings = ClientSettings.read(params.initialization_options)
 
     def thumbnail(self, element: Element) -> str:
         """An element's picture in Markdown; empty where the client shows none or it cannot be drawn."""
@@ -365,7 +365,7 @@ def _files_changed(server: Server, params: types.DidChangeWatchedFilesParams) ->
 
 
 def _configured(server: Server, params: types.DidChangeConfigurationParams) -> None:
-    server.settings = Settings.read(params.settings)
+    server.settings = ClientSettings.read(params.settings)
     for document in server.docs.open.values():
         server.schedule(document, 0.0)
 
@@ -483,7 +483,7 @@ def _handler(method: str) -> Callable[[Server, Any], Any]:
     def handle(ls: Server, params: Any) -> Any:
         try:
             return _answer(ls, method, params)
-        except navigation.Refused as reason:
+        except navigation.RenameRefused as reason:
             raise JsonRpcException(str(reason), _FAILED) from None
         except JsonRpcException:
             raise

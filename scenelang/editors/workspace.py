@@ -40,7 +40,7 @@ _NEWLINE: Final = re.compile(r"\r\n|\n|\r")
 
 
 @dataclass(frozen=True)
-class Edit:
+class TextChange:
     """``old[start:old_end]`` became ``new[start:new_end]``; offsets in code points."""
 
     start: int
@@ -52,11 +52,11 @@ class Edit:
         return self.new_end - self.old_end
 
 
-def difference(old: Sequence[str], new: Sequence[str]) -> Edit:
+def difference(old: Sequence[str], new: Sequence[str]) -> TextChange:
     """The shortest single edit from one text, or list of lines, to another."""
     start = common_start(old, new)
     end = common_start(old[start:][::-1], new[start:][::-1])
-    return Edit(start, len(old) - end, len(new) - end)
+    return TextChange(start, len(old) - end, len(new) - end)
 
 
 class Lines:
@@ -194,7 +194,7 @@ def check(
 MAX_PAUSE_MS: Final = 60_000
 
 
-class Settings(Record):
+class ClientSettings(Record):
     """Settings of the client, from ``initializationOptions`` or ``workspace/didChangeConfiguration``."""
 
     debounce_ms: float = 200.0  # pause in typing after which a scene is evaluated
@@ -204,7 +204,7 @@ class Settings(Record):
     argument_hints: bool = True
 
     @classmethod
-    def read(cls, options: Any) -> Settings:
+    def read(cls, options: Any) -> ClientSettings:
         """Read a client's settings; one that is missing, of another type or out of range has its default."""
         given = options.get("scenelang", options) if isinstance(options, dict) else None
         given = given if isinstance(given, dict) else {}
@@ -239,7 +239,7 @@ class Document:
     version: int | None = None  # the client's number of this text; None for a file that is not open
     encoding: Encoding = "utf-16"
     checked: Checked | None = None  # of the last evaluation that ended, perhaps of an older text
-    edits: list[Edit] = field(default_factory=list)  # since that
+    edits: list[TextChange] = field(default_factory=list)  # since that
     semantic: list[Diagnostic] = field(default_factory=list)  # of that, at their current places
     _known: list[tree.Kept] = field(default_factory=list)  # sound statements that are as they were parsed
 
@@ -314,7 +314,7 @@ class Document:
         if isinstance(change, types.TextDocumentContentChangePartial):
             start, end = sorted((self.lines.offset(change.range.start), self.lines.offset(change.range.end)))
             text = self.text[:start] + change.text + self.text[end:]
-            edit = Edit(start, end, start + len(change.text))
+            edit = TextChange(start, end, start + len(change.text))
         else:
             text, edit = change.text, difference(self.text, change.text)
         source = SourceFile(self.source.name, text)
@@ -325,7 +325,7 @@ class Document:
         for name in ("_parsed", "file", "lines", "names", "tokens"):
             self.__dict__.pop(name, None)
 
-    def _left(self, edit: Edit, source: SourceFile) -> list[tree.Kept]:
+    def _left(self, edit: TextChange, source: SourceFile) -> list[tree.Kept]:
         """The sound statements that an edit does not touch, at their places after it."""
         known: Sequence[tree.Stmt] = self._known
         if "_parsed" in self.__dict__:
@@ -351,7 +351,7 @@ class Document:
         return offset
 
 
-def _carried(diagnostic: Diagnostic, edit: Edit, source: SourceFile) -> Diagnostic | None:
+def _carried(diagnostic: Diagnostic, edit: TextChange, source: SourceFile) -> Diagnostic | None:
     """A diagnostic after an edit; None where the edit touches it."""
 
     def carried(span: Span) -> Span | None:

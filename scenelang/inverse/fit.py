@@ -22,7 +22,7 @@ from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
-from scenelang.inverse.problem import LEVELS, Moment, Problem
+from scenelang.inverse.problem import LEVELS, FitProblem, Moment
 from scenelang.inverse.search import (
     ALIKE,
     NEAR,
@@ -36,7 +36,7 @@ from scenelang.inverse.search import (
     Point,
     Report,
     SearchBox,
-    Target,
+    TargetPicture,
     blurred,
     central,
     descend,
@@ -55,17 +55,17 @@ MOST_TARGETS: Final = 64
 
 
 def problems_of(
-    moments: Sequence[Moment], goals: Sequence[Target], space: SearchBox, canvas: tuple[int, int]
-) -> list[Problem]:
+    moments: Sequence[Moment], goals: Sequence[TargetPicture], space: SearchBox, canvas: tuple[int, int]
+) -> list[FitProblem]:
     """Comparisons of frames with their targets, from small to large; the last is of the final pictures."""
     values = space.values(space.point({}))
     solid = True in {_is_solid(each, values, canvas) for each in moments}
     smallest = min(min(goal.weights.shape) for goal in goals)
     short = min(MOST_SOLID if solid else SIDES[-1], *canvas, smallest)
 
-    def compared(side: int, samples: Sampling, levels: int, soft: bool) -> Problem:
+    def compared(side: int, samples: Sampling, levels: int, soft: bool) -> FitProblem:
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
-        return Problem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
+        return FitProblem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
 
     result = [
         compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
@@ -93,7 +93,7 @@ ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the err
 class Lens:
     """Blur of a target, fitted with the values as one more number of the search of the last size."""
 
-    def __init__(self, problem: Problem, space: SearchBox, until: float) -> None:
+    def __init__(self, problem: FitProblem, space: SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
         self.finer = problem.finer()
         self._last: tuple[Found, Found, Blur] | None = None
@@ -153,7 +153,7 @@ _UNSEEN: Final = 1e-4  # root mean square change over a whole range up to which 
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class FittedNumber:
     """One fitted number, or one of a vector; its range and value are in base units."""
 
     label: str  # `k`, or `ink.2` of a vector
@@ -178,7 +178,7 @@ class Fit:
     size: tuple[int, int]  # width and height of the pictures that were compared
     done: bool  # true where the search converged before the time was out
     notes: tuple[str, ...]  # obstacles to a nearer picture or a surer value, without a full stop
-    numbers: tuple[Number, ...]  # continuous params and how sensitive the picture is to each
+    numbers: tuple[FittedNumber, ...]  # continuous params and how sensitive the picture is to each
     tied: tuple[tuple[str, str, float], ...]  # pairs of their labels and their correlation, from `TIED` on
     others: tuple[dict[str, str], ...]  # values of other places whose pictures are about as near
     frames: int  # pictures that were drawn
@@ -220,7 +220,7 @@ class Fit:
         return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
 
 
-def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[Number, ...]:
+def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[FittedNumber, ...]:
     """Value and sensitivity of each continuous axis."""
     result = []
     for at in np.flatnonzero(space.smooth).tolist():
@@ -228,7 +228,7 @@ def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[Numbe
         rate = 0.0 if slopes is None else float(np.linalg.norm(slopes[:, at]))
         share = math.nan if slopes is None else LEVEL / rate if rate > _UNSEEN else math.inf
         value = axis.low + float(u[at]) * (axis.high - axis.low)
-        result.append(Number(axis.label, axis.low, axis.high, value, share))
+        result.append(FittedNumber(axis.label, axis.low, axis.high, value, share))
     return tuple(result)
 
 
@@ -252,13 +252,13 @@ def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float
 def hindrances(
     space: SearchBox,
     u: Point,
-    numbers: Sequence[Number],
+    numbers: Sequence[FittedNumber],
     psnr: float,
     done: bool,
     worst: tuple[str, Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
-    """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `Problem`."""
+    """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `FitProblem`."""
     notes = []
     if not done:
         notes.append("not converged: the last rounds still found nearer pictures, or time was out")
@@ -395,7 +395,7 @@ def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[
             yield moment.evaluated(space.values(u))[1]
 
 
-def _db(problem: Problem, pictures: Sequence[Picture]) -> float:
+def _db(problem: FitProblem, pictures: Sequence[Picture]) -> float:
     """PSNR over the pixels that count."""
     off = problem.residuals(pictures)
     error = float(off @ off)

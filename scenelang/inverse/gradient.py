@@ -29,7 +29,7 @@ from scenelang.compiler.program import Program
 from scenelang.drawing.arrays_torch import TORCH
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
-from scenelang.drawing.neural.frames import Affine, Warp, way_back
+from scenelang.drawing.neural.frames import FrameMap, FrameTurn, way_back
 from scenelang.drawing.neural.load import Framed, load_model
 from scenelang.drawing.neural.network import EMPTY, Cell, FramedArrays
 from scenelang.inverse.search import WHITE, Point, SearchBox
@@ -149,16 +149,16 @@ class SoftPlane:
     def _distances(self, p: Tensor, geometry: Tensor) -> Tensor:
         """World distances (N, M) of objects with numbers (N, G + 2, M or 1) at world points (2, M)."""
         layout = self.layout
-        steps: list[Affine | Warp] = []
+        steps: list[FrameMap | FrameTurn] = []
         maps = []
         for frame, warps in layout.ways:
             a, b, u, c, d, v = geometry[:, frame].unbind(1)
             maps.append((a, b, c, d))
-            steps.append(Affine(((a, b, u), (c, d, v))))
+            steps.append(FrameMap(((a, b, u), (c, d, v))))
             for at in range(warps.start, warps.stop, STRENGTHS):
                 if at in self.turning:
                     twirl, *bend = geometry[:, at : at + STRENGTHS].unbind(1)
-                    steps.append(Warp(twirl, tuple(bend)))
+                    steps.append(FrameTurn(twirl, tuple(bend)))
         points = way_back(TORCH, steps, [x.expand(self.count, -1) for x in p])
         q = torch.stack(list(points))
         result: list[Any] = [None] * self.count

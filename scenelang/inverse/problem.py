@@ -19,7 +19,7 @@ from scenelang.drawing.how import Sampling
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.drawing.small import draw_small
 from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
-from scenelang.inverse.search import Blur, Matrix, Picture, Point, SearchBox, Target, blurred, over
+from scenelang.inverse.search import Blur, Matrix, Picture, Point, SearchBox, TargetPicture, blurred, over
 from scenelang.language import tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, Source
@@ -70,7 +70,7 @@ class Moment(Record, frozen=False):
             return None
 
 
-class Problem:
+class FitProblem:
     """Residuals of the pictures of frames, all of one size (width, height), against their targets.
 
     With ``light`` pixels are means of linear light, as those of solids are. ``soft`` outlines of the plane
@@ -82,7 +82,7 @@ class Problem:
         self,
         moments: Sequence[Moment],
         space: SearchBox,
-        targets: Sequence[Target],
+        targets: Sequence[TargetPicture],
         canvas: tuple[int, int],
         *,
         light: bool = False,
@@ -125,7 +125,7 @@ class Problem:
             return over(draw_objects(network, program, samples="one").image, self.under)
         return over(draw_small(program, samples=self.samples, threads=1).image, self.under)
 
-    def finer(self) -> Problem:
+    def finer(self) -> FitProblem:
         """The same with pictures, of the plane, of twice as many pixels along each side, as means of sRGB."""
         larger = copy.copy(self)
         larger.frames = 0

@@ -127,7 +127,7 @@ _ASPECT: Final = 0.02  # most relative difference of aspects, beyond which a pic
 WHITE: Final = (1.0, 1.0, 1.0)
 
 
-class Target(Record):
+class TargetPicture(Record):
     """Picture to compare with, and the weights of its pixels."""
 
     colours: Picture  # (H, W, 3), sRGB-encoded in [0, 1], laid over ``under`` where it was transparent
@@ -188,7 +188,7 @@ def target_of(
     mask: Given | None = None,
     crop: tuple[int, int, int, int] | None = None,
     under: tuple[float, float, float] = WHITE,
-) -> Target:
+) -> TargetPicture:
     """A target for scenes of a canvas (width, height); arguments and errors are those of `scenelang.fit`."""
     result = over(_read(picture), under)
     weights = np.ones(result.shape[:2]) if mask is None else over(_read(mask), (0.0, 0.0, 0.0)).mean(2)
@@ -206,7 +206,7 @@ def target_of(
         raise FitError(f"{fact}: say which part of it shows the scene, or give the scene another canvas")
     if not weights.any():
         raise FitError("a mask in which no pixel counts")
-    return Target(result, weights, under)
+    return TargetPicture(result, weights, under)
 
 
 def _read(picture: Given) -> npt.NDArray[np.floating]:

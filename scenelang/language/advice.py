@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
 from scenelang.language import foreign, library, scopes, tree
-from scenelang.language.builder import FileContext, Place
+from scenelang.language.builder import FileContext, Site
 from scenelang.language.diagnostics import Edit, Fix, Label, SourceFile, Span, did_you_mean, listing
 from scenelang.language.reporter import Advice, Reporter
 from scenelang.language.session import Scope, Session
@@ -38,7 +38,7 @@ def problem_advice(problem: Problem, operand: tree.Expr | None) -> Advice:
             return problem.help, None
         return problem.help, Fix(f"write `{colour}`", (Edit(operand.span, colour),))
     inner = operand.operand if isinstance(operand, tree.Unary) else operand
-    if isinstance(inner, tree.Number):
+    if isinstance(inner, tree.NumberLiteral):
         size, end = abs(inner.value), inner.span.end
         small = "turn" if problem.fix == "hue" and size < 1 else "rad"
         unit = "deg" if size > math.tau or float(size).is_integer() else small
@@ -58,7 +58,7 @@ def member_advice(name: tree.Name) -> str | None:
     return None
 
 
-def in_library(stmt: tree.Call, place: Place) -> str | None:
+def in_library(stmt: tree.Call, place: Site) -> str | None:
     """Help for a statement whose name is that of a shape of the library, unless more is known of it."""
     name = stmt.name.text.lower()
     shape = foreign.SHAPES.get(name)
@@ -84,7 +84,7 @@ def likely_dimensions(session: Session, source: SourceFile) -> tuple[int, ...]:
     return (*likely,) if len(likely) == 1 else (*LEAVES,)
 
 
-def material_advice(place: Place, name: str, argument: str = "…") -> str:
+def material_advice(place: Site, name: str, argument: str = "…") -> str:
     """Text of an operation on a colour, in the material of what a text draws if that is known."""
     dimensions = likely_dimensions(place.session, place.file.source)
     material = next(iter(SHADINGS[dimensions[0]])) if len(dimensions) == 1 else None
@@ -92,7 +92,7 @@ def material_advice(place: Place, name: str, argument: str = "…") -> str:
     return written if material else f"{written}, in space material diffuse"
 
 
-def unknown_material(name: tree.Name, place: Place, known: set[str]) -> Advice:
+def unknown_material(name: tree.Name, place: Site, known: set[str]) -> Advice:
     """Likely meaning of a name in the place of a material."""
     span, lower = name.span, name.text.lower()
     likely = likely_dimensions(place.session, place.file.source)
@@ -106,7 +106,7 @@ def unknown_material(name: tree.Name, place: Place, known: set[str]) -> Advice:
     return help or (here if here and " " in here else f"there is {listing(there)}"), fix
 
 
-def drawn(place: Place) -> str:
+def drawn(place: Site) -> str:
     """Shapes that can be drawn, in the plane or in space."""
     dimensions = likely_dimensions(place.session, place.file.source)
     said = {n: listing(LEAVES[n]) for n in dimensions}
@@ -116,7 +116,7 @@ def drawn(place: Place) -> str:
 
 
 def report_unknown(
-    name: tree.Name, place: Place, code: str, message: str, advise: Callable[[], Advice]
+    name: tree.Name, place: Site, code: str, message: str, advise: Callable[[], Advice]
 ) -> None:
     """Report a name that stands for nothing; again only as a further place of the first report."""
     report, key = place.report, (code, name.text, name.span.source)
@@ -125,7 +125,7 @@ def report_unknown(
     report.error_once(key, code, message, name.span, help=help, fix=fix)
 
 
-def visible(place: Place, kinds: Sequence[str]) -> set[str]:
+def visible(place: Site, kinds: Sequence[str]) -> set[str]:
     """The names in sight of some kinds; none any more where looking through them has taken too long."""
     effort = place.report.effort
     if effort.spent:
@@ -137,7 +137,7 @@ def visible(place: Place, kinds: Sequence[str]) -> set[str]:
 
 def unknown_member(
     name: tree.Name,
-    place: Place,
+    place: Site,
     exported: FileContext | None,
     what: Literal["name", "material"] = "name",
     kinds: Sequence[str] = (),
@@ -183,7 +183,7 @@ def _last(name: tree.Name) -> Span:
     return Span(name.span.source, name.span.end - len(rest), name.span.end)
 
 
-def report_early(name: tree.Name, place: Place) -> bool:
+def report_early(name: tree.Name, place: Site) -> bool:
     """Report a name that a later line defines, if one does."""
     around = place.scope.outwards()
     later = next((scope.later[name.text] for scope in around if name.text in scope.later), None)
@@ -194,7 +194,7 @@ def report_early(name: tree.Name, place: Place) -> bool:
     return later is not None
 
 
-def unknown(name: tree.Name, place: Place, call: tree.CallExpr | None = None) -> None:
+def unknown(name: tree.Name, place: Site, call: tree.CallExpr | None = None) -> None:
     """Report a name that stands for nothing in an expression, perhaps the one that is called."""
     alias, dot, _ = name.text.partition(".")
     if dot:
@@ -205,7 +205,7 @@ def unknown(name: tree.Name, place: Place, call: tree.CallExpr | None = None) ->
         report_unknown(name, place, code, f"unknown {what} `{name.text}`", lambda: _advice(name, place, call))
 
 
-def _advice(name: tree.Name, place: Place, call: tree.CallExpr | None) -> Advice:
+def _advice(name: tree.Name, place: Site, call: tree.CallExpr | None) -> Advice:
     """Advice on a name in an expression that stands for nothing."""
     text, span = name.text, name.span
     lower, source = text.lower(), span.source.text

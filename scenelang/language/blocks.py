@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from scenelang.assets.records import Record
 from scenelang.language import expressions, library, tree
-from scenelang.language.builder import Action, Builder, ChainBuilder, Place, make
+from scenelang.language.builder import Action, Builder, ChainBuilder, Site, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span, did_you_mean, listing
 from scenelang.language.expressions import Code, bind, condition, guarded, prepare
 from scenelang.language.library import SpanMap, Written
@@ -20,7 +20,7 @@ from scenelang.language.values import MAX_VECTOR, POISON, Problem, RangeValue, V
 from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
 
 
-class Body(NamedTuple):
+class PreparedBlock(NamedTuple):
     """A prepared block, and what a run of it costs."""
 
     actions: Iterable[Action] = ()
@@ -33,14 +33,14 @@ class Body(NamedTuple):
             act(env, out)
 
 
-def prepare_statement(stmt: tree.Stmt, place: Place) -> Action | None:
+def prepare_statement(stmt: tree.Stmt, place: Site) -> Action | None:
     """One statement's action; None where it does nothing when it runs."""
     place.file.weight += HALF_STEPS.get(stmt.__class__, 0)
     action: Action | None = place.session.statements[stmt.__class__](stmt, place)
     return action
 
 
-def prepare_block(statements: Sequence[tree.Stmt], place: Place, span: Span) -> Body:
+def prepare_block(statements: Sequence[tree.Stmt], place: Site, span: Span) -> PreparedBlock:
     """Prepare a block in its own scope, which ``place`` brings along; bodies of fns and modules last."""
     file, scope = place.file, place.scope
     file.nesting += 1
@@ -63,15 +63,15 @@ def prepare_block(statements: Sequence[tree.Stmt], place: Place, span: Span) -> 
         prepare_body()
     file.nesting -= 1
     weight, file.weight = file.weight - before, before  # whoever runs the block counts it
-    return Body(tuple(actions), 1 + len(actions) + weight // 2)
+    return PreparedBlock(tuple(actions), 1 + len(actions) + weight // 2)
 
 
-def prepare_inner(block: tree.Block | None, place: Place) -> Body:
+def prepare_inner(block: tree.Block | None, place: Site) -> PreparedBlock:
     """Prepare a block of a statement, with the place inside it; nothing to run where there is none."""
-    return Body() if block is None else prepare_block(block.statements, place, block.span)
+    return PreparedBlock() if block is None else prepare_block(block.statements, place, block.span)
 
 
-def _collected(stmt: tree.Stmt, place: Place) -> Action | None:
+def _collected(stmt: tree.Stmt, place: Site) -> Action | None:
     """`prepare_statement`, noting dependencies; what no frame changes, in a file or its groups, runs once."""
     session = place.session
     if not session.replays or place.repeated or place.scope.slots.root is None:
@@ -102,7 +102,7 @@ def _unbind(scope: Scope) -> list[Action]:
 
 
 def misplaced(
-    place: Place, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
+    place: Site, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
 ) -> None:
     """Report a statement in the wrong place by a ``fact`` with ``{}`` for its name, once in a block."""
     if place.kind != "unknown":
@@ -110,7 +110,7 @@ def misplaced(
         place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
 
 
-def define(name: tree.Name, binding: Binding, place: Place) -> bool:
+def define(name: tree.Name, binding: Binding, place: Site) -> bool:
     """Bind a name in this scope; reports a second definition and keeps the first."""
     scope = place.scope
     earlier = scope.names.get(name.text)
@@ -128,7 +128,7 @@ def define(name: tree.Name, binding: Binding, place: Place) -> bool:
     return True
 
 
-def prepare_let(stmt: tree.Let, place: Place) -> Action | None:
+def prepare_let(stmt: tree.Let, place: Site) -> Action | None:
     code = prepare(stmt.value, place)
     name, session, slots = stmt.name.span, place.session, place.scope.slots
     slot, known = slots.add(), code.value is not expressions.VARIES
@@ -144,7 +144,7 @@ def prepare_let(stmt: tree.Let, place: Place) -> Action | None:
     return action
 
 
-def _declare(stmt: tree.Fn | tree.Module, place: Place) -> Callable[[], None] | None:
+def _declare(stmt: tree.Fn | tree.Module, place: Site) -> Callable[[], None] | None:
     """Make a function or module known; returns how to prepare its body."""
     name, outer = stmt.name, place.scope.slots
     if isinstance(stmt, tree.Module) and name.text in LANGUAGE:
@@ -157,10 +157,10 @@ def _declare(stmt: tree.Fn | tree.Module, place: Place) -> Callable[[], None] | 
     return lambda: _prepare_body(stmt, definition, place)
 
 
-def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Place) -> None:
+def _prepare_body(stmt: tree.Fn | tree.Module, definition: Definition, place: Site) -> None:
     file, report, session = place.file, place.report, place.session
     slots = Slots(definition.outer, owner=stmt.name.span)
-    inside = Place(file, Scope(slots, place.scope), "group")
+    inside = Site(file, Scope(slots, place.scope), "group")
     defaults: list[Callable[[Env], Any]] = []
     places = [slots.add() for _ in stmt.params]
     optional = False
@@ -202,7 +202,7 @@ def _items(value: Any) -> Any:
     raise unexpected("a range or a vector", value, advice)
 
 
-def _prepare_loop(stmt: tree.For | tree.ForItem, place: Place) -> tuple[Callable[[Env], Any], int, Place]:
+def _prepare_loop(stmt: tree.For | tree.ForItem, place: Site) -> tuple[Callable[[Env], Any], int, Site]:
     """How to get what a loop runs over, the slot of its variable, and the place inside it."""
     get = prepare(stmt.iterable, place).run
     loop = place.inner()._replace(repeated=True)
@@ -212,7 +212,7 @@ def _prepare_loop(stmt: tree.For | tree.ForItem, place: Place) -> tuple[Callable
     return lambda env: check(get(env)), slot, loop
 
 
-def prepare_vector(expr: tree.Vector, place: Place) -> Code:
+def prepare_vector(expr: tree.Vector, place: Site) -> Code:
     """Prepare a vector; with loops in it the items of each run are counted before it is made."""
     if not any(isinstance(item, tree.ForItem | tree.IfItem) for item in expr.items):
         return expressions.computed(place, _vector, expr.span, expr.items, item_steps=0)
@@ -233,7 +233,7 @@ def _vector(*items: Any) -> Vec:
     return Vec(items)
 
 
-def _prepare_item(item: tree.Expr, place: Place) -> Callable[[Env, list[Any]], bool]:
+def _prepare_item(item: tree.Expr, place: Site) -> Callable[[Env, list[Any]], bool]:
     """Prepare how an item adds its values to those of a vector; false where one of them is poison."""
     session, file = place.session, place.file
     if isinstance(item, tree.IfItem):
@@ -276,7 +276,7 @@ def _prepare_item(item: tree.Expr, place: Place) -> Callable[[Env, list[Any]], b
     return one
 
 
-def prepare_for(stmt: tree.For, place: Place) -> Action | None:
+def prepare_for(stmt: tree.For, place: Site) -> Action | None:
     values_of, slot, loop = _prepare_loop(stmt, place)
     actions, weight = prepare_inner(stmt.body, loop.inner())
     session, span = place.session, stmt.iterable.span
@@ -296,8 +296,8 @@ def prepare_for(stmt: tree.For, place: Place) -> Action | None:
     return action
 
 
-def prepare_if(stmt: tree.If, place: Place) -> Action | None:
-    arms: list[tuple[Callable[[Env], Any], Body]] = []
+def prepare_if(stmt: tree.If, place: Site) -> Action | None:
+    arms: list[tuple[Callable[[Env], Any], PreparedBlock]] = []
     at: tree.If | tree.Block | None = stmt
     while isinstance(at, tree.If):
         test = condition(at.condition, place).run
@@ -364,7 +364,7 @@ class Replayed(Record, frozen=False):
 HOLDERS = ("file", "group", "chain", "unknown")
 
 
-def holds_children(place: Place, span: Span, what: str, name: str) -> bool:
+def holds_children(place: Site, span: Span, what: str, name: str) -> bool:
     """Test whether children may stand here, and report it if not."""
     if place.kind in HOLDERS:
         return True
@@ -401,7 +401,7 @@ _SIDES: Final = {
 """Leaves, how long their sides are, and what of the library takes sides."""
 
 
-def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -> Action | None:
+def prepare_object(stmt: tree.Call, place: Site, geometry: str | None = None) -> Action | None:
     """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
     fits = holds_children(place, where.name, "object `{}`", name)
@@ -441,7 +441,7 @@ def prepare_object(stmt: tree.Call, place: Place, geometry: str | None = None) -
     return action
 
 
-def prepare_node(stmt: tree.Node, place: Place) -> Action | None:
+def prepare_node(stmt: tree.Node, place: Site) -> Action | None:
     fits = holds_children(place, stmt.keyword, "`{}`", stmt.kind)
     chain = stmt.kind == "chain"
     if chain:
@@ -461,7 +461,7 @@ def prepare_node(stmt: tree.Node, place: Place) -> Action | None:
     return action
 
 
-def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: Span) -> None:
+def _run_nested(body: PreparedBlock, env: Env, inside: Builder, session: Session, span: Span) -> None:
     """Run a block one level further down."""
     session.node_depth += 1
     if session.node_depth > MAX_NODE_DEPTH:
@@ -470,7 +470,7 @@ def _run_nested(body: Body, env: Env, inside: Builder, session: Session, span: S
     session.node_depth -= 1
 
 
-def _width(stmt: tree.Node | tree.Combined, place: Place) -> Callable[[Env], float | None]:
+def _width(stmt: tree.Node | tree.Combined, place: Site) -> Callable[[Env], float | None]:
     """The k of a word that joins, None where none is written."""
     op = stmt.op if isinstance(stmt, tree.Combined) else stmt.kind
     word = KEYWORDS[op]
@@ -507,7 +507,7 @@ def _finish(
     return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
 
 
-def _check_first(stmt: tree.Node, place: Place) -> None:
+def _check_first(stmt: tree.Node, place: Site) -> None:
     """The first child that a chain names outright joins nothing and carries no word."""
     makers = (tree.Combined, tree.Call, tree.Node, tree.For, tree.If)
     child = next((child for child in stmt.body.statements if isinstance(child, makers)), None)
@@ -520,12 +520,12 @@ def _check_first(stmt: tree.Node, place: Place) -> None:
         place.report.error("E0335", message, word, help=help, fix=fix)
 
 
-def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
+def prepare_combined(stmt: tree.Combined, place: Site) -> Action | None:
     report, op, width = place.report, stmt.op, _width(stmt, place)
     if place.kind not in ("chain", "unknown"):
         help = f"put the children into chain {{ … }}, or write a boolean node: {op} {{ … }}"
         misplaced(place, stmt.keyword, "`{}` before a child outside a chain", op, help)
-        prepare_statement(stmt.child, Place(place.file, place.scope, "unknown", place.nested))
+        prepare_statement(stmt.child, Site(place.file, place.scope, "unknown", place.nested))
         return None
     child, makes = stmt.child, isinstance(stmt.child, tree.Node)
     if isinstance(child, tree.Call):
@@ -553,7 +553,7 @@ def prepare_combined(stmt: tree.Combined, place: Place) -> Action | None:
     return action
 
 
-def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -> Action | None:
+def prepare_module_call(stmt: tree.Call, definition: Definition, place: Site) -> Action | None:
     """``NAME(1);`` or ``NAME(1) { transforms }``: one child, whatever the module holds."""
     session, where = place.session, Written(stmt.name.span, stmt.span)
     fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
@@ -568,7 +568,7 @@ def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -
         before = session.report.calls
         frame = enter(env)
         inside = Builder()
-        _run_nested(Body(definition.run, 1), frame, inside, session, where.name)
+        _run_nested(PreparedBlock(definition.run, 1), frame, inside, session, where.name)
         session.report.calls = before
         session.depth -= 1
         place_called(inside, block, env, where, out, session)
@@ -577,7 +577,7 @@ def prepare_module_call(stmt: tree.Call, definition: Definition, place: Place) -
 
 
 def place_called(
-    inside: Builder, block: Body | None, env: Env, where: Written, out: Builder, session: Session
+    inside: Builder, block: PreparedBlock | None, env: Env, where: Written, out: Builder, session: Session
 ) -> None:
     """Hand what a call has made to the block it stands in, moved as the call's own block says."""
     transforms, material = inside.transforms, inside.material
@@ -599,7 +599,7 @@ def place_called(
     _join_child(child, where, out, session)
 
 
-def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None:
+def prepare_element(stmt: tree.Call, place: Site, called: str) -> Action | None:
     """A statement headed by the name of a geometry or a group, which a Scene calls ``called``."""
     alias, _, name = called.partition(".")
     file = next(file for file in place.session.elements.values() if file.name == alias)
@@ -638,7 +638,7 @@ def prepare_element(stmt: tree.Call, place: Place, called: str) -> Action | None
     return action
 
 
-def _missing(stmt: tree.Call, place: Place, what: str, known: list[str], otherwise: str) -> None:
+def _missing(stmt: tree.Call, place: Site, what: str, known: list[str], otherwise: str) -> None:
     """Report a name that stands only for the other of a geometry and a group."""
     alias, _, name = stmt.name.text.partition(".")
     last = Span(stmt.name.span.source, stmt.name.span.end - len(name), stmt.name.span.end)

@@ -103,7 +103,7 @@ class FileContext:
         self.session.roots.append(self.env)
 
 
-class Place(NamedTuple):
+class Site(NamedTuple):
     """Place of a statement or an expression: its scope, its file and its session."""
 
     file: FileContext
@@ -121,9 +121,9 @@ class Place(NamedTuple):
     def report(self) -> Reporter:
         return self.file.session.report
 
-    def inner(self, kind: Kind | None = None) -> Place:
+    def inner(self, kind: Kind | None = None) -> Site:
         """The place inside a block: a new scope, and a new kind unless control flow passes it on."""
         scope = Scope(self.scope.slots, self.scope)
         if kind is None:
             return self._replace(scope=scope, nested=True)
-        return Place(self.file, scope, kind, False, self.repeated, scope)
+        return Site(self.file, scope, kind, False, self.repeated, scope)

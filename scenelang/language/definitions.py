@@ -42,7 +42,7 @@ class Symbol(Record, frozen=False):
     kind: Kind
     span: Span
     node: tree.Stmt | tree.Parameter | tree.ForItem
-    scope: Scope
+    scope: TextScope
     since: int  # the offset from which on it is in sight
     owner: Symbol | None = None  # the fn or module that it is a parameter of
     params: list[Symbol] = field(default_factory=list)
@@ -53,12 +53,12 @@ class Symbol(Record, frozen=False):
         return self.scope.parent is None and self.kind in ("let", "param", "fn", "module")
 
 
-class Scope(Record, frozen=False):
+class TextScope(Record, frozen=False):
     """A block, a function or a loop: its names, where it reaches, and what is around it."""
 
     start: int
     end: int
-    parent: Scope | None = None
+    parent: TextScope | None = None
     names: dict[str, Symbol] = field(default_factory=dict)
 
     outwards, find = scopes.outwards, scopes.find
@@ -83,11 +83,11 @@ class Names:
         """Find all names, or those in sight of an offset: of statements elsewhere what they define."""
         self._at = at
         self.source: SourceFile = file.span.source
-        self.top = Scope(0, file.span.end + 1)
+        self.top = TextScope(0, file.span.end + 1)
         self.uses: list[Use] = []
         self.symbols: list[Symbol] = []
-        self.scopes: list[Scope] = [self.top]
-        self._unresolved: list[tuple[Use, Scope]] = []
+        self.scopes: list[TextScope] = [self.top]
+        self._unresolved: list[tuple[Use, TextScope]] = []
         self._statements(file.statements, self.top, "file")
         for use, scope in self._unresolved:
             use.symbol = scope.find(use.text)  # used before its line: still the one that is meant
@@ -105,7 +105,7 @@ class Names:
             return use
         return None
 
-    def scope_at(self, offset: int) -> Scope:
+    def scope_at(self, offset: int) -> TextScope:
         """The innermost scope at an offset."""
         best = self.top
         for scope in self.scopes:
@@ -131,7 +131,7 @@ class Names:
         name: tree.Name,
         kind: Kind,
         node: tree.Stmt | tree.Parameter | tree.ForItem,
-        scope: Scope,
+        scope: TextScope,
         since: int,
         owner: Symbol | None = None,
     ) -> Symbol:
@@ -141,12 +141,12 @@ class Names:
         self._add(name.span, name.text, "name", symbol).defines = True
         return symbol
 
-    def _scope(self, start: int, end: int, parent: Scope) -> Scope:
-        scope = Scope(start, end, parent)
+    def _scope(self, start: int, end: int, parent: TextScope) -> TextScope:
+        scope = TextScope(start, end, parent)
         self.scopes.append(scope)
         return scope
 
-    def _statements(self, statements: Iterable[tree.Stmt], scope: Scope, kind: str) -> None:
+    def _statements(self, statements: Iterable[tree.Stmt], scope: TextScope, kind: str) -> None:
         bodies = []
         for stmt in statements:
             if isinstance(stmt, tree.Fn | tree.Module):
@@ -166,18 +166,18 @@ class Names:
             if self._is_near(definition, scope):
                 self._walk(definition.body, around, "group")
 
-    def _is_near(self, stmt: tree.Stmt, scope: Scope) -> bool:
+    def _is_near(self, stmt: tree.Stmt, scope: TextScope) -> bool:
         """Test whether what is inside a statement is looked at."""
         at, span = self._at, stmt.span
         return at is None or scope is not self.top or span.start <= at <= span.end
 
-    def _walk(self, node: Any, scope: Scope, kind: str) -> None:
+    def _walk(self, node: Any, scope: TextScope, kind: str) -> None:
         """Note the names in a statement or an expression, in a block of some kind."""
         match node:
             case tree.Block():
                 inside = self._scope(node.span.start, node.span.end, scope)
                 self._statements(node.statements, inside, kind)
-            case tree.Model():
+            case tree.ModelStatement():
                 if isinstance(node.name, tree.String):
                     self._add(node.name.span, node.name.value, "model")
             case tree.Let() | tree.Param():
@@ -241,12 +241,12 @@ class Names:
             case _:
                 self._children(node, scope, kind)
 
-    def _children(self, node: Any, scope: Scope, kind: str) -> None:
+    def _children(self, node: Any, scope: TextScope, kind: str) -> None:
         for child in tree.children(node):
             if not isinstance(child, tree.Name):
                 self._walk(child, scope, kind)
 
-    def _call(self, stmt: tree.Call, scope: Scope, kind: str) -> None:
+    def _call(self, stmt: tree.Call, scope: TextScope, kind: str) -> None:
         name = stmt.name.text
         own = None if name in LANGUAGE else scope.find(name)
         meaning = scopes.head_of(stmt, own, kind)
@@ -269,7 +269,7 @@ class Names:
         return use
 
     def _reference(
-        self, name: tree.Name, scope: Scope, otherwise: Role, member: Role = "member"
+        self, name: tree.Name, scope: TextScope, otherwise: Role, member: Role = "member"
     ) -> Use | None:
         """The use of a plain or dotted name; of a dotted one that of its last part."""
         alias, _, rest = name.text.partition(".")
@@ -286,7 +286,7 @@ class Names:
             return self._add(tail, rest, member, symbol)
         return None
 
-    def _arguments(self, args: Iterable[tree.Argument], scope: Scope, head: Use | None) -> None:
+    def _arguments(self, args: Iterable[tree.Argument], scope: TextScope, head: Use | None) -> None:
         for arg in args:
             if arg.name is not None:
                 self._add(arg.name.span, arg.name.text, "argument").callee = head

@@ -137,7 +137,7 @@ Part = Doc | str
 """A bare string is a short text that never breaks, without comments around it."""
 
 
-class Word(Doc):
+class DocText(Doc):
     """Text that stands as it is, with comments around it."""
 
     __slots__ = ()
@@ -158,7 +158,7 @@ class Concat(Doc):
         self.parts = parts
 
 
-class Group(Doc):
+class DocGroup(Doc):
     """Document on one line if it fits, otherwise that of ``maker``, which is called at most once."""
 
     __slots__ = ("_made", "maker")
@@ -313,7 +313,7 @@ class _Printer:
                 self.write(part.flat, margin)
             elif isinstance(part, Concat):
                 stack += [(margin, inner) for inner in reversed(part.parts)]
-            elif isinstance(part, Group):
+            elif isinstance(part, DocGroup):
                 stack.append((margin, part.broken()))
             elif isinstance(part, Indent):
                 stack.append((margin + INDENT, part.part))
@@ -396,7 +396,7 @@ def _reach(stack: Sequence[tuple[int, Part]], room: int) -> int:
                 return used
             elif isinstance(part, Concat):
                 todo += reversed(part.parts)
-            elif isinstance(part, Group):
+            elif isinstance(part, DocGroup):
                 todo.append(part.broken())
             elif isinstance(part, Indent):
                 todo.append(part.part)

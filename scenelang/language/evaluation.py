@@ -16,8 +16,8 @@ from typing import Any, Final
 
 from scenelang.assets.records import Record, deep_stack
 from scenelang.language import tree as nodes
-from scenelang.language.blocks import Body
-from scenelang.language.builder import Builder, FileContext, Place, make
+from scenelang.language.blocks import PreparedBlock
+from scenelang.language.builder import Builder, FileContext, Site, make
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, nearest
 from scenelang.language.expressions import prepare
 from scenelang.language.library import SpanMap, Written
@@ -119,7 +119,7 @@ class Evaluation:
         params = source.params
         self.inputs = given = params if isinstance(params, Defines) else Defines(params or {})
         self.context = FileContext(file.span.source, session, loader, given, path)
-        self._body: Body | None = None
+        self._body: PreparedBlock | None = None
         if not self.animates:
             session.animated[:] = [0.0, 0.0, 0.0, 1.0]
         with deep_stack(), suppress(Halt):
@@ -338,7 +338,7 @@ def knob_of(stmt: nodes.Param, file: FileContext) -> Knob:
     name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
     allowed: Any = None
     if stmt.range is not None:
-        allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
+        allowed = prepare(stmt.range, Site(file, file.scope, "file")).run(file.env)
     if allowed.__class__ is Vec:
         return Knob(stmt, value, (Axis(name, choices=_few(name, allowed.items)),), False)
     if value.__class__ is bool:
@@ -383,7 +383,7 @@ def _few(name: str, choices: tuple[Any, ...]) -> tuple[Any, ...]:
 def is_colour(expr: nodes.Expr) -> bool:
     """Test whether an expression is written as a colour."""
     called = expr.name.text if isinstance(expr, nodes.CallExpr) else ""
-    return isinstance(expr, nodes.Color) or called in ("rgb", "hsv")
+    return isinstance(expr, nodes.ColorLiteral) or called in ("rgb", "hsv")
 
 
 def value_at(axis: Axis, u: float, like: Any) -> Any:
@@ -420,7 +420,7 @@ def _literal(value: Any, axis: Axis, default: nodes.Expr, digits: int) -> str:
     x, kind = unpack(value)
     unit = ""
     if kind != "number":
-        units = (node.unit for node in nodes.walk(default) if isinstance(node, nodes.Number))
+        units = (node.unit for node in nodes.walk(default) if isinstance(node, nodes.NumberLiteral))
         unit = next(filter(None, units), "deg" if kind == "angle" else "s")
     factor = _UNITS.get(unit, 1.0)
     if axis.choices:

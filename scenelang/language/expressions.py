@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from scenelang.language import foreign, limits, tree, values, words
 from scenelang.language.advice import member_advice, report_problem, unknown, unknown_member
-from scenelang.language.builder import FileContext, Place
+from scenelang.language.builder import FileContext, Site
 from scenelang.language.diagnostics import Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
 from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX_DEPTH, MAX_NESTING
@@ -49,7 +49,7 @@ def constant(value: Any) -> Code:
 POISONED: Final = constant(POISON)
 
 
-def prepare(expr: tree.Expr, place: Place) -> Code:
+def prepare(expr: tree.Expr, place: Site) -> Code:
     """Resolve the names of ``expr`` and make it runnable; reports what is wrong in any case."""
     file = place.file
     file.weight += HALF_STEPS.get(expr.__class__, 1)
@@ -63,7 +63,7 @@ def prepare(expr: tree.Expr, place: Place) -> Code:
         file.nesting -= 1
 
 
-def prepare_arguments(args: Iterable[tree.Argument] | None, place: Place, name: str = "") -> list[Given]:
+def prepare_arguments(args: Iterable[tree.Argument] | None, place: Site, name: str = "") -> list[Given]:
     """Prepare the arguments of a call; ``name`` is that of one of the language's own words."""
     word, given = words.word_for_call(name, False), []
     angle = word.params[0] if word and word.kinds[:1] in (("angle",), ("hue",)) else None
@@ -73,7 +73,7 @@ def prepare_arguments(args: Iterable[tree.Argument] | None, place: Place, name: 
     return given
 
 
-def _prepare_angle(expr: tree.Expr, place: Place) -> Code:
+def _prepare_angle(expr: tree.Expr, place: Site) -> Code:
     """`prepare`, noting a 0 without a unit that may be another number in another frame."""
     session = place.session
     around, session.needs = session.needs, Needs()
@@ -109,7 +109,7 @@ def folded(codes: Iterable[Code], function: Callable[..., Any], run: Run) -> Cod
 
 
 def guarded(
-    place: Place,
+    place: Site,
     function: Callable[..., Any],
     span: Span,
     operands: tuple[tree.Expr | None, ...],
@@ -136,7 +136,7 @@ def guarded(
 
 
 def computed(
-    place: Place,
+    place: Site,
     function: Callable[..., Any],
     span: Span,
     exprs: Sequence[tree.Expr],
@@ -162,7 +162,7 @@ _LITERALS: Final[dict[str, Callable[[float], Any]]] = {
 }
 
 
-def prepare_number(expr: tree.Number, place: Place) -> Code:
+def prepare_number(expr: tree.NumberLiteral, place: Site) -> Code:
     value = float(expr.value)
     if not math.isfinite(value * math.tau if expr.unit == "turn" else value):
         place.report.error("E0306", "the number is too large", expr.span)
@@ -170,7 +170,7 @@ def prepare_number(expr: tree.Number, place: Place) -> Code:
     return constant(_LITERALS[expr.unit](value) if expr.unit else value)
 
 
-def prepare_range(expr: tree.Range, place: Place) -> Code:
+def prepare_range(expr: tree.Range, place: Site) -> Code:
     def make(start: Any, stop: Any, step: Any = 1.0) -> RangeValue:
         for index, value in enumerate((start, stop, step)):
             if value.__class__ not in values.UNITS:
@@ -190,7 +190,7 @@ def prepare_range(expr: tree.Range, place: Place) -> Code:
     return computed(place, make, expr.span, parts)
 
 
-def _component(code: Code, name: tree.Name, place: Place, of: tree.Expr) -> Code:
+def _component(code: Code, name: tree.Name, place: Site, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
     index = values.COMPONENTS.get(name.text)
     if index is None:
@@ -251,7 +251,7 @@ _MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
 }
 
 
-def prepare_binary(expr: tree.Binary, place: Place) -> Code:
+def prepare_binary(expr: tree.Binary, place: Site) -> Code:
     op = expr.op
     if op in ("&&", "||"):
         return _logic(expr, place)
@@ -287,7 +287,7 @@ def _truth(value: Any, operand: int = 0) -> bool:
     raise values.unexpected("a boolean", value, help, operand)
 
 
-def condition(expr: tree.Expr, place: Place) -> Code:
+def condition(expr: tree.Expr, place: Site) -> Code:
     """A prepared expression that is true, false or poison."""
     code = prepare(expr, place)
     if code.value is True or code.value is False:
@@ -302,7 +302,7 @@ def condition(expr: tree.Expr, place: Place) -> Code:
     return Code(run)
 
 
-def _logic(expr: tree.Binary, place: Place) -> Code:
+def _logic(expr: tree.Binary, place: Site) -> Code:
     left, right = condition(expr.left, place).run, condition(expr.right, place).run
     decides = expr.op == "||"
 
@@ -313,7 +313,7 @@ def _logic(expr: tree.Binary, place: Place) -> Code:
     return Code(run)
 
 
-def prepare_unary(expr: tree.Unary, place: Place) -> Code:
+def prepare_unary(expr: tree.Unary, place: Site) -> Code:
     if expr.op != "!":
         meaning = values.negate if expr.op == "-" else values.plus
         return computed(place, meaning, expr.span, (expr.operand,))
@@ -326,7 +326,7 @@ def prepare_unary(expr: tree.Unary, place: Place) -> Code:
     return Code(invert)
 
 
-def prepare_conditional(expr: tree.Conditional, place: Place) -> Code:
+def prepare_conditional(expr: tree.Conditional, place: Site) -> Code:
     test = condition(expr.condition, place).run
     then, otherwise = prepare(expr.then, place).run, prepare(expr.otherwise, place).run
 
@@ -339,7 +339,7 @@ def prepare_conditional(expr: tree.Conditional, place: Place) -> Code:
     return Code(run)
 
 
-def value_of(name: tree.Name, binding: Binding, place: Place) -> Code:
+def value_of(name: tree.Name, binding: Binding, place: Site) -> Code:
     """The value of a variable."""
     slots, slot, report, span = binding.slots, binding.slot, place.report, name.span
     if binding.needs is not None:
@@ -366,7 +366,7 @@ def value_of(name: tree.Name, binding: Binding, place: Place) -> Code:
     return Code(run)
 
 
-def lookup(name: tree.Name, place: Place) -> Binding | None:
+def lookup(name: tree.Name, place: Site) -> Binding | None:
     """The binding of a plain or qualified name; None where it is unknown, unreported."""
     alias, dot, rest = name.text.partition(".")
     binding = place.scope.find(alias)
@@ -381,7 +381,7 @@ def lookup(name: tree.Name, place: Place) -> Binding | None:
     return None if result is None or result.kind == "import" else result
 
 
-def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, help: str | None = None) -> None:
+def wrong_kind(name: tree.Name, binding: Binding, place: Site, wanted: str, help: str | None = None) -> None:
     """Report a name that stands for something else than is wanted here."""
     kinds = {"fn": "a function", "module": "a module", "import": "an imported file", "element": "a geometry"}
     kinds |= {"text": "a module", "width": "a function"}
@@ -390,7 +390,7 @@ def wrong_kind(name: tree.Name, binding: Binding, place: Place, wanted: str, hel
     place.report.error_once(key, "E0213", message, name.span, help=help, labels=binding.labels())
 
 
-def _as_value(name: tree.Name, binding: Binding, place: Place) -> Code:
+def _as_value(name: tree.Name, binding: Binding, place: Site) -> Code:
     if binding.kind in VALUES or binding.kind == "poison":
         return value_of(name, binding, place)
     called = binding.kind in ("fn", "width")
@@ -398,12 +398,12 @@ def _as_value(name: tree.Name, binding: Binding, place: Place) -> Code:
     return POISONED
 
 
-def prepare_name(expr: tree.NameRef, place: Place) -> Code:
+def prepare_name(expr: tree.NameRef, place: Site) -> Code:
     binding = place.scope.find(expr.name.text)
     return _own_name(expr.name, place) if binding is None else _as_value(expr.name, binding, place)
 
 
-def _own_name(name: tree.Name, place: Place) -> Code:
+def _own_name(name: tree.Name, place: Site) -> Code:
     """A constant of the language or a variable of the animation."""
     text, session = name.text, place.session
     if text in values.CONSTANTS:
@@ -437,7 +437,7 @@ def _own_name(name: tree.Name, place: Place) -> Code:
     return Code(run)
 
 
-def prepare_member(expr: tree.Member, place: Place) -> Code:
+def prepare_member(expr: tree.Member, place: Site) -> Code:
     value = expr.value
     binding = place.scope.find(value.name.text) if isinstance(value, tree.NameRef) else None
     if binding is None or binding.kind != "import":
@@ -524,7 +524,7 @@ def bind(
     return bound
 
 
-def prepare_call(expr: tree.CallExpr, place: Place) -> Code:
+def prepare_call(expr: tree.CallExpr, place: Site) -> Code:
     name = expr.name
     binding = lookup(name, place)
     given = prepare_arguments(expr.args, place, name.text if binding is None else "")
@@ -555,7 +555,7 @@ def prepare_call(expr: tree.CallExpr, place: Place) -> Code:
     return Code(run)
 
 
-def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code:
+def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Site) -> Code:
     """A call of a function of the language; reports a name that stands for nothing."""
     name = expr.name
     word = words.FUNCTIONS.get(name.text)
@@ -588,7 +588,7 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Place) -> Code
     return computed(place, meaning, expr.span, exprs, [code for _, code in given], per_item)
 
 
-def _method(expr: tree.CallExpr, place: Place) -> None:
+def _method(expr: tree.CallExpr, place: Site) -> None:
     """Report `v.length()`: a value has no functions."""
     rest, source = expr.name.text.partition(".")[2], expr.name.span.source
     last = tree.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
@@ -596,7 +596,7 @@ def _method(expr: tree.CallExpr, place: Place) -> None:
     place.report.error("E0128", "only a name can be called", expr.name.span, help=help)
 
 
-def _doubted(hsv: Callable[..., Any], span: Span, place: Place) -> Callable[..., Any]:
+def _doubted(hsv: Callable[..., Any], span: Span, place: Site) -> Callable[..., Any]:
     """``hsv``, which warns of a hue that looks like degrees."""
 
     def run(h: Any, s: Any, v: Any) -> Any:
@@ -610,7 +610,7 @@ def _doubted(hsv: Callable[..., Any], span: Span, place: Place) -> Callable[...,
     return run
 
 
-def entering(name: tree.Name, args: Sequence[Given], definition: Definition, place: Place) -> Run | None:
+def entering(name: tree.Name, args: Sequence[Given], definition: Definition, place: Site) -> Run | None:
     """Function that counts a call and makes its slots; None if the arguments do not fit.
 
     The caller puts the session's depth and calls back.

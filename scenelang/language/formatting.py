@@ -27,12 +27,12 @@ from scenelang.language.documents import (
     Comments,
     Concat,
     Doc,
+    DocGroup,
+    DocText,
     Fill,
-    Group,
     Indent,
     Notes,
     Part,
-    Word,
     after_of,
     attach,
     before_of,
@@ -62,7 +62,7 @@ class Item(NamedTuple):
     after: Sequence[Comment] = ()  # comments behind the comma, less the item's own, that end the line
 
 
-class Bracketed(Group):
+class Bracketed(DocGroup):
     """A vector or a block: as a call's only argument it opens on the call's line."""
 
     __slots__ = ()
@@ -107,7 +107,7 @@ def _numbers(items: Sequence[Item]) -> list[str]:
     """The items, if they are several plain numbers without comments or blank lines between; else nothing."""
     texts: list[str] = []
     for index, (part, behind, after) in enumerate(items):
-        if index == 0 and isinstance(part, Word) and not (part.before or part.after):
+        if index == 0 and isinstance(part, DocText) and not (part.before or part.after):
             part = part.flat  # a blank line before the first item means nothing
         if not isinstance(part, str) or behind or after or not _NUMBER.match(part):
             return []
@@ -148,7 +148,7 @@ _LEVELS = {"*": 5, "/": 5, "%": 5, "+": 4, "-": 4, "<": 3, "<=": 3, ">": 3, ">="
 _LEVELS |= {"&&": 1, "||": 0}
 
 
-class Operation(Group):
+class Operation(DocGroup):
     """Operands with operators of one level between them; those of the same level on the left are taken in."""
 
     __slots__ = ("level", "operands", "operators")
@@ -180,7 +180,7 @@ class Operation(Group):
         return Concat(None, parts)
 
 
-class Choice(Group):
+class Ternary(DocGroup):
     """``c ? a : b``, with the choices in its last place taken in."""
 
     __slots__ = ("clauses",)
@@ -203,7 +203,7 @@ class Choice(Group):
         return sequence([*parts, *lead, otherwise])
 
 
-class Statement(Group):
+class Statement(DocGroup):
     """A statement with ``depth`` blocks within each other; a simple one may stand in a block on one line."""
 
     __slots__ = ("depth", "simple")
@@ -214,7 +214,7 @@ class Statement(Group):
         self.simple = simple
 
 
-class Block:
+class Braced:
     """``{ … }``, whose place in a line is for the statement around it to say."""
 
     __slots__ = ("closing", "depth", "flat", "opening", "statements")
@@ -270,12 +270,12 @@ def entries(statements: Sequence[Item], dangling: Sequence[Comment]) -> list[Par
     return [*parts, *comment_lines(dangling, begun=bool(parts))]
 
 
-def _lined(parts: Sequence[Part], flat: str | None) -> Group:
+def _lined(parts: Sequence[Part], flat: str | None) -> DocGroup:
     """Document on the same line or, where that is too long, on a line of its own."""
-    return Group(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
+    return DocGroup(None if flat is None else " " + flat, lambda: Indent(Concat(None, [LINE, *parts])))
 
 
-class Layout:
+class FileLayout:
     """Lays out one file that was read without mistakes."""
 
     def __init__(self, tokens: Tokens, notes: Mapping[int, Notes]) -> None:
@@ -297,7 +297,7 @@ class Layout:
             text = " ".join([*texts_of(note.leading), text])
         if not (note.before or note.after or note.blank):
             return text
-        word = Word(text)
+        word = DocText(text)
         word.before, word.after, word.blank = note.before, note.after, note.blank
         return word
 
@@ -320,9 +320,9 @@ class Layout:
                 items[-1] = Item(item, "".join(f" {text}" for text in texts_of(note.trailing)))
 
     def enclosed(self, opening: int, *rest: Any) -> Part:
-        return self._bracketed(Group, opening, rest)
+        return self._bracketed(DocGroup, opening, rest)
 
-    def _bracketed(self, form: type[Group], opening: int, rest: Sequence[Any]) -> Part:
+    def _bracketed(self, form: type[DocGroup], opening: int, rest: Sequence[Any]) -> Part:
         items: list[Item] = rest[0] if rest[1:] else []
         left, right = self.word(opening), self.word(rest[-1])
         if rest[2:]:
@@ -343,11 +343,11 @@ class Layout:
         for part in parts:
             if isinstance(part, str):
                 text += part
-            elif isinstance(part, Word) and not (part.before or part.after):
+            elif isinstance(part, DocText) and not (part.before or part.after):
                 text += part.flat
             else:
                 return sequence(parts)
-        word = Word(text)
+        word = DocText(text)
         word.blank = not isinstance(parts[0], str) and parts[0].blank
         return word if word.blank else text
 
@@ -365,7 +365,7 @@ class Layout:
         return named
 
     def range(self, start: Part, dots: int, stop: Part, *rest: Any) -> Part:
-        loose = isinstance(start, (Operation, Choice)) or isinstance(stop, (Operation, Choice))
+        loose = isinstance(start, (Operation, Ternary)) or isinstance(stop, (Operation, Ternary))
         left = flat_of(start)
         space = " " if loose or (left is not None and left.endswith(".")) else ""
         step = [" ", self.word(rest[0]), " ", rest[1]] if rest else []
@@ -374,8 +374,8 @@ class Layout:
     def conditional(self, condition: Part, mark: int, then: Part, colon: int, otherwise: Part) -> Part:
         head = (condition, self.word(mark), then, self.word(colon))
         flat = joined([condition, " ", head[1], " ", then, " ", head[3], " ", otherwise])
-        tail = otherwise.clauses if isinstance(otherwise, Choice) else [(otherwise,)]
-        return ends_of(Choice(flat, [head, *tail]), condition, otherwise)
+        tail = otherwise.clauses if isinstance(otherwise, Ternary) else [(otherwise,)]
+        return ends_of(Ternary(flat, [head, *tail]), condition, otherwise)
 
     def binary(self, left: Part, op: int, right: Part) -> Part:
         operator = self.word(op)
@@ -416,7 +416,7 @@ class Layout:
 
     def _enclosed(self, left: Part, value: Part, right: Part) -> Part:
         inside = [Item(value)]
-        doc = Group(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
+        doc = DocGroup(joined([left, value, right]), lambda: broken(left, inside, right, comma=""))
         return ends_of(doc, left, right)
 
     def vector(self, opening: int, *rest: Any) -> Part:
@@ -480,7 +480,7 @@ class Layout:
         """``=`` and what follows: operations go to a line of their own before they are broken."""
         sign = self.word(equal)
         commented = after_of(sign) or before_of(value)
-        if not commented and not isinstance(value, (Operation, Choice)):
+        if not commented and not isinstance(value, (Operation, Ternary)):
             return [" ", sign, " ", value]
         doc = _lined([*comments_before(value), value], None if commented else flat_of(value))
         doc.after = after_of(value)
@@ -517,8 +517,8 @@ class Layout:
     def call(self, name: Part, *rest: Any) -> Part:
         return self._use([name, *rest[:-1]], rest[-1])
 
-    def _use(self, head: list[Part], last: int | Block) -> Part:
-        if isinstance(last, Block):
+    def _use(self, head: list[Part], last: int | Braced) -> Part:
+        if isinstance(last, Braced):
             return self._blocked(head, last, structure=False)
         return self._ended(head, last, simple=True)
 
@@ -527,10 +527,10 @@ class Layout:
 
     # ------------------------------------------------------------ statements with a block
 
-    def block(self, opening: int, *rest: Any) -> Block:
-        return Block(self.word(opening), rest[0] if rest[1:] else [], self.word(rest[-1]))
+    def block(self, opening: int, *rest: Any) -> Braced:
+        return Braced(self.word(opening), rest[0] if rest[1:] else [], self.word(rest[-1]))
 
-    def _blocked(self, head: Sequence[Part], body: Block, structure: bool = True) -> Statement:
+    def _blocked(self, head: Sequence[Part], body: Braced, structure: bool = True) -> Statement:
         """A statement that ends with a block; that of an object stands on one line with what holds it."""
         one_line = body.structural() if structure else body.flat
         begun = [*head[:-1], plain(head[-1], before=len(head) > 1)]
@@ -543,35 +543,35 @@ class Layout:
         )
         return ends_of(stmt, head[0], body.closing)
 
-    def module(self, word: int, name: Part, params: Part, body: Block) -> Part:
+    def module(self, word: int, name: Part, params: Part, body: Braced) -> Part:
         return self._blocked([self.word(word), " ", name, params], body)
 
     def for_(
-        self, word: int, opening: int, variable: Part, within: int, iterable: Part, closing: int, body: Block
+        self, word: int, opening: int, variable: Part, within: int, iterable: Part, closing: int, body: Braced
     ) -> Part:
         inside = sequence([variable, " ", self.word(within), " ", iterable])
         return self._blocked([self.word(word), " ", self.parenthesised(opening, inside, closing)], body)
 
-    def if_(self, word: int, opening: int, condition: Part, closing: int, then: Block, *rest: Any) -> Part:
+    def if_(self, word: int, opening: int, condition: Part, closing: int, then: Braced, *rest: Any) -> Part:
         begun = self._blocked([self.word(word), " ", self.parenthesised(opening, condition, closing)], then)
         if not rest:
             return begun
-        otherwise: Block | Statement = rest[1]
+        otherwise: Braced | Statement = rest[1]
         turn = self.word(rest[0])
         between = [*after_of(then.closing), *before_of(turn)]
-        first = otherwise.opening if isinstance(otherwise, Block) else otherwise
-        inline = otherwise.structural() if isinstance(otherwise, Block) else otherwise.flat
+        first = otherwise.opening if isinstance(otherwise, Braced) else otherwise
+        inline = otherwise.structural() if isinstance(otherwise, Braced) else otherwise.flat
         flat = None
         if inline is not None and not (between or after_of(turn) or before_of(first)):
             flat = joined([begun, " ", turn, " ", inline])
 
         def broken() -> Part:
             parts = [begun.broken(), *([Comments(own_after_first(between)), LINE] if between else [" "])]
-            if isinstance(otherwise, Block):
+            if isinstance(otherwise, Braced):
                 return sequence([*parts, plain(turn), " ", *otherwise.open(after_of(turn))])
             return sequence([*parts, plain(turn, after=True), " ", otherwise.broken()])
 
-        last = otherwise.closing if isinstance(otherwise, Block) else otherwise
+        last = otherwise.closing if isinstance(otherwise, Braced) else otherwise
         depth = max(then.depth, otherwise.depth)
         return ends_of(Statement(flat, broken, depth, simple=False), begun, last)
 
@@ -586,7 +586,7 @@ class Layout:
 
     def material(self, word: int, *rest: Any) -> Part:
         body = rest[-1]
-        if not isinstance(body, Block):
+        if not isinstance(body, Braced):
             return sequence(self._material(word, rest))
         stmt = self._blocked(self._material(word, rest[:-1]), body, structure=False)
         return ends_of(Bracketed(stmt.flat, stmt.maker), stmt, stmt)
@@ -617,7 +617,7 @@ def format_text(text: str, *, name: str = "<text>") -> str:
     report = Report(source)
     tokens = scan(source, report)
     limit_nesting(tokens, report)
-    layout = Layout(tokens, attach(tokens))
+    layout = FileLayout(tokens, attach(tokens))
     document: Part | None = None
     if not report.found:  # read as the parser reads it; None at a mistake
         document = run(tokens.kinds, layout.callbacks(), lambda states, values, at: None)

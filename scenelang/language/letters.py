@@ -9,7 +9,7 @@ from scenelang.assets.font import ALIGNED, Font, FontError, Placed
 from scenelang.language import tree
 from scenelang.language.advice import report_problem
 from scenelang.language.blocks import holds_children, place_called, place_child, prepare_inner
-from scenelang.language.builder import Action, Builder, Place, make
+from scenelang.language.builder import Action, Builder, Site, make
 from scenelang.language.diagnostics import listing
 from scenelang.language.expressions import Code, Given, bind, computed, prepare_arguments
 from scenelang.language.library import Written
@@ -61,7 +61,7 @@ def width_of(font: Font) -> Callable[..., float]:
     return lambda text, size=1.0: size * _line(font, text, size)[1]
 
 
-def prepare_text(stmt: tree.Call, place: Place, letters: Letters) -> Action | None:
+def prepare_text(stmt: tree.Call, place: Site, letters: Letters) -> Action | None:
     """``abc.text("Ag", size = 0.5) { transforms }``: one child, a union of letters."""
     session, where, word = place.session, Written(stmt.name.span, stmt.span), LETTERS["text"]
     fits = holds_children(place, where.name, "a call of `{}`", stmt.name.text)
@@ -99,7 +99,7 @@ def prepare_text(stmt: tree.Call, place: Place, letters: Letters) -> Action | No
     return action
 
 
-def prepare_width(letters: Letters, expr: tree.CallExpr, given: list[Given], place: Place) -> Code | None:
+def prepare_width(letters: Letters, expr: tree.CallExpr, given: list[Given], place: Site) -> Code | None:
     """``abc.width("Ag", size = 0.5)``, a number; None after a report."""
     word = LETTERS["width"]
     bound = bind(place.report, expr.name, word.params, word.required, given)

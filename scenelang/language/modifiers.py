@@ -10,7 +10,7 @@ from scenelang.assets.gradient import STOPS, material_fault
 from scenelang.assets.records import Record
 from scenelang.language import advice, expressions, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner
-from scenelang.language.builder import Action, Builder, FileContext, Place, make
+from scenelang.language.builder import Action, Builder, FileContext, Site, make
 from scenelang.language.diagnostics import Edit, Fix, Label, Span
 from scenelang.language.expressions import POISONED, Code, Given, bind
 from scenelang.language.library import Written
@@ -233,7 +233,7 @@ def spread(values: Sequence[Any], word: words.Word) -> Sequence[Any]:
     return [*first.items, *[LEFT_OUT] * (len(params) - len(first.items))]
 
 
-def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
+def prepare_move(stmt: tree.Call, place: Site) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     name, report = stmt.name.text, place.report
     given = expressions.prepare_arguments(stmt.args, place, name)
@@ -257,7 +257,7 @@ def prepare_move(stmt: tree.Call, place: Place) -> Action | None:
     return _action(spec, bound, stmt, place)
 
 
-def _spec(stmt: tree.Call, place: Place) -> Spec | None:
+def _spec(stmt: tree.Call, place: Site) -> Spec | None:
     """The operation that the name stands for in such a block; None with a report if there is none."""
     name, span = stmt.name.text, stmt.name.span
     if place.kind == "material":
@@ -279,13 +279,13 @@ def _spec(stmt: tree.Call, place: Place) -> Spec | None:
     return GEOMETRY.get(name) or TEXTURE[name]
 
 
-def _skim(stmt: tree.Call, place: Place) -> None:
+def _skim(stmt: tree.Call, place: Site) -> None:
     """Look through the block of a transform as one of children."""
     if stmt.body is not None and place.kind in ("file", "group", "chain"):
         prepare_inner(stmt.body, place.inner("group"))
 
 
-def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: Place) -> Action:
+def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: Site) -> Action:
     session, span, where = place.session, stmt.name.span, Written(stmt.name.span, stmt.span)
     operands = tuple([None if one is None else one.arg.value for one in bound])
     first = operands[0] if operands else None
@@ -360,9 +360,7 @@ def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
         report.warn("W0301", f"{outside:.6g} is outside 0 to 1", span, help)
 
 
-def _stands(
-    place: Place, span: Span, what: str, help: str, inside: str | None = None, name: str = ""
-) -> bool:
+def _stands(place: Site, span: Span, what: str, help: str, inside: str | None = None, name: str = "") -> bool:
     """Test whether a material may stand here, and report it if not."""
     if place.kind not in ("file", "material"):
         return True
@@ -372,7 +370,7 @@ def _stands(
     return False
 
 
-def prepare_use(stmt: tree.MaterialUse, place: Place) -> Action | None:
+def prepare_use(stmt: tree.MaterialUse, place: Site) -> Action | None:
     word = Span(stmt.span.source, stmt.span.start, stmt.name.span.end)
     stands = _stands(place, word, "a material", "put it into the block of an object or a group")
     make_material = _prepare(stmt, place)
@@ -387,12 +385,12 @@ def prepare_use(stmt: tree.MaterialUse, place: Place) -> Action | None:
     return action
 
 
-def prepare_material(expr: tree.MaterialExpr, place: Place) -> Code:
+def prepare_material(expr: tree.MaterialExpr, place: Site) -> Code:
     make_material = _prepare(expr, place)
     return POISONED if make_material is None else Code(lambda env: MaterialValue(make_material(env)))
 
 
-def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> Callable[[Env], Material] | None:
+def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Callable[[Env], Material] | None:
     """Function that makes the material node; None where a name is unknown."""
     name, session = written.name, place.session
     operations = _operations(written.body, place)
@@ -434,7 +432,7 @@ def _check_stops(material: Material, where: Written, session: Session) -> None:
     report.error(code, message, span, help=help)
 
 
-def _called(name: tree.Name, place: Place) -> str | None:
+def _called(name: tree.Name, place: Site) -> str | None:
     """Name of a material in a Scene; None after a report."""
     alias, dot, rest = name.text.partition(".")
     if not dot:
@@ -461,7 +459,7 @@ def _called(name: tree.Name, place: Place) -> str | None:
     return None
 
 
-def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str | None:
+def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> str | None:
     """The word before the name, None without one and empty after a report."""
     word, name = written.shading, written.name
     if word is None:
@@ -483,7 +481,7 @@ def _shading(written: tree.MaterialUse | tree.MaterialExpr, place: Place) -> str
 
 
 def _operations(
-    body: tree.Block | None, place: Place
+    body: tree.Block | None, place: Site
 ) -> Callable[[Env], tuple[tuple[Any, ...], dict[str, Any]]]:
     """Function that returns the operations of a material's block, and the properties that it gives."""
     if body is None:
@@ -500,7 +498,7 @@ def _operations(
     return run
 
 
-def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
+def _unknown(name: tree.Name, place: Site, known: set[str]) -> None:
     """Report a name that no material has."""
     report, span, binding = place.report, name.span, place.scope.find(name.text)
     if binding is not None and binding.kind in ("let", "argument", "loop"):
@@ -512,7 +510,7 @@ def _unknown(name: tree.Name, place: Place, known: set[str]) -> None:
         report.error("E0208", f"unknown material `{name.text}`", span, help=hint, fix=fix)
 
 
-def _is_value(name: tree.Name, place: Place) -> None:
+def _is_value(name: tree.Name, place: Site) -> None:
     """Report `material mist` where `mist` is a material value, or `material red` where `red` is a colour."""
     span, binding = name.span, place.scope.find(name.text)
     if binding is not None and binding.known and binding.value is not POISON:
@@ -527,7 +525,7 @@ def _is_value(name: tree.Name, place: Place) -> None:
     place.report.error("E0213", message, span, help=help, fix=away if start >= 0 else None)
 
 
-def _give(material: Material, span: Span, out: Builder, place: Place) -> None:
+def _give(material: Material, span: Span, out: Builder, place: Site) -> None:
     """Set the material of the block; a second one is a mistake."""
     if out.material is None:
         out.material, out.material_span = material, span
@@ -536,7 +534,7 @@ def _give(material: Material, span: Span, out: Builder, place: Place) -> None:
     place.report.error("E0332", "a second material in one block", span, labels=labels)
 
 
-def prepare_value_use(stmt: tree.Call, binding: Binding, place: Place) -> Action | None:
+def prepare_value_use(stmt: tree.Call, binding: Binding, place: Site) -> Action | None:
     """``mist;`` or ``mist { hue(0.1turn); }``: the block's operations come after the value's own."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     operations = _operations(stmt.body, place)

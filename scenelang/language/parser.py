@@ -28,7 +28,7 @@ Arguments = tuple[tuple[tree.Argument, ...], int]
 Keyword = tuple[Any, Span]
 
 PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
-    "model": (tree.Model, (1,)),
+    "model": (tree.ModelStatement, (1,)),
     "let": (tree.Let, (1, 3)),
     "fn": (tree.Fn, (1, 2, 4)),
     "module": (tree.Module, (1, 2, 3)),
@@ -46,10 +46,10 @@ PLAIN: Final[dict[str, tuple[type, tuple[int, ...]]]] = {
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 _ESCAPES_ELSEWHERE = "abefrvxuUN'01234567"
 """Letters with a meaning behind a backslash in other languages: nobody meant the backslash itself there."""
-_LITERALS = (tree.Number, tree.String, tree.Bool, tree.Color, tree.NameRef, tree.BadExpr)
+_LITERALS = (tree.NumberLiteral, tree.String, tree.Bool, tree.ColorLiteral, tree.NameRef, tree.BadExpr)
 
 
-class Builder:
+class TreeBuilder:
     """Makes the nodes of one file; ``report`` takes what is found in literals."""
 
     def __init__(self, tokens: Tokens, report: Report, kept: Mapping[int, tree.Stmt] = {}) -> None:
@@ -176,7 +176,7 @@ class Builder:
 
     # ------------------------------------------------------------ literals
 
-    def number(self, token: int) -> tree.Number | tree.BadExpr:
+    def number(self, token: int) -> tree.NumberLiteral | tree.BadExpr:
         start, end = self.starts[token], self.ends[token]
         span = Span(self.source, start, end)
         if start == end or start in self.tokens.reported:
@@ -188,7 +188,7 @@ class Builder:
         if isinf(value):
             self.report.add("E0125", "number too large", start, end, help="the largest number is 1.8e308")
             return tree.BadExpr(span)
-        return tree.Number(span, value, text[len(digits) :], digits.isdigit())
+        return tree.NumberLiteral(span, value, text[len(digits) :], digits.isdigit())
 
     def string(self, token: int) -> tree.String:
         start, end = self.starts[token], self.ends[token]
@@ -226,7 +226,7 @@ class Builder:
         if len(digits) == 3:
             digits = "".join(digit * 2 for digit in digits)
         red, green, blue = (int(digits[at : at + 2], 16) / 255 for at in (0, 2, 4))
-        return tree.Color(span, (red, green, blue))
+        return tree.ColorLiteral(span, (red, green, blue))
 
     # ------------------------------------------------------------ statements
 
@@ -242,7 +242,7 @@ class Builder:
     def version(self, word: int, number: int, semicolon: int) -> tree.Stmt:
         span = self._span(word, semicolon)
         value = self.number(number)
-        return tree.Version(span, value) if isinstance(value, tree.Number) else tree.BadStmt(span)
+        return tree.Version(span, value) if isinstance(value, tree.NumberLiteral) else tree.BadStmt(span)
 
     def param(self, word: int, name: tree.Name, equal: int, default: tree.Expr, *rest: Any) -> tree.Stmt:
         span = self._span(word, rest[-1])
@@ -362,7 +362,7 @@ def parse(source: SourceFile, diagnostics: Diagnostics, known: Sequence[tree.Kep
         unfinished = values
         return recovery.resume(states, values, at)
 
-    builder = Builder(tokens, report, {stmt.span.start: stmt for stmt in known})
+    builder = TreeBuilder(tokens, report, {stmt.span.start: stmt for stmt in known})
     file: tree.File | None = run(tokens.kinds, builder.callbacks(), mend)
     if known and (file is None or any(d.code in ("E0120", "E0121") for d in report.found)):
         return parse(source, diagnostics)

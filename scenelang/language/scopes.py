@@ -15,11 +15,11 @@ VALUES: Final = ("let", "param", "argument", "loop")
 """Kinds of names that stand for values."""
 
 
-class Scope(Protocol[T_co]):
+class NameScope(Protocol[T_co]):
     """The names of a block, and the block around it."""
 
     @property
-    def parent(self) -> Scope[T_co] | None: ...
+    def parent(self) -> NameScope[T_co] | None: ...
     @property
     def names(self) -> Mapping[str, T_co]: ...
 
@@ -32,7 +32,7 @@ def outwards(nested: S) -> Iterator[S]:
         around = around.parent
 
 
-def find(scope: Scope[T_co], name: str) -> T_co | None:
+def find(scope: NameScope[T_co], name: str) -> T_co | None:
     """The innermost definition of a name that is in sight of a scope."""
     return next((around.names[name] for around in outwards(scope) if name in around.names), None)
 

@@ -22,7 +22,7 @@ from scenelang.language import (
     values,
     words,
 )
-from scenelang.language.builder import Action, Builder, FileContext, Place, make
+from scenelang.language.builder import Action, Builder, FileContext, Site, make
 from scenelang.language.diagnostics import (
     Diagnostics,
     Edit,
@@ -46,7 +46,7 @@ from scenelang.language.session import Binding, Defines, Env, Session
 from scenelang.language.values import POISON, UNITS, Angle, Problem, RangeValue, Time, Vec
 
 
-def at_top_level(place: Place, span: Span, what: str, name: str = "") -> bool:
+def at_top_level(place: Site, span: Span, what: str, name: str = "") -> bool:
     """Test whether a statement stands at top level, and report it if not."""
     if place.kind == "file" and not place.nested:
         return True
@@ -63,7 +63,7 @@ def _once(session: Session, what: str, span: Span) -> bool:
     return first is span
 
 
-def prepare_version(stmt: tree.Version, place: Place) -> Action | None:
+def prepare_version(stmt: tree.Version, place: Site) -> Action | None:
     version, first = stmt.number, place.file.first
     if not at_top_level(place, stmt.span, "the language version"):
         return None
@@ -82,7 +82,7 @@ def prepare_version(stmt: tree.Version, place: Place) -> Action | None:
     return None
 
 
-def prepare_model(stmt: tree.Model, place: Place) -> Action | None:
+def prepare_model(stmt: tree.ModelStatement, place: Site) -> Action | None:
     session, name, span = place.session, stmt.name, stmt.name.span
     if not at_top_level(place, stmt.span, "'model'") or not _once(session, "model", stmt.span):
         return None
@@ -94,7 +94,7 @@ def prepare_model(stmt: tree.Model, place: Place) -> Action | None:
     return None
 
 
-def prepare_setting(stmt: tree.Call, place: Place) -> Action | None:
+def prepare_setting(stmt: tree.Call, place: Site) -> Action | None:
     """A statement of the top level that sets something for the whole picture."""
     session, name, span = place.session, stmt.name.text, stmt.name.span
     given = prepare_arguments(stmt.args, place)
@@ -177,7 +177,7 @@ def _animate(fields: dict[str, Any], session: Session) -> None:
 BROUGHT = (tree.Param, tree.Let, tree.Fn, tree.Module, tree.Import, tree.Version)
 
 
-def prepare_import(stmt: tree.Import, place: Place) -> Action | None:
+def prepare_import(stmt: tree.Import, place: Site) -> Action | None:
     context, alias = place.file, stmt.alias
     if not at_top_level(place, stmt.span, "an import"):
         blocks.define(alias, Binding("poison", alias.span), place)
@@ -250,7 +250,7 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
     return brought
 
 
-def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> blocks.Body:
+def prepare_file(context: FileContext, file: tree.File, *, imported: bool = False) -> blocks.PreparedBlock:
     """Prepare a file's statements; of an imported one only what it brings."""
     report = context.session.report
     damage = find_damage(file, report.diagnostics)
@@ -265,10 +265,10 @@ def prepare_file(context: FileContext, file: tree.File, *, imported: bool = Fals
                 fact = f"`{stmt.name.text}` in an imported file"
                 report.error_once((fact, context.source), "E0330", fact, stmt.name.span, help=help)
     statements = [s for s in file.statements if not imported or isinstance(s, BROUGHT)]
-    return blocks.prepare_block(statements, Place(context, context.scope, "file"), file.span)
+    return blocks.prepare_block(statements, Site(context, context.scope, "file"), file.span)
 
 
-def prepare_param(stmt: tree.Param, place: Place) -> Action | None:
+def prepare_param(stmt: tree.Param, place: Site) -> Action | None:
     file, name, session, slots = place.file, stmt.name, place.session, place.scope.slots
     default = prepare(stmt.default, place)
     bounds = prepare(stmt.range, place) if stmt.range is not None else None
@@ -419,16 +419,16 @@ def literal(text: str, file: FileContext) -> Any:
         return None
     session = Session(Reporter(diagnostics), around.expressions, around.statements)
     alone = FileContext(SourceFile("", text), session, file.loader, Defines({}))
-    value = prepare(stmt.value, Place(alone, alone.scope, "file")).run([])
+    value = prepare(stmt.value, Site(alone, alone.scope, "file")).run([])
     return None if value is POISON or diagnostics.errors else value
 
 
 def _is_literal(expr: tree.Expr) -> bool:
     """Test whether an expression names nothing and computes nothing but a sign."""
     match expr:
-        case tree.Number() | tree.Bool() | tree.Color() | tree.String():
+        case tree.NumberLiteral() | tree.Bool() | tree.ColorLiteral() | tree.String():
             return True
-        case tree.Unary(op="-" | "+", operand=tree.Number()):
+        case tree.Unary(op="-" | "+", operand=tree.NumberLiteral()):
             return True
         case tree.Vector():
             return all(_is_literal(item) for item in expr.items)
@@ -438,7 +438,7 @@ def _is_literal(expr: tree.Expr) -> bool:
             return False
 
 
-def prepare_headed(stmt: tree.Call, place: Place) -> Action | None:
+def prepare_headed(stmt: tree.Call, place: Site) -> Action | None:
     name = stmt.name.text
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
     head = scopes.head_of(stmt, binding, place.kind)
@@ -474,13 +474,13 @@ def _boolean(stmt: tree.Call) -> str | None:
     return here if here in words.COMBINE and stmt.args and stmt.body is None else None
 
 
-def _skim(stmt: tree.Call, place: Place) -> None:
+def _skim(stmt: tree.Call, place: Site) -> None:
     """Look for mistakes in the arguments and the block of something that will not run."""
     prepare_arguments(stmt.args, place)
     blocks.prepare_inner(stmt.body, place.inner("unknown"))
 
 
-def _lacks_module(stmt: tree.Call, place: Place) -> bool:
+def _lacks_module(stmt: tree.Call, place: Site) -> bool:
     """Report ``dot(x, y) { … }`` whose arguments are unknown names: the word `module` is missing."""
     name = stmt.name.text
     if stmt.body is None or not stmt.args or "." in name:
@@ -501,7 +501,7 @@ def _lacks_module(stmt: tree.Call, place: Place) -> bool:
     return True
 
 
-def _unknown(stmt: tree.Call, place: Place) -> None:
+def _unknown(stmt: tree.Call, place: Site) -> None:
     """Report a statement whose name stands for nothing."""
     name, text = stmt.name, stmt.name.text
     if "." in text:
@@ -525,7 +525,7 @@ def _unknown(stmt: tree.Call, place: Place) -> None:
     advice.report_unknown(name, place, "E0204", f"unknown {what} `{text}`", lambda: _advice(stmt, place))
 
 
-def _advice(stmt: tree.Call, place: Place) -> Advice:
+def _advice(stmt: tree.Call, place: Site) -> Advice:
     """Advice on a statement whose name stands for nothing."""
     name, text = stmt.name, stmt.name.text
     candidates = _candidates(stmt, place)
@@ -565,7 +565,7 @@ def _lacks_material(stmt: tree.Call) -> Advice:
     return f"write {written}", Fix(f"write `{written}`", (Edit(stmt.span, written),))
 
 
-def _candidates(stmt: tree.Call, place: Place) -> set[str]:
+def _candidates(stmt: tree.Call, place: Site) -> set[str]:
     """Names that could have been meant, given where the statement stands and how it looks."""
     kind = place.kind
     if kind == "material":
@@ -587,10 +587,10 @@ def _candidates(stmt: tree.Call, place: Place) -> set[str]:
 
 
 EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
-    tree.Number: expressions.prepare_number,
+    tree.NumberLiteral: expressions.prepare_number,
     tree.String: lambda expr, place: expressions.constant(expr.value),
     tree.Bool: lambda expr, place: expressions.constant(expr.value),
-    tree.Color: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
+    tree.ColorLiteral: lambda expr, place: expressions.constant(Vec(tuple(map(float, expr.rgb)))),
     tree.Vector: blocks.prepare_vector,
     tree.Range: expressions.prepare_range,
     tree.NameRef: expressions.prepare_name,
@@ -607,7 +607,7 @@ EXPRESSIONS: Final[Mapping[type, Callable[..., Any]]] = {
 }
 STATEMENTS: Final[Mapping[type, Callable[..., Any]]] = {
     tree.Version: prepare_version,
-    tree.Model: prepare_model,
+    tree.ModelStatement: prepare_model,
     tree.Param: prepare_param,
     tree.Let: blocks.prepare_let,
     tree.Fn: lambda stmt, place: None,  # `prepare_block` has declared it

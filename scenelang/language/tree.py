@@ -35,7 +35,7 @@ class Name(Spanned):
 # ---------------------------------------------------------------- expressions
 
 
-class Number(Expr):
+class NumberLiteral(Expr):
     """A literal number with its unit glued on: '', 'deg', 'rad', 'turn', 's', 'ms'."""
 
     value: float
@@ -62,7 +62,7 @@ class Bool(Expr):
     value: bool
 
 
-class Color(Expr):
+class ColorLiteral(Expr):
     """A ``#rgb`` or ``#rrggbb`` literal, as three numbers in [0, 1]."""
 
     rgb: tuple[float, float, float]
@@ -171,10 +171,10 @@ class Parameter(Spanned):
 
 
 class Version(Stmt):
-    number: Number
+    number: NumberLiteral
 
 
-class Model(Stmt):
+class ModelStatement(Stmt):
     name: Expr
 
 

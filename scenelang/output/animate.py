@@ -20,7 +20,16 @@ from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
 from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
-from scenelang.output.frames import Clip, Drawable, Film, FrameRange, Store, Target, find_target, put_frame
+from scenelang.output.frames import (
+    Clip,
+    Drawable,
+    Film,
+    FrameRange,
+    FrameStore,
+    Target,
+    find_target,
+    put_frame,
+)
 from scenelang.output.painting import Cluster, Errand, Painter, Workers
 
 if TYPE_CHECKING:
@@ -101,7 +110,7 @@ def make(
         raise RenderError("a cluster draws by the network, and the reference is asked for")
     suffix = Path(target.pattern).suffix.lower() if target.kind == "sequence" else ".png"
     result = RenderResult([], len(numbers))
-    with Store(target.work, suffix) as store:
+    with FrameStore(target.work, suffix) as store:
         run = _Run(painter, store, jobs, cluster, strict, progress, result)
         run.draw(numbers)
         started = time.perf_counter()
@@ -133,7 +142,7 @@ class _Run:
     """Frames on their way into a store."""
 
     painter: Painter
-    store: Store
+    store: FrameStore
     jobs: int | None
     cluster: str | None
     strict: bool
@@ -231,7 +240,7 @@ class _Run:
         self.progress(Progress("drawing", done - waiting, total))
 
 
-def _numbered(store: Store, target: Target, numbers: range, run: _Run) -> list[Path]:
+def _numbered(store: FrameStore, target: Target, numbers: range, run: _Run) -> list[Path]:
     """Move the files of frames to their places; of equal frames all but the last are copies."""
     target.path.mkdir(parents=True, exist_ok=True)
     keys = run.result.keys

@@ -207,7 +207,7 @@ def frame_key(*parts: object) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:40]
 
 
-class Store:
+class FrameStore:
     """A folder of cached frames, locked while it is open; raises `Busy` where another process has it.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
@@ -227,7 +227,7 @@ class Store:
         for part in self._named(_PASSING):
             part.unlink()
 
-    def __enter__(self) -> Store:
+    def __enter__(self) -> FrameStore:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -421,7 +421,7 @@ class Clip:
         self._last = shot, program
         return program
 
-    def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
+    def beside(self, frame: Drawable, store: FrameStore) -> Mapping[str, bytes]:
         """Files to write next to a frame's picture, by suffix; an exception ends the run."""
         return {}
 

@@ -42,7 +42,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class FrameErrors:
     """FLIP of frames, in [0, 1], over scenes."""
 
     __pydantic_config__ = _STRICT
@@ -74,7 +74,7 @@ class Point:
     skip: bool
     offered: bool  # true where `scenelang render` may choose it
     why_not: str | None  # reason if not
-    flip: Errors | None  # None where only the time was measured
+    flip: FrameErrors | None  # None where only the time was measured
     cost: Cost | None  # what a frame takes elsewhere; None where it is not offered
 
 

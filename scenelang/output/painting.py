@@ -28,7 +28,7 @@ from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import enlarged, packed
 from scenelang.drawing.neural.draw import TileCache
 from scenelang.output.frames import Clip, Drawable, Shot, frame_key, put_frame
-from scenelang.output.workers import Link
+from scenelang.output.workers import Connection
 
 if TYPE_CHECKING:
     from scenelang.drawing.image import Image, Output
@@ -242,10 +242,10 @@ _local = threading.local()
 
 
 class Cluster:
-    """Workers of a scheduler that draw frames, with the methods of `Workers`; raises as `Link`."""
+    """Workers of a scheduler that draw frames, with the methods of `Workers`; raises as `Connection`."""
 
     def __init__(self, address: str) -> None:
-        self._link = Link(address)
+        self._link = Connection(address)
         self.batches = 0  # sent so far
         self._batch: list[tuple[bytes, Errand]] = []
         self._each_s = BATCH_S  # estimated time of a frame
@@ -269,7 +269,7 @@ class Cluster:
             self._send()
 
     def take(self) -> None:
-        """Send an incomplete batch, and write the next files that come back; raises as `Link.take`."""
+        """Send an incomplete batch, and write the next files that come back; raises as `Connection.take`."""
         self._send()
         self._receive()
 

@@ -70,7 +70,7 @@ def operands(tokens: npt.NDArray[np.int8]) -> list[Operand]:
     return stack[0]
 
 
-class Layer(NamedTuple):
+class SvgLayer(NamedTuple):
     """A region of one look: where all of its terms are negative."""
 
     row: int  # whose look it is
@@ -79,10 +79,12 @@ class Layer(NamedTuple):
     wins: tuple[tuple[list[Operand], list[Operand], bool], ...] = ()
 
 
-def layers_of(fold: Sequence[Operand], looks: Sequence[object], cuts: Sequence[Operand] = ()) -> list[Layer]:
+def layers_of(
+    fold: Sequence[Operand], looks: Sequence[object], cuts: Sequence[Operand] = ()
+) -> list[SvgLayer]:
     """Layers of a fold that is cut later, in the order of painting; equal looks (N,) need no borders."""
     last = max((at for at, operand in enumerate(fold) if at and operand.operator == SMOOTH), default=-1)
-    result: list[Layer] = []
+    result: list[SvgLayer] = []
     if last >= 0:
         whole = [*fold[: last + 1], *_cuts(fold[last + 1 :]), *cuts]
         seen = list(_seen(fold[: last + 1]))
@@ -94,7 +96,7 @@ def layers_of(fold: Sequence[Operand], looks: Sequence[object], cuts: Sequence[O
         if not at or operand.operator == UNION:
             more = [*_cuts(fold[at + 1 :]), *cuts]
             inner = layers_of(operand.inner, looks, more) if operand.inner else None
-            result += [Layer(operand.rows[0], [operand, *more])] if inner is None else inner
+            result += [SvgLayer(operand.rows[0], [operand, *more])] if inner is None else inner
     return result
 
 
@@ -102,13 +104,13 @@ def _cuts(fold: Sequence[Operand]) -> list[Operand]:
     return [operand for operand in fold if operand.operator >= SUBTRACT]
 
 
-def _seen(fold: Sequence[Operand]) -> Iterator[Layer]:
+def _seen(fold: Sequence[Operand]) -> Iterator[SvgLayer]:
     """Leaves of a fold, each where its colour is the last one taken by more than half."""
     for at, operand in enumerate(fold):
         if at and operand.operator >= SUBTRACT:
             continue
         won = (([operand], list(fold[:at]), operand.operator == UNION),) if at else ()
-        for layer in _seen(operand.inner) if operand.inner else (Layer(operand.rows[0], []),):
+        for layer in _seen(operand.inner) if operand.inner else (SvgLayer(operand.rows[0], []),):
             yield layer._replace(wins=layer.wins + won)
 
 
@@ -163,7 +165,7 @@ class Shapes:
 class Region:
     """A layer to be outlined; its function is negative inside, and about as steep as a distance."""
 
-    def __init__(self, shapes: Shapes, layer: Layer) -> None:
+    def __init__(self, shapes: Shapes, layer: SvgLayer) -> None:
         self.shapes, self.layer = shapes, layer
         self.bound = shapes.fold(layer.shape)
         self.wins = [(shapes.fold(one), shapes.fold(other), floor) for one, other, floor in layer.wins]

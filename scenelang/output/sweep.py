@@ -48,7 +48,16 @@ from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
-from scenelang.output.frames import Clip, Drawable, Shot, Store, Target, TargetError, find_target, is_pattern
+from scenelang.output.frames import (
+    Clip,
+    Drawable,
+    FrameStore,
+    Shot,
+    Target,
+    TargetError,
+    find_target,
+    is_pattern,
+)
 from scenelang.output.painting import Painter
 
 MOST_ROWS: Final = 1_000_000
@@ -234,7 +243,7 @@ class TableError(ValueError):
     """A table that cannot be written, or one that is of another sweep."""
 
 
-class Line(Record):
+class TableRow(Record):
     picture: str  # name of its file; empty where there is none
     values: tuple[str, ...]  # text of each param's value, in order; empty for its default
     digest: str = ""  # of all that determines the picture; empty before it is drawn, or where it is not
@@ -245,7 +254,7 @@ class Line(Record):
         return (self.picture, *self.values, self.digest, self.error)
 
 
-def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> bytes:
+def table_bytes(path: Path, names: Sequence[str], lines: Sequence[TableRow]) -> bytes:
     """Contents of a table of this name."""
     heads = (*_FRONT, *names, *_BACK)
     if path.suffix.lower() == PARQUET:
@@ -257,7 +266,7 @@ def table_bytes(path: Path, names: Sequence[str], lines: Sequence[Line]) -> byte
     return text.getvalue().encode()
 
 
-def _parquet(heads: Sequence[str], lines: Sequence[Line]) -> bytes:
+def _parquet(heads: Sequence[str], lines: Sequence[TableRow]) -> bytes:
     import pyarrow as arrow
     import pyarrow.parquet
 
@@ -320,7 +329,7 @@ class Variants(Clip):
         self.names = tuple(dict.fromkeys(name for row in rows for name in row))
         self.told: dict[int, Sequence[Diagnostic]] = {}  # errors of the first rows that have any, by number
         self.lines = [
-            Line(target.file(at).name, tuple(row.get(name, "") for name in self.names))
+            TableRow(target.file(at).name, tuple(row.get(name, "") for name in self.names))
             for at, row in enumerate(rows)
         ]
         self._old = self._before()
@@ -328,7 +337,7 @@ class Variants(Clip):
         if not self._old:
             self._write()
 
-    def _before(self) -> list[Line]:
+    def _before(self) -> list[TableRow]:
         """Rows of the previous sweep that this one continues."""
         if not self.file.exists():
             if self.target.path.is_dir() and (others := self.target.there()):
@@ -343,7 +352,7 @@ class Variants(Clip):
         heads = [*_FRONT, *self.names, *_BACK]
         if not cells or cells[0] != heads or any(len(row) != len(heads) for row in cells):
             raise TableError(f"`{self.file}` is not a table of these params")
-        old = [Line(row[0], tuple(row[1:-2]), *row[-2:]) for row in cells[1:]]
+        old = [TableRow(row[0], tuple(row[1:-2]), *row[-2:]) for row in cells[1:]]
         for at, (line, now) in enumerate(zip(old, self.lines, strict=False)):
             if line.values != now.values:
                 fact = f"{', '.join(line.values)} where {', '.join(now.values)} are asked for"
@@ -357,7 +366,7 @@ class Variants(Clip):
         self._evaluation.inputs.values = {**self._source.values, **self._rows[number]}
         return replace(super().shot(self._frame), number=number)
 
-    def beside(self, frame: Drawable, store: Store) -> Mapping[str, bytes]:
+    def beside(self, frame: Drawable, store: FrameStore) -> Mapping[str, bytes]:
         """Note a row that gives a scene; returns the files next to its picture."""
         line = self.lines[frame.number]
         old = self._old[frame.number] if frame.number < len(self._old) else line
@@ -372,7 +381,7 @@ class Variants(Clip):
             raise TableError(
                 f"`{self.file}` is of another scene, model, size or version: row {frame.number} differs"
             )
-        self._note(frame.number, Line(line.picture, line.values, frame.key))
+        self._note(frame.number, TableRow(line.picture, line.values, frame.key))
         result = {}
         if "scene" in self._asked:
             result[TEXTS["scene"]] = frame.shot.scene.to_nsg().encode()
@@ -388,14 +397,14 @@ class Variants(Clip):
         if len(self.told) < _REPORTED:
             self.told[number] = errors
         line = self.lines[number]
-        self._note(number, Line("", line.values, "", f"{errors[0].code}: {errors[0].message}"))
+        self._note(number, TableRow("", line.values, "", f"{errors[0].code}: {errors[0].message}"))
         old, self.diagnostics = self.diagnostics, Diagnostics()
         for d in old:
             if d.severity == "warning":
                 self.diagnostics.add(d.code, d.message, d.span, labels=d.labels, help=d.help, fix=d.fix)
         self._evaluation = self._source.evaluation(self.diagnostics)
 
-    def _note(self, number: int, line: Line) -> None:
+    def _note(self, number: int, line: TableRow) -> None:
         self.lines[number] = line
         if number == len(self.lines) - 1:
             self._write()
@@ -411,7 +420,7 @@ _WORTH: Final = 64  # pixels across from which on a picture is labelled
 
 
 def write_sheet(
-    path: Path, folder: Path, names: Sequence[str], lines: Sequence[Line], across: int = 0
+    path: Path, folder: Path, names: Sequence[str], lines: Sequence[TableRow], across: int = 0
 ) -> int:
     """Draw the pictures of ``lines``, ``across`` in a row or in a square, over white; returns how many.
 
@@ -467,7 +476,7 @@ class Sweep:
 
     table: Path  # file of values, digests and errors
     names: tuple[str, ...]  # of the params
-    lines: Sequence[Line]  # the table's rows
+    lines: Sequence[TableRow]  # the table's rows
     failed: Mapping[int, Sequence[Diagnostic]]  # errors of the first few rows without a picture, by number
     warnings: Sequence[Diagnostic]  # all of them, each once
     made: RenderResult  # figures of the run

@@ -43,7 +43,7 @@ class GivenUp(RenderError):
     """Several workers ended over one task, one after another."""
 
 
-class Link:
+class Connection:
     """Connection to workers whose results are those of this machine; raises `RenderError` for any failure.
 
     The address is a scheduler's, or ``"local"``, a worker for each core here, ``"local:8787"`` with a
@@ -148,12 +148,12 @@ class Link:
 def by_workers(
     address: str, function: Callable[[T], R], items: Iterable[tuple[K, T]], libraries: tuple[str, ...] = ()
 ) -> Iterator[tuple[K, Callable[[], R]]]:
-    """Map one of our functions over named arguments, each taken when it can be sent, by workers of a `Link`.
+    """Map one of our functions over named arguments, each taken when it can be sent, by a `Connection`.
 
     Yields names in the order in which they are done, each with a function that returns the result or raises
-    as `Link.take` says, to be called before the next name is taken.
+    as `Connection.take` says, to be called before the next name is taken.
     """
-    link = Link(address, libraries)
+    link = Connection(address, libraries)
     try:
         for name, item in items:
             link.send(name, function, item)

@@ -66,7 +66,7 @@ KINDS: Final = {
 }
 
 
-class Store:
+class ArrayStore:
     """The blob of arrays, one after the other."""
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ def packed(data: bytes) -> str:
 OUTLINE_SIDES = 12, 24  # the last is `SIDE` in plane.glsl
 
 
-def shapes_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
+def shapes_of(elements: Iterable[Element | Gradient], store: ArrayStore) -> list[dict[str, Any]]:
     """Entries of a view's ``shapes`` for the geometries among elements; raises `ProgramError`."""
     shapes = (element for element in elements if isinstance(element, Element) and not element.material)
     return [_shape(element, store) for element in shapes]
@@ -106,12 +106,12 @@ def worn_of(program: Program) -> tuple[Element | Gradient, ...]:
     return *program.elements, *map(Gradient, sorted(graded))
 
 
-def paints_of(elements: Iterable[Element | Gradient], store: Store) -> list[dict[str, Any]]:
+def paints_of(elements: Iterable[Element | Gradient], store: ArrayStore) -> list[dict[str, Any]]:
     """Entries of a view's ``paints`` for the materials among elements; raises as `shapes_of`."""
     return [_paint(element, store) for element in elements if element.material]
 
 
-def _shape(element: Element, store: Store) -> dict[str, Any]:
+def _shape(element: Element, store: ArrayStore) -> dict[str, Any]:
     if element.form == "outline":
         table, curves = table_of(element, OUTLINE_SIDES), curves_of(element)
         wide, high = (float(side) for side in abs(curves).max((0, 1)))
@@ -151,7 +151,7 @@ def bounds_of(element: Element) -> tuple[float, float, float]:
     return max(result[0], 1.0), max(result[1], 1.0), max(result[2], 2.0**0.5)
 
 
-def _paint(element: Element | Gradient, store: Store) -> dict[str, Any]:
+def _paint(element: Element | Gradient, store: ArrayStore) -> dict[str, Any]:
     if isinstance(element, Gradient):
         return {"name": element.name, "kind": element.name}
     if element.form != "picture":

@@ -38,7 +38,7 @@ from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
-from scenelang.web.arrays import Store, packed, paints_of, rows_of, script, shapes_of, web, worn_of
+from scenelang.web.arrays import ArrayStore, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def view_of(
     Without a form its numbers never change. Raises `ProgramError` for other weights, or where no page can
     draw the model.
     """
-    manifest, store = load_manifest(program.model), Store()
+    manifest, store = load_manifest(program.model), ArrayStore()
     if manifest.renderer not in ("framed", "solid"):
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
     if not manifest.framed:

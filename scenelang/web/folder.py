@@ -33,7 +33,7 @@ _PART: Final = re.compile(
 _DEVICE: Final = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *(\..*)?", re.IGNORECASE)
 
 
-class Refused(Exception):
+class Denied(Exception):
     """Raised where a request cannot be granted; the message says why."""
 
 
@@ -83,12 +83,12 @@ class Folder:
         return sorted(result, key=lambda name: (name.count("/"), name))[:MOST_FILES]
 
     def place(self, name: str) -> Path:
-        """The path of a file, which need not be there; raises `Refused` for other names than scenes'."""
+        """The path of a file, which need not be there; raises `Denied` for other names than scenes'."""
         if not fits(name):
-            raise Refused(f"`{repr(name[:80])[1:-1]}` is not the name of a scene in this folder")
+            raise Denied(f"`{repr(name[:80])[1:-1]}` is not the name of a scene in this folder")
         path = self.path / name
         if not self.holds(str(path)):
-            raise Refused(f"`{name}` lies outside the folder")
+            raise Denied(f"`{name}` lies outside the folder")
         return path
 
     def read(self, name: str) -> tuple[str | None, str | None]:
@@ -99,48 +99,48 @@ class Folder:
         except FileNotFoundError:
             return None, None
         except Unreadable as error:
-            raise Refused(f"cannot read `{name}`: {error}") from None
+            raise Denied(f"cannot read `{name}`: {error}") from None
         except OSError as error:
-            raise Refused(f"cannot read `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot read `{name}`: {_reason(error)}") from None
         return text.replace("\r\n", "\n").replace("\r", "\n"), _digest(data)
 
     def write(self, name: str, text: str, base: str | None) -> str:
         """Write a file whole, with the line ends that it has; its digest.
 
-        Raises `Changed` where the file's digest is not ``base``, None for no file, and `Refused` where it
+        Raises `Changed` where the file's digest is not ``base``, None for no file, and `Denied` where it
         cannot be written, or is, or lies behind, a link.
         """
         path = self.place(name)
         for part in (path, *path.parents[: len(Path(name).parts) - 1]):
             if part.is_symlink():
-                raise Refused(f"`{name}` is a link, which is not written through")
+                raise Denied(f"`{name}` is a link, which is not written through")
         old, disk = self.read(name)
         if disk != base:
             raise Changed(old, disk)
         crlf = old is not None and b"\r\n" in read_regular(path, MAX_BYTES).partition(b"\n")[0] + b"\n"
         data = (text.replace("\n", "\r\n") if crlf else text).encode("utf-8", "strict")
         if len(data) > MAX_BYTES:
-            raise Refused(f"a text of more than {MAX_BYTES // 1_000_000} MB")
+            raise Denied(f"a text of more than {MAX_BYTES // 1_000_000} MB")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, data)
         except OSError as error:
-            raise Refused(f"cannot write `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot write `{name}`: {_reason(error)}") from None
         return _digest(data)
 
     def rename(self, name: str, to: str) -> None:
-        """Give a file a name that no other has; raises `Refused`."""
+        """Give a file a name that no other has; raises `Denied`."""
         old, new = self.place(name), self.place(to)
         if old.is_symlink() or not old.is_file():
-            raise Refused(f"there is no file `{name}`")
+            raise Denied(f"there is no file `{name}`")
         try:
             new.parent.mkdir(parents=True, exist_ok=True)
             os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL))  # the name is ours from here on
             os.replace(old, new)
         except FileExistsError:
-            raise Refused(f"there is a file `{to}` already") from None
+            raise Denied(f"there is a file `{to}` already") from None
         except OSError as error:
-            raise Refused(f"cannot rename `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot rename `{name}`: {_reason(error)}") from None
 
     def holds(self, path: str) -> bool:
         """True where an absolute path leads to a place in the folder."""
@@ -298,9 +298,9 @@ def text_of(message: Json) -> str:
     text = string_of(message, "text")
     try:
         if len(text.encode()) > MAX_BYTES:
-            raise Refused(f"a text of more than {MAX_BYTES // 1_000_000} MB")
+            raise Denied(f"a text of more than {MAX_BYTES // 1_000_000} MB")
     except UnicodeEncodeError:
-        raise Refused("the text has halves of characters") from None
+        raise Denied("the text has halves of characters") from None
     return text
 
 

@@ -24,7 +24,7 @@ from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import Stage, stage_data
 from scenelang.language import scene, words
 from scenelang.language import tree as nodes
-from scenelang.language.builder import FileContext, Place
+from scenelang.language.builder import FileContext, Site
 from scenelang.language.evaluation import Evaluation, is_colour
 from scenelang.language.expressions import prepare
 from scenelang.language.nodes import MOST
@@ -46,11 +46,11 @@ class Frame:
 
 
 @dataclass(slots=True, eq=False)
-class Scope:
+class PageScope:
     """The names of a block, and the block around it; without a frame its slots are those of files."""
 
     frame: Frame | None = None
-    parent: Scope | None = None
+    parent: PageScope | None = None
     names: dict[str, Bound] = field(default_factory=dict)
 
     def find(self, name: str) -> Bound | None:
@@ -65,10 +65,10 @@ class Bound:
     """The binding of a name."""
 
     kind: str  # as of `scenelang.language.session.Binding`
-    scope: Scope  # of its definition
+    scope: PageScope  # of its definition
     slot: int = 0
     node: Any = None  # the statement of a fn or module
-    inside: Scope | None = None  # the names of an imported file
+    inside: PageScope | None = None  # the names of an imported file
     file: FileContext | None = None
     at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
     uses: list[Bound] = field(default_factory=list)  # names of files
@@ -77,7 +77,7 @@ class Bound:
 
 
 @dataclass(slots=True)
-class Line:
+class FormLine:
     """A statement of a file, the name that it defines, and the names of files that it uses."""
 
     form: Json
@@ -120,9 +120,9 @@ class Writer:
         self.written = {chr(int(e.name[1:], 16)) for e in self.shapes if e.form == "outline"}
         """Characters of all strings."""
 
-    def block(self, block: nodes.Block, around: Scope, kind: str) -> Json:
+    def block(self, block: nodes.Block, around: PageScope, kind: str) -> Json:
         """A block in a scope of its own."""
-        scope = Scope(around.frame, around)
+        scope = PageScope(around.frame, around)
         bodies = self._declare(block.statements, scope)
         forms = [self.statement(stmt, scope, kind) for stmt in block.statements]
         for bound in bodies:
@@ -130,15 +130,17 @@ class Writer:
             self.uses += bound.uses
         return [form for form in forms if form is not None]
 
-    def file(self, context: FileContext, tree: nodes.File, scope: Scope, imported: bool) -> list[Line]:
+    def file(
+        self, context: FileContext, tree: nodes.File, scope: PageScope, imported: bool
+    ) -> list[FormLine]:
         """The statements of a file; of an imported one the exported definitions."""
         statements = [s for s in tree.statements if not imported or isinstance(s, BROUGHT)]
         self._declare(statements, scope)
-        lines: list[Line] = []
+        lines: list[FormLine] = []
         for stmt in statements:
             self.uses = []
             if isinstance(stmt, nodes.Import):
-                brought, inside = context.scope.names[stmt.alias.text].value, Scope()
+                brought, inside = context.scope.names[stmt.alias.text].value, PageScope()
                 scope.names[stmt.alias.text] = Bound("import", scope, inside=inside, file=brought)
                 if (imported_tree := context.loader.parsed.get(brought.path)) is not None:
                     lines += self.file(brought, imported_tree, inside, imported=True)
@@ -154,13 +156,13 @@ class Writer:
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
                 bound.uses = self.uses
-                lines.append(Line(form, bound, self.uses))
+                lines.append(FormLine(form, bound, self.uses))
                 if isinstance(stmt, nodes.Param):
                     full = context.prefix + stmt.name.text
                     form[2] = full
                     self.params.append((full, stmt, context, bound))
             elif form := self.statement(stmt, scope, "file"):
-                lines.append(Line(form, None, self.uses))
+                lines.append(FormLine(form, None, self.uses))
             if isinstance(stmt, nodes.Call) and stmt.name.text in self.lengths:
                 self.lengths[stmt.name.text] += self.uses
         return lines
@@ -178,7 +180,7 @@ class Writer:
                 stack += bound.uses
         return set(seen)
 
-    def _declare(self, statements: Sequence[nodes.Stmt], scope: Scope) -> list[Bound]:
+    def _declare(self, statements: Sequence[nodes.Stmt], scope: PageScope) -> list[Bound]:
         result = []
         for stmt in statements:
             if isinstance(stmt, nodes.Fn | nodes.Module):
@@ -192,7 +194,7 @@ class Writer:
         at, stmt = self._called(bound), bound.node
         around, self.uses = self.uses, bound.uses
         frame = Frame(bound.scope.frame, 1 + len(stmt.params))
-        inside, defaults = Scope(frame, bound.scope), []
+        inside, defaults = PageScope(frame, bound.scope), []
         for slot, param in enumerate(stmt.params, 1):
             defaults.append(None if param.default is None else self.expression(param.default, inside))
             inside.names[param.name.text] = Bound("argument", inside, slot)
@@ -210,7 +212,7 @@ class Writer:
             self.calls.append(None)
         return bound.at
 
-    def slot(self, scope: Scope) -> int:
+    def slot(self, scope: PageScope) -> int:
         """A new slot."""
         if scope.frame is None:
             self.slots += 1
@@ -218,7 +220,7 @@ class Writer:
         scope.frame.size += 1
         return scope.frame.size - 1
 
-    def hops(self, scope: Scope, to: Scope) -> int:
+    def hops(self, scope: PageScope, to: PageScope) -> int:
         """Number of calls between a scope and the slots of another; -1 for those of files."""
         hops, frame = 0, scope.frame
         while frame is not to.frame:
@@ -226,7 +228,7 @@ class Writer:
             hops, frame = hops + 1, frame.outer
         return -1 if frame is None else hops
 
-    def value(self, bound: Bound, scope: Scope) -> Json:
+    def value(self, bound: Bound, scope: PageScope) -> Json:
         """A variable."""
         if bound.number is not None:
             return bound.number
@@ -235,33 +237,33 @@ class Writer:
             return ["g", bound.slot]
         return ["v", self.hops(scope, bound.scope), bound.slot]
 
-    def call(self, bound: Bound, args: Sequence[nodes.Argument], scope: Scope) -> list[Json]:
+    def call(self, bound: Bound, args: Sequence[nodes.Argument], scope: PageScope) -> list[Json]:
         """Place of a definition, hops to where it stands, and the arguments."""
         if bound.scope.frame is None:
             self.uses.append(bound)
         given = bind([param.name.text for param in bound.node.params], args)
         return [self._called(bound), self.hops(scope, bound.scope), self.given(given, scope)]
 
-    def given(self, values: Iterable[nodes.Expr | None], scope: Scope) -> list[Json]:
+    def given(self, values: Iterable[nodes.Expr | None], scope: PageScope) -> list[Json]:
         """Arguments, None where one is left out."""
         return [None if value is None else self.expression(value, scope) for value in values]
 
-    def expression(self, expr: nodes.Expr, scope: Scope) -> Json:
+    def expression(self, expr: nodes.Expr, scope: PageScope) -> Json:
         """An expression: a number, a boolean, or a word and its operands."""
         match expr:
-            case nodes.Number():
+            case nodes.NumberLiteral():
                 return [expr.unit, plain(expr.value)] if expr.unit else plain(expr.value)
             case nodes.Bool():
                 return expr.value
             case nodes.String():
                 self.written |= {*expr.value}
                 return ["'", expr.value]
-            case nodes.Color():
+            case nodes.ColorLiteral():
                 return ["#", *(round(255 * part) for part in expr.rgb)]
             case nodes.Vector():
                 return ["[", *self.given(expr.items, scope)]
             case nodes.ForItem():
-                items, inside = self.expression(expr.iterable, scope), Scope(scope.frame, scope)
+                items, inside = self.expression(expr.iterable, scope), PageScope(scope.frame, scope)
                 target = self._define(expr.variable, "loop", inside)
                 return ["for", *target, items, self.expression(expr.body, inside)]
             case nodes.IfItem():
@@ -306,7 +308,7 @@ class Writer:
                 return self._material(expr, scope)
         raise TypeError(f"no form of {expr.__class__.__name__}")
 
-    def _material(self, written: nodes.MaterialExpr | nodes.MaterialUse, scope: Scope) -> Json:
+    def _material(self, written: nodes.MaterialExpr | nodes.MaterialUse, scope: PageScope) -> Json:
         """``["material", index of its shading, index of its paint or -1, block]``."""
         name, shading = written.name.text, written.shading
         alias, dot, rest = name.partition(".")
@@ -339,7 +341,7 @@ class Writer:
             known.append(element)
         return known.index(element)
 
-    def statement(self, stmt: nodes.Stmt, scope: Scope, kind: str) -> Json:
+    def statement(self, stmt: nodes.Stmt, scope: PageScope, kind: str) -> Json:
         """A statement in a kind of block; None where it does nothing when it runs."""
         match stmt:
             case nodes.Let():
@@ -349,7 +351,7 @@ class Writer:
                 given = self.given((stmt.default, stmt.range), scope)
                 return ["param", self._define(stmt.name, "param", scope)[1], stmt.name.text, *given]
             case nodes.For():
-                items, inside = self.expression(stmt.iterable, scope), Scope(scope.frame, scope)
+                items, inside = self.expression(stmt.iterable, scope), PageScope(scope.frame, scope)
                 target = self._define(stmt.variable, "loop", inside)
                 return ["for", *target, items, self.block(stmt.body, inside, kind)]
             case nodes.If():
@@ -370,16 +372,16 @@ class Writer:
                 return self._headed(stmt, scope, kind)
         return None
 
-    def _define(self, name: nodes.Name, kind: str, scope: Scope) -> list[Json]:
+    def _define(self, name: nodes.Name, kind: str, scope: PageScope) -> list[Json]:
         """Give a name a new slot: ``["g", slot]`` of files, or ``["v", slot]`` of a call."""
         slot = self.slot(scope)
         scope.names[name.text] = Bound(kind, scope, slot)
         return ["g" if scope.frame is None else "v", slot]
 
-    def _width(self, stmt: nodes.Node | nodes.Combined, scope: Scope) -> Json:
+    def _width(self, stmt: nodes.Node | nodes.Combined, scope: PageScope) -> Json:
         return self.given(bind(("k",), stmt.args), scope)[0]
 
-    def _headed(self, stmt: nodes.Call, scope: Scope, kind: str) -> Json:
+    def _headed(self, stmt: nodes.Call, scope: PageScope, kind: str) -> Json:
         name = stmt.name.text
         bound = None if name in words.LANGUAGE else scope.find(name)
         head = head_of(stmt, bound, kind)
@@ -405,7 +407,7 @@ class Writer:
         ops = [] if stmt.body is None else self.block(stmt.body, scope, "material")
         return ["use", self.value(bound, scope), *([ops] if ops else [])]
 
-    def _move(self, stmt: nodes.Call, scope: Scope, inks: bool) -> Json:
+    def _move(self, stmt: nodes.Call, scope: PageScope, inks: bool) -> Json:
         name, args = stmt.name.text, stmt.args or ()
         table = words.OPERATIONS if inks else words.TRANSFORMS
         if name not in table:
@@ -434,7 +436,7 @@ class Writer:
             self.fonts.append(bound.element)
         return self.fonts.index(bound.element)
 
-    def _text(self, word: str, args: Sequence[nodes.Argument] | None, scope: Scope) -> list[Json]:
+    def _text(self, word: str, args: Sequence[nodes.Argument] | None, scope: PageScope) -> list[Json]:
         """Arguments of a line of letters."""
         given = bind(words.LETTERS[word].params, args)
         aligned = [one for one in given[2:] if isinstance(one, nodes.String)]  # which is no text
@@ -510,7 +512,7 @@ def form_of(
     """
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
     with deep_stack():
-        lines = writer.file(evaluation.context, evaluation.file, Scope(), imported=False)
+        lines = writer.file(evaluation.context, evaluation.file, PageScope(), imported=False)
         needed = writer.reached(bound for line in lines if line.bound is None for bound in line.uses)
         for word, uses in writer.lengths.items():
             reached = writer.reached(uses)
@@ -564,7 +566,7 @@ def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any
     kind = colour if isinstance(value, Vec) else _KINDS[value.__class__]
     data: dict[str, Any] = {"name": name, "kind": kind, "value": _json(value)}
     if stmt.range is not None:
-        allowed = prepare(stmt.range, Place(file, file.scope, "file")).run(file.env)
+        allowed = prepare(stmt.range, Site(file, file.scope, "file")).run(file.env)
         if isinstance(allowed, Vec):
             data["choices"] = _json(allowed)
         elif isinstance(allowed, RangeValue) and allowed.step is not None:
@@ -575,7 +577,7 @@ def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any
             data |= {"low": allowed.start, "high": allowed.stop}
             data |= {"exclusive": True} if allowed.exclusive else {}
     if isinstance(value, Angle | Time):
-        units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.Number))
+        units = (node.unit for node in nodes.walk(stmt.default) if isinstance(node, nodes.NumberLiteral))
         data["unit"] = next(filter(None, units), "deg" if isinstance(value, Angle) else "s")
     if label := _LABEL.match(stmt.span.source.text, (stmt.range or stmt.default).span.end):
         data["label"] = label[1].strip()

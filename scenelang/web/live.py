@@ -20,12 +20,12 @@ from scenelang.web.folder import (
     MOST_SIDE,
     Answer,
     Changed,
+    Denied,
     Files,
     Folder,
     JobFailed,
     Journal,
     Json,
-    Refused,
     choice_of,
     id_of,
     string_of,
@@ -202,7 +202,7 @@ class Live:
                 message = given if isinstance(given, dict) else {}
                 await _ANSWERS[choice_of(message, "kind", _ANSWERS)](self, message)
                 continue
-            except (Refused, OSError) as error:
+            except (Denied, OSError) as error:
                 why = str(error)
             except (ValueError, RecursionError) as error:
                 why = f"not a message: {error}"
@@ -217,7 +217,7 @@ class Live:
         name = string_of(message, "file")
         path = self._play.folder.place(name)
         if name not in self.open and len(self.open) >= MOST_OPEN:
-            raise Refused(f"more than {MOST_OPEN} open files")
+            raise Denied(f"more than {MOST_OPEN} open files")
         kept = await asyncio.to_thread(self._play.journal.find, path)
         async with self._play.reading:
             text, disk = await asyncio.to_thread(self._play.folder.read, name)
@@ -286,7 +286,7 @@ class Live:
     def _known(self, message: Json) -> tuple[str, Open]:
         name = string_of(message, "file")
         if name not in self.open:
-            raise Refused(f"`{name[:80]}` is not open")
+            raise Denied(f"`{name[:80]}` is not open")
         return name, self.open[name]
 
     def _keep_later(self, name: str) -> None:
@@ -385,7 +385,7 @@ class Live:
         if slot in self._jobs:
             self._jobs[slot][0].cancel()
         elif len(self._jobs) >= MOST_JOBS:
-            raise Refused("too many drawings at the same time")
+            raise Denied("too many drawings at the same time")
         task = asyncio.create_task(self._work(id, name, job, pool, done))
         self._jobs[slot] = task, id, name
 

@@ -19,7 +19,7 @@ from scenelang.compiler.program import STEPS, ProgramError
 from scenelang.drawing.neural import field
 from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, FramedArrays
 from scenelang.language.words import TOKENS
-from scenelang.web.arrays import Store, web
+from scenelang.web.arrays import ArrayStore, web
 
 NODES: Final = 129  # along a side of the grid for bounds of decoders
 QUARTERED: Final = 7  # times that squares are quartered to prove that a unit is never above zero
@@ -29,7 +29,7 @@ UNKNOWN: Final = 1e9  # leaf units: a bound that rules nothing out
 Floats = npt.NDArray[np.float64]
 
 
-class Leaf(NamedTuple):
+class LeafDecoder(NamedTuple):
     """A decoder for shaders, in leaf units."""
 
     first: Floats  # (n, 3) of the units of the first layer: factors of x and y, and bias
@@ -41,7 +41,7 @@ class Leaf(NamedTuple):
     inner: float  # radius of a disc within the shape, 0 where none is known
 
 
-def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
+def shader(network: FramedArrays, store: ArrayStore) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view; `ProgramError` if it knows more than distances."""
     config = network.config
     if not config.features == config.state == 1:
@@ -94,7 +94,7 @@ def shader(network: FramedArrays, store: Store) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=8)
-def leaves(network: FramedArrays) -> list[Leaf]:
+def leaves(network: FramedArrays) -> list[LeafDecoder]:
     """The decoders of all geometries of a network."""
     axis = np.linspace(-RADIUS, RADIUS, NODES)
     p = np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
@@ -117,7 +117,7 @@ def leaves(network: FramedArrays) -> list[Leaf]:
         w, b, v = w[first], b[first], v[:, first]
         second = _firing(w, b, v, c)
         kept = np.column_stack([w, b]), np.column_stack([c, v])[second], np.append(u[0, second], d[0])
-        result.append(Leaf(*kept, far, bounds, inner))
+        result.append(LeafDecoder(*kept, far, bounds, inner))
     return result
 
 

@@ -36,7 +36,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 from watchfiles import DefaultFilter, awatch
 
-from scenelang.web.folder import Refused
+from scenelang.web.folder import Denied
 from scenelang.web.language import serve_language
 from scenelang.web.live import Live, Play
 
@@ -193,7 +193,7 @@ async def _reread(play: Play, name: str) -> None:
         async with play.reading:
             try:
                 text, disk = await asyncio.to_thread(play.folder.read, name)
-            except Refused as error:
+            except Denied as error:
                 log.warning("%s", error)
                 return
             if text or patient:

@@ -16,10 +16,10 @@ from scenelang.compiler.groups import INTERSECT, SUBTRACT
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage, stage_data
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
-from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidArrays
+from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidArrays, SolidCell
 from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import LOOSE, SLACK
-from scenelang.web.arrays import Store, web
+from scenelang.web.arrays import ArrayStore, web
 
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
 """Files of ``viewer/``, in order."""
@@ -36,7 +36,7 @@ _CONSTANTS: Final = {
 }
 
 
-def shader(network: SolidArrays, store: Store) -> dict[str, Any]:
+def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
     paint, kind = config.paint_lines, config.kind_lines
@@ -84,7 +84,7 @@ def _products(layers: Smooth | Norms) -> int:
     return sum(w.size for w, _ in layers)
 
 
-def _cell(cell: Cell) -> np.ndarray:
+def _cell(cell: SolidCell) -> np.ndarray:
     """A cell (K, 4): its factor of a distance and its bump; then each line's own, past and bias."""
     lines = np.concatenate([cell.own, cell.past, cell.bias, 0 * cell.bias], 1)
     return np.concatenate([[[cell.candidate.item(), cell.bump.item(), 0.0, 0.0]], lines])

@@ -20,7 +20,7 @@ import pytest
 
 from scenelang.assets.files import NotWritten, write_output, write_whole
 from scenelang.drawing.image import Image
-from scenelang.output.frames import Store, put_frame
+from scenelang.output.frames import FrameStore, put_frame
 from tests.assets.processes import SOON_S, leavings, one_line, run
 from tests.cli.conftest import Folder
 
@@ -235,7 +235,7 @@ def test_what_is_not_the_stores_stays(scenes: Folder) -> None:
 
 def test_a_kept_frame_that_is_a_link(tmp_path: Path, outside: Path) -> None:
     key = "a" * 40
-    with Store(tmp_path / "work") as store:
+    with FrameStore(tmp_path / "work") as store:
         store.file(key).symlink_to(outside / f"{key}.png")
         put_frame({store.file(key): np.zeros((2, 3, 3), np.float32).view(Image).encode()})
         assert store.has(key, (3, 2))

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from lab.frontier.record import Errors, Frontier
+from lab.frontier.record import FrameErrors, Frontier
 from scenelang.cli import choosing
 from scenelang.compiler.compile import compile_scene
 from scenelang.drawing.small import load_of
@@ -22,7 +22,7 @@ from tests.output.test_frontier import frontier, point
 
 EXACT = replace(
     point("exact reference, 4 spp", 80, 0.0, backend="reference", model=None, renderer="reference"),
-    flip=Errors(0.0, 0.0, 0.0, 0.0),
+    flip=FrameErrors(0.0, 0.0, 0.0, 0.0),
 )
 
 

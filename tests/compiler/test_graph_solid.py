@@ -19,7 +19,7 @@ from scenelang.compiler.lifting import SOLID_LAYOUT, lift_many
 from scenelang.compiler.spaces import SPACES, Camera, Ground, Light, Stage, decoded
 from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.arrays import NUMPY
-from scenelang.drawing.exact.solid import Body
+from scenelang.drawing.exact.solid import ExactBody
 from scenelang.drawing.solid.passes import read_solid_frame
 from scenelang.language import words
 
@@ -164,7 +164,7 @@ def test_boxes_and_balls_hold_leaves(geometry: str, level: float) -> None:
         *centre, radius = SOLID.bound(geometry, leaf.steps, level)
         middle, half = (low + high) / 2, (high - low) / 2
         p = (middle + 1.5 * half * draw.uniform(-1, 1, (3000, 3))).T
-        near = Body(leaf, leaf.steps, 10.0).distance(p)[0] < level
+        near = ExactBody(leaf, leaf.steps, 10.0).distance(p)[0] < level
         hits += near.sum()
         assert (abs(p.T - middle) <= half)[near].all()
         assert (np.linalg.norm(p.T - centre, axis=1) <= radius)[near].all()

@@ -14,7 +14,7 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.passes import PASSES, check_eye
 from scenelang.compiler.rewrites import Context, drop_hidden, drop_unseen, flatten
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage
-from scenelang.drawing.exact.solid import Field, solid_image
+from scenelang.drawing.exact.solid import ExactField, solid_image
 from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.words import COMBINE
@@ -102,12 +102,12 @@ def test_random_trees_keep_their_picture() -> None:
         accepted += 1
         p = np.random.default_rng(seed).uniform(-1.3, 1.3, (3, 2500))
         p = p[:, p[1] >= first.window()[1]]
-        wanted = Field(first.root).at(p)
+        wanted = ExactField(first.root).at(p)
         covered += (wanted.d < 0).sum()
         shorter += len(others[-3].root.links) > len(others[-1].root.links)
         # each pass by itself, and their whole
         for graph in others if seed % 4 == 0 else others[-1:]:
-            found = Field(graph.root).at(p)
+            found = ExactField(graph.root).at(p)
             clear = abs(wanted.d) > 1e-9
             assert ((found.d < 0) == (wanted.d < 0))[clear].all()
             inside = clear & (wanted.d < -1e-9) & np.ones(p.shape[1], bool)
@@ -133,7 +133,7 @@ def test_eyes_inside_are_reported() -> None:
         for step in PASSES[: [step.run for step in PASSES].index(flatten) + 1]:
             graph = step.run(graph, context)
         eye = rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3)
-        found = Field(graph.root).at(np.reshape(eye, (3, 1)))
+        found = ExactField(graph.root).at(np.reshape(eye, (3, 1)))
         opaque = bool(found.d[0] < 0.0) and not np.atleast_1d(found.medium)[0]
         check_eye(replace(graph, stage=Stage(Camera(eye))), context)
         assert [d.code for d in context.diagnostics] == ["E0408"] * opaque

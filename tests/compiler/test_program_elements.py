@@ -26,7 +26,7 @@ from scenelang.compiler.rewrites import Context
 from scenelang.compiler.spaces import PLANE, SPACES, Camera, Ground, Light, Stage, read_stage, stage_data
 from scenelang.compiler.steps import Displace, Twist, Warp
 from scenelang.compiler.weights import load_codes
-from scenelang.drawing.exact.solid import Body
+from scenelang.drawing.exact.solid import ExactBody
 from scenelang.language.diagnostics import Diagnostics
 from tests.assets.scenes import changed
 from tests.assets.shapes import ball, element, noise, square, torus
@@ -205,7 +205,7 @@ def test_balls_hold_what_a_row_changes() -> None:
     *centre, radius = made.bounds[0].tolist()
     leaf = Leaf("torus", Look("diffuse"), tuple(map(Move, MIXED[0].steps)))
     p = np.random.default_rng(1).uniform(-4, 4, (3, 20000))
-    near = Body(leaf, leaf.steps, 9.0).distance(p)[0] < 0.6  # the k of the two blends
+    near = ExactBody(leaf, leaf.steps, 9.0).distance(p)[0] < 0.6  # the k of the two blends
     assert (np.linalg.norm(p.T - centre, axis=1) <= radius)[near].all()
     assert radius < 4
     around = np.linalg.norm(made.bounds[:3, :3], axis=1) + made.bounds[:3, 3]

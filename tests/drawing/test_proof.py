@@ -28,7 +28,7 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import RADIUS
-from scenelang.drawing.proof import PROVER, TAME, Errors, Written, layers_of, load_errors
+from scenelang.drawing.proof import PROVER, TAME, Errors, WrittenObject, layers_of, load_errors
 from scenelang.language.scene import Scene
 from tests.assets.scenes import IMPORT, good
 from tests.assets.shapes import element, square
@@ -363,7 +363,7 @@ def test_misplaced_bounds_what_is_lost() -> None:
             abs(float(Fraction(float(c)) - true)) for q in found for c, true in zip(q, exact, strict=True)
         )
         reach = float(np.hypot(*map(float, exact)))
-        bound = Written(Look("flat"), tuple(steps)).misplaced(reach, 2**0.5) - TAME
+        bound = WrittenObject(Look("flat"), tuple(steps)).misplaced(reach, 2**0.5) - TAME
         assert off <= bound
         tight.append(bound / (off + 1e-16 * reach))
     assert np.median(tight) < 1e5

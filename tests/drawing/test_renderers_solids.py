@@ -16,7 +16,7 @@ from scenelang.compiler.spaces import Camera, Light, Stage
 from scenelang.compiler.steps import Affine, Displace, Step, Twist
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.exact.field import combine, leaf_distance
-from scenelang.drawing.exact.solid import Field, solid_image
+from scenelang.drawing.exact.solid import ExactField, solid_image
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
@@ -429,14 +429,14 @@ def test_the_field_has_the_colours_of_the_reference(library: str, element) -> No
     objects[1] = MIXED[1]._replace(paint=Paint(element))
     solids = field(objects, torch_network() if library == "torch" else None)
     p = np.random.default_rng(2).uniform(-1, 1, (3, 4000)).astype(np.float32)
-    exact = Field(graph(objects)).at(p.astype(float))
+    exact = ExactField(graph(objects)).at(p.astype(float))
     like = solids.xp.array(p, solids.network.codes)
     with solids.xp.inference():
         if library == "numpy":
             found = everywhere(solids, like).register[:3]
         else:  # one object alone
             found = solids.xp.to_numpy(solids.worn(solids.xp.whole(like[0] * 0), like))
-            exact = Field(graph(objects[:1])).at(p.astype(float))
+            exact = ExactField(graph(objects[:1])).at(p.astype(float))
     inside = exact.d < -0.02
     assert inside.sum() > 100
     error = abs(found - exact.rgb)[:, inside]

@@ -12,7 +12,7 @@ from scenelang.compiler.graph import Fold
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage
 from scenelang.compiler.steps import Displace, Grow, Shell, Twist, Warp
 from scenelang.drawing.exact import solid
-from scenelang.drawing.exact.solid import Body, solid_image
+from scenelang.drawing.exact.solid import ExactBody, solid_image
 from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import flip
 from tests.drawing import solid_oracle
@@ -216,7 +216,7 @@ def test_gradients_are_differences_and_bounded_within_reach(geometry: str) -> No
             moved(*rng.uniform(-1, 1, 3).tolist()),
         ]
         steps = [Displace(0.1, 6.0), *(kinds[i] for i in rng.integers(0, 5, 5)), scaled(0.3)]
-        body = Body(leaf(geometry, "diffuse", GOLD), tuple(steps), 0.0)
+        body = ExactBody(leaf(geometry, "diffuse", GOLD), tuple(steps), 0.0)
         p = rng.uniform(-1, 1, (3, 1000))
         h = 1e-7
         differences = [(body.distance(p + h * e)[0] - body.distance(p - h * e)[0]) / (2 * h) for e in AXES]
@@ -231,7 +231,7 @@ def test_gradients_are_differences_and_bounded_within_reach(geometry: str) -> No
 def test_a_bound_holds_where_the_stretch_grows() -> None:
     """About the centre of a twirl; the map outside it makes the reach longer."""
     steps = (moved(0.5, 0.3, 0.2), Warp(12.0, (0.0, 0.0)), scaled(0.3))
-    body = Body(leaf("sphere", "diffuse", GOLD), steps, 0.0)
+    body = ExactBody(leaf("sphere", "diffuse", GOLD), steps, 0.0)
     way = np.random.default_rng(6).normal(size=(3, 1000))
     way *= body.reach / np.linalg.norm(way, axis=0)
     bound = body.distance(np.zeros((3, 1)))[1] * body.first.grows
@@ -247,7 +247,7 @@ def test_no_ray_passes_through_what_is_warped() -> None:
     x = (np.arange(40) + 0.5) / 20 - 1.0
     d = (3 * forward + x[None, :, None] * right - x[:, None, None] * up).reshape(-1, 3).T
     d /= np.linalg.norm(d, axis=0)
-    body = Body(ring, ring.steps, 0.0)
+    body = ExactBody(ring, ring.steps, 0.0)
     eye = np.array(stage.camera.eye)[:, None]
     least = np.min([body.distance(eye + t * d)[0] for t in np.arange(4.5, 7.8, 0.004)], axis=0)
     sure = abs(least) > 1e-3

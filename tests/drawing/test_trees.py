@@ -8,7 +8,7 @@ import pytest
 import scenelang as nsg
 from scenelang.compiler.spaces import Light, Stage
 from scenelang.drawing.closed import ClosedSolids
-from scenelang.drawing.exact.solid import Field, solid_image
+from scenelang.drawing.exact.solid import ExactField, solid_image
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.network import Wanted
 from tests.drawing.solids import (
@@ -61,7 +61,7 @@ def test_what_is_not_met_changes_nothing(library: str) -> None:
     seeds = 60 if library == "numpy" else 12
     for seed in range(seeds):
         tree, p = tree_of(seed, 2), around(seed, 3000)
-        exact = Field(tree_graph(tree)).at(p.astype(float))
+        exact = ExactField(tree_graph(tree)).at(p.astype(float))
         rgb, medium, owner = (np.broadcast_to(v, p.shape) for v in (exact.rgb, exact.medium, exact.owner))
         solids = tree_field(tree, CLOSED if library == "numpy" else TORCH)
         xp, like, (way, t) = solids.xp, solids.network.codes, rays(p)
@@ -180,7 +180,7 @@ HOLE = Tree((Join("union", ball(0, 0, 1.5)), Join("subtract", ball(0.8, 0, 0.2))
 def test_balls_hold_what_an_intersection_ends(tree: Tree) -> None:
     """Intersections in one another whose leaves lie apart; a rounded edge along a hole in a group."""
     p = around(8, 20000, 2.0)
-    exact = Field(tree_graph(tree)).at(p.astype(float)).d
+    exact = ExactField(tree_graph(tree)).at(p.astype(float)).d
     solids = tree_field(tree, CLOSED)
     way, t = rays(p)
     met, passes = solids.passes(EYE, way, t + 5)

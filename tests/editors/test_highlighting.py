@@ -20,7 +20,7 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 from scenelang.cli.main import COMMANDS
 from scenelang.editors import highlighting
 from scenelang.editors.highlighting import NsgLexer
-from scenelang.editors.workspace import Settings
+from scenelang.editors.workspace import ClientSettings
 from scenelang.language import words
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.formatting import format_text
@@ -233,8 +233,8 @@ def test_extensions_name_files_commands_and_settings_that_exist() -> None:
     # It passes the settings of the server.
     hints = {"values": False, "arguments": False}
     changed = {"model": "m", "root": "/r", "debounceMs": 7, "inlayHints": hints}
-    default, read = Settings.read({}), Settings.read({"scenelang": changed})
-    for name in Settings.__dataclass_fields__:
+    default, read = ClientSettings.read({}), ClientSettings.read({"scenelang": changed})
+    for name in ClientSettings.__dataclass_fields__:
         assert getattr(read, name) != getattr(default, name)
     for key in (*changed, *hints):
         assert re.search(rf"\b{key}:", client), key

@@ -14,7 +14,7 @@ import scenelang as nsg
 from scenelang.editors.context import cursor_at
 from scenelang.editors.workspace import Encoding, Lines, Workspace, difference
 from scenelang.language import expressions, tree
-from scenelang.language.builder import Place
+from scenelang.language.builder import Site
 from scenelang.language.definitions import Names
 from scenelang.language.diagnostics import Diagnostics, SourceFile, Span
 from scenelang.language.evaluation import Source
@@ -47,7 +47,7 @@ def test_names_mean_what_they_mean_to_the_evaluator(monkeypatch: pytest.MonkeyPa
     resolved: list[tuple[Span, Span]] = []
     original = expressions.value_of
 
-    def watched(name: tree.Name, binding: Binding, place: Place) -> object:
+    def watched(name: tree.Name, binding: Binding, place: Site) -> object:
         if binding.span is not None and "." not in name.text:
             resolved.append((name.span, binding.span))
         return original(name, binding, place)

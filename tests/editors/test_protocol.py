@@ -12,7 +12,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenelang.editors.workspace import MAX_TEXT, Settings
+from scenelang.editors.workspace import MAX_TEXT, ClientSettings
 from tests.editors.client import PATIENCE_S, Client, Json
 
 ASTRAL = '/* 𝄞 é */ let\ta = "𝄞𝄞"; let b = #d33; squar { }\n'
@@ -68,8 +68,8 @@ def test_positions_and_pauses_that_are_none_are_refused(client: Client) -> None:
             params = {"textDocument": {"uri": uri}, "position": place}
             assert "Invalid" in client.refused(f"textDocument/{method}", params)
     for pause in (1e300, 10**400, float("nan"), float("inf"), -1, 60_001, True, False, "7", None):
-        assert Settings.read({"debounceMs": pause}) == Settings(), pause
-    assert Settings.read({"debounceMs": 60_000}).debounce_ms == 60_000
+        assert ClientSettings.read({"debounceMs": pause}) == ClientSettings(), pause
+    assert ClientSettings.read({"debounceMs": 60_000}).debounce_ms == 60_000
 
 
 HELD = """

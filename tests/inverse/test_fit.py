@@ -19,8 +19,18 @@ from scenelang.drawing.image import Image, decoded, encoded
 from scenelang.drawing.metrics import psnr
 from scenelang.inverse import search
 from scenelang.inverse.fit import Fit, problems_of
-from scenelang.inverse.problem import Moment, Problem
-from scenelang.inverse.search import Axis, Blur, Found, Knob, SearchBox, Target, blurred, space_of, target_of
+from scenelang.inverse.problem import FitProblem, Moment
+from scenelang.inverse.search import (
+    Axis,
+    Blur,
+    Found,
+    Knob,
+    SearchBox,
+    TargetPicture,
+    blurred,
+    space_of,
+    target_of,
+)
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source, rewritten
 from scenelang.language.parser import parse
@@ -272,7 +282,7 @@ square { scale(0.5); translate(x, u); material flat { color(#000000); } }
 """
 
 
-def problem(targets: dict[int, np.ndarray]) -> Problem:
+def problem(targets: dict[int, np.ndarray]) -> FitProblem:
     """The last comparison with targets by frame."""
     source = Source(text=SourceFile("a.nsg", SLIDES)).parsed(Diagnostics())
     moments = [Moment(source, frame) for frame in targets]
@@ -339,8 +349,8 @@ square { scale(s); translate(x, 0); material flat { color(#000000); } }
 def test_covered_area_changes_as_the_square_does() -> None:
     """A square of radius s covers s² / 2 of the canvas, whose sides are 2; corners are cut a little."""
     moment, size = Moment(Source(text=SourceFile("a.nsg", GROWS)).parsed(Diagnostics())), 0.2 + 0.52 * 0.6
-    white, space = Target(np.ones((32, 32, 3)), np.ones((32, 32))), space_of(moment.evaluated({})[0])
-    drawn = Problem([moment], space, [white], (32, 32), soft=True, samples="four")
+    white, space = TargetPicture(np.ones((32, 32, 3)), np.ones((32, 32))), space_of(moment.evaluated({})[0])
+    drawn = FitProblem([moment], space, [white], (32, 32), soft=True, samples="four")
     low, high = (drawn.pictures(np.array([0.43, 0.52 + step])) for step in (-0.02, 0.02))
     assert low is not None
     assert high is not None

@@ -9,8 +9,8 @@ import torch
 from scenelang.compiler.program import Program
 from scenelang.drawing.neural.draw import draw_objects
 from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
-from scenelang.inverse.problem import Moment, Problem
-from scenelang.inverse.search import Point, Target, over, space_of
+from scenelang.inverse.problem import FitProblem, Moment
+from scenelang.inverse.search import Point, TargetPicture, over, space_of
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source
 
@@ -40,19 +40,19 @@ SCENES = {
 }
 
 
-def problem(text: str, frames: int = 1) -> Problem:
+def problem(text: str, frames: int = 1) -> FitProblem:
     source = Moment(Source(text=SourceFile("a.nsg", text)).parsed(Diagnostics()))
     rng = np.random.default_rng(3)
-    target = Target(rng.random((40, 48, 3)), rng.random((40, 48)), (0.2, 0.9, 0.4))
+    target = TargetPicture(rng.random((40, 48, 3)), rng.random((40, 48)), (0.2, 0.9, 0.4))
     space = space_of(source.evaluated({})[0])
-    return Problem([source] * frames, space, [target] * frames, (48, 40), soft=True)
+    return FitProblem([source] * frames, space, [target] * frames, (48, 40), soft=True)
 
 
-def here(drawn: Problem) -> Point:
+def here(drawn: FitProblem) -> Point:
     return drawn.space.point({})
 
 
-def residuals_change(drawn: Problem, twice: Problem) -> None:
+def residuals_change(drawn: FitProblem, twice: FitProblem) -> None:
     """As slopes say: from params on, through evaluation, compilation and the levels of the pyramid.
 
     A decoder has kinks closer to each other than the ends of these differences.

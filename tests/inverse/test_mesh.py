@@ -20,7 +20,7 @@ import scenelang as nsg
 from scenelang.assets.colours import unpacked
 from scenelang.assets.element_file import element_file_bytes, load_element_file
 from scenelang.assets.picture import texels
-from scenelang.drawing.exact.mesh import FitError, Look, Mesh, mesh_of, read_solids, white, whole
+from scenelang.drawing.exact.mesh import FitError, Mesh, Tints, mesh_of, read_solids, white, whole
 from scenelang.drawing.exact.originals import FOLDER
 from scenelang.drawing.exact.outline import read_outline, read_picture
 from scenelang.drawing.exact.picture import reference_image
@@ -146,7 +146,7 @@ def test_textures_are_repeated_and_multiplied() -> None:
     tint = np.full((1, 3, 3), 0.5, np.float32)
     for u, v, linear in ((0.3, 0.6, False), (0.01, 0.99, True), (1.7, -0.4, False), (-1.2, 2.9, True)):
         corners = np.tile(np.array((u, v), np.float32), (1, 3, 1))
-        look = Look(tint, np.array([linear]), corners, np.zeros(1, np.int32), (PICTURE,))
+        look = Tints(tint, np.array([linear]), corners, np.zeros(1, np.int32), (PICTURE,))
         expected = by_hand(PICTURE, u, v)
         expected = encoded(0.5 * decoded(expected)) if linear else 0.5 * expected
         assert look.at(ONE, np.full((1, 3), 1 / 3))[0] == pytest.approx(expected, abs=1e-5)
@@ -201,7 +201,7 @@ def striped(subdivisions: int = 4) -> Mesh:
     corner = np.stack([red, 1 - red, 0.2 + 0 * red], 1).astype(np.float32)
     faces = np.asarray(ball.faces, np.int64)
     look = white(len(faces))
-    look = Look(corner[faces], look.linear, look.uv, look.image)
+    look = Tints(corner[faces], look.linear, look.uv, look.image)
     return mesh_of(np.asarray(ball.vertices, float), faces, look=look)
 
 

@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 from lab.docs.claims.common import GIVEN
-from lab.docs.figures import Figure, Word, filled, uncovered
+from lab.docs.figures import Figure, Phrase, filled, uncovered
 from lab.docs.make_claims import claimed
 
 PAGES = {"architecture", "drawing", "elements", "index", "measurements", "README", "viewer"}
@@ -75,6 +75,6 @@ def test_a_changed_record_is_written_into_the_page() -> None:
     """Its figures, and not the words between them or where lines break."""
     text = "It takes 12\nms and 1,000 s (`run -o a`), 3 of 5."
     claim = (
-        f"takes {Figure(7.25):.1f} ms and {Figure(12345):,.0f} s (`{Word('run -o b')}`), {Figure(-1)} of 5"
+        f"takes {Figure(7.25):.1f} ms and {Figure(12345):,.0f} s (`{Phrase('run -o b')}`), {Figure(-1)} of 5"
     )
     assert filled(text, [claim]) == "It takes 7.2\nms and 12,345 s (`run -o b`), -1 of 5."

@@ -11,7 +11,7 @@ import torch
 
 import scenelang as nsg
 from lab.designs.long import LongConfig, LongPhase, LongTraining, export_long, trained_model
-from lab.designs.pictures import PictureConfig, Scenes, exact_vectors, pictures, random_scenes
+from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, pictures, random_scenes
 from lab.designs.students import LiftingConfig, StreamingStudent, StudentConfig, make_student
 from lab.designs.windows import draw, grid, maps, prefixes, windows
 from lab.sets.scenes import draw_scene
@@ -102,7 +102,7 @@ def test_weights_draw_scenes_as_they_were_trained_to(tmp_path: Path) -> None:
     program, picture = draw_scene(model, nsg.Scene(canvas=(8, 8), nodes=(side,)))
     assert len(program) == 1
     affine = torch.tensor([[0.4, 0, 0, 0.2], [0, 0.3, 0, -0.1], [0, 0, 1, 0], [0, 0, 0, 1]])
-    scenes = Scenes(
+    scenes = SceneBatch(
         leaf=torch.tensor([[GEOMETRIES.index("star")]]),
         twirl=torch.zeros(1, 1),
         bend=torch.zeros(1, 1),
@@ -119,11 +119,11 @@ def test_weights_draw_scenes_as_they_were_trained_to(tmp_path: Path) -> None:
 WORDS = ("union", "smooth", "subtract", "intersect")
 
 
-def some(count: int) -> Scenes:
+def some(count: int) -> SceneBatch:
     return random_scenes(count, PictureConfig(), torch.Generator().manual_seed(11))
 
 
-def as_scene(scenes: Scenes, index: int, side: int) -> Scene:
+def as_scene(scenes: SceneBatch, index: int, side: int) -> Scene:
     """One of them as a Scene."""
     links = []
     for i in range(int(scenes.count[index])):
@@ -160,12 +160,12 @@ def test_padding_does_not_show(renderer: str) -> None:
     torch.manual_seed(4)
     student = make_student(config("learned", renderer=renderer).student)
     scenes, other = some(6), random_scenes(6, PictureConfig(), torch.Generator().manual_seed(12))
-    mixed = Scenes(
+    mixed = SceneBatch(
         *(
             torch.where(scenes.used.view(*scenes.used.shape, *(1,) * (a.dim() - 2)), a, b)
             if a.dim() > 1
             else a
-            for a, b in ((getattr(scenes, k), getattr(other, k)) for k in Scenes.__slots__)
+            for a, b in ((getattr(scenes, k), getattr(other, k)) for k in SceneBatch.__slots__)
         )
     )
     with torch.no_grad():

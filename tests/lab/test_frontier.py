@@ -19,9 +19,9 @@ import scenelang as nsg
 from lab.charts import pyplot
 from lab.frontier import measure, verify, ways
 from lab.frontier.chart import frontier_chart, frontier_figure, short_name
-from lab.frontier.measure import Case, median_interval
+from lab.frontier.measure import PromisedScenes, median_interval
 from lab.frontier.page import frontier_page
-from lab.frontier.record import Errors, Frontier, between
+from lab.frontier.record import FrameErrors, Frontier, between
 from scenelang.compiler.manifest import available
 from scenelang.drawing.image import Image, from_samples
 from scenelang.output.frontier import frontier_path
@@ -40,7 +40,7 @@ def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Frontier:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(ways, "_paper", lambda base: iter(()))
     monkeypatch.setattr(ways, "available", lambda: ["shapes2d"])
-    monkeypatch.setattr(measure, "CASES", (measure.CASES[0], Case("32 x 32", "", (32, 32), 0.5)))
+    monkeypatch.setattr(measure, "CASES", (measure.CASES[0], PromisedScenes("32 x 32", "", (32, 32), 0.5)))
     monkeypatch.setattr(measure, "CONVERGED", 1)
     result = run("frontier", "shapes2d", "-o", "out", "--scenes", "2", "--seed", "5")
     assert result.exit_code == 0, result.output
@@ -116,10 +116,10 @@ def test_frontier_refuses(shipped: Folder) -> None:
 
 def test_verify_counts_kept_promises(shipped: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     """A promise of little is kept in all scenes, one of nothing in none."""
-    monkeypatch.setattr(verify, "CASES", (Case("small", "", (64, 64), 1.0),))
+    monkeypatch.setattr(verify, "CASES", (PromisedScenes("small", "", (64, 64), 1.0),))
     good = ladder()
     points = [p for p in good.points if p.name in ("shapes2d", "exact reference, 4 spp")]
-    for errors, held in ((Errors(0.5, 0.5, 0.5, 0.5), True), (Errors(1e-9, 0, 0, 0), False)):
+    for errors, held in ((FrameErrors(0.5, 0.5, 0.5, 0.5), True), (FrameErrors(1e-9, 0, 0, 0), False)):
         promises = replace(good, points=tuple(replace(p, flip=errors) for p in points))
         Path("promises.json").write_text(promises.to_json(), "utf-8")
         result = run("frontier", "shapes2d", "--verify", "--promises", "promises.json", "--scenes", "2")

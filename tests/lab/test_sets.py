@@ -16,7 +16,7 @@ from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.sets.scenes import coverage, interval, scenes_of, sets_of, spread
 from lab.sets.solids import SOLID_SETS
 from lab.shadows import shadow_mask
-from lab.symmetric import Decoder, Floats, hiding, placed
+from lab.symmetric import Floats, SymmetricDecoder, hiding, placed
 from scenelang.compiler import spaces
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
@@ -85,7 +85,11 @@ def test_two_decoders_hide_a_third() -> None:
     rng, p = np.random.default_rng(2), points(500)
     a, b, third = (
         decoder.numbers(decoder.start(rng))
-        for decoder in (Decoder(4, ("g", "g1")), Decoder(3, ("gg", "ge")), Decoder(6, ("v", "e1")))
+        for decoder in (
+            SymmetricDecoder(4, ("g", "g1")),
+            SymmetricDecoder(3, ("gg", "ge")),
+            SymmetricDecoder(6, ("v", "e1")),
+        )
     )
     one, two = hiding(a, b, third, 32)
     assert answered(one, p) == pytest.approx(answered(a, p))

@@ -15,7 +15,7 @@ from lab.training.checkpoint import load_tensors
 from lab.training.config import Phase, SolidsConfig, TrainConfig
 from lab.training.leaves import half_rays
 from lab.training.loop import train
-from lab.training.norms import Start, fitted
+from lab.training.norms import NormStart, fitted
 from lab.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
 from lab.training.solids import fit_cell, fit_segments, train_solids
 from scenelang.compiler.geometries import GEOMETRIES as GEOMETRY
@@ -140,7 +140,7 @@ TINY = SolidsConfig("solids3d", 3, 4, 4, NORMS)
 
 def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
-    monkeypatch.setattr("lab.training.solids.fitted", lambda leaf, seed: (Start(leaf, seed), 1.0))
+    monkeypatch.setattr("lab.training.solids.fitted", lambda leaf, seed: (NormStart(leaf, seed), 1.0))
     assert not train_solids(TINY, tmp_path / "two", budget_s=1e-9)
     while not train_solids(TINY, tmp_path / "two", budget_s=1e-3, report=lambda *a: told.append(a[:2])):
         pass

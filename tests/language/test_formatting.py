@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scenelang.language.diagnostics import SourceFile, Span
-from scenelang.language.formatting import Layout, format_range, format_text
+from scenelang.language.formatting import FileLayout, format_range, format_text
 from scenelang.language.lexer import Report, scan
 from scenelang.language.reports import SceneError
 from scenelang.language.tables import tables
@@ -73,7 +73,7 @@ def test_golden(before: str, after: str) -> None:
 
 def test_every_rule_is_laid_out() -> None:
     names = {name for _, _, name in tables().rules if name and not name.startswith("bad_")}
-    assert not [name for name in names if not callable(getattr(Layout, name, None))]
+    assert not [name for name in names if not callable(getattr(FileLayout, name, None))]
 
 
 def test_line_ends_and_byte_order_mark_stay() -> None:

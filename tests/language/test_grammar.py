@@ -13,7 +13,7 @@ from lark import Lark
 from scenelang.language import generate as maker
 from scenelang.language import tables
 from scenelang.language.generate import generate
-from scenelang.language.parser import PLAIN, Builder
+from scenelang.language.parser import PLAIN, TreeBuilder
 
 GRAMMAR = tables.grammar_path().read_text(encoding="utf-8")
 
@@ -76,4 +76,6 @@ def test_grammar_has_no_conflicts(caplog: pytest.LogCaptureFixture) -> None:
 
 def test_every_rule_has_a_callback() -> None:
     names = {name for _, _, name in tables.tables().rules if name}
-    assert not [name for name in names if name not in PLAIN and not callable(getattr(Builder, name, None))]
+    assert not [
+        name for name in names if name not in PLAIN and not callable(getattr(TreeBuilder, name, None))
+    ]

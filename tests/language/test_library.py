@@ -14,7 +14,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.exact.solid import Field as Solid
+from scenelang.drawing.exact.solid import ExactField as Solid
 from scenelang.drawing.render import exact_graph
 from scenelang.language import library
 from scenelang.language.diagnostics import SourceFile, apply_fixes

@@ -135,7 +135,7 @@ def test_trees_made_by_hand_can_be_too_deep() -> None:
     """Text is cut off by the parser; a tree from elsewhere meets a limit of its own."""
     source = SourceFile("made.nsg", "")
     span = Span(source, 0, 0)
-    expr: nodes.Expr = nodes.Number(span, 1.0, "")
+    expr: nodes.Expr = nodes.NumberLiteral(span, 1.0, "")
     for _ in range(5000):
         expr = nodes.Unary(span, "-", expr)
     file = nodes.File(span, (nodes.Let(span, nodes.Name(span, "a"), expr),))

@@ -30,15 +30,15 @@ def test_numbers() -> None:
         ("2s", 2, "s", True),
     ):
         number = expression(text)
-        assert isinstance(number, nodes.Number)
+        assert isinstance(number, nodes.NumberLiteral)
         assert [number.value, number.unit, number.is_integer] == meant
         assert number.span.text == text
 
 
 def test_colours() -> None:
     short, long = expression("#d3f"), expression("#DD33ff")
-    assert isinstance(short, nodes.Color)
-    assert isinstance(long, nodes.Color)
+    assert isinstance(short, nodes.ColorLiteral)
+    assert isinstance(long, nodes.ColorLiteral)
     assert short.rgb == long.rgb == (0xDD / 255, 0x33 / 255, 1.0)
 
 
@@ -50,7 +50,20 @@ def test_statements() -> None:
     mist; mist { hue(1turn); } material flat; material lib.red { }"""
     kinds = [type(statement).__name__ for statement in read_well(text).statements]
     assert kinds == (
-        ["Version", "Model", "Call", "Param", "Param", "Let", "Fn", "Fn", "Module", "Import", "For", "If"]
+        [
+            "Version",
+            "ModelStatement",
+            "Call",
+            "Param",
+            "Param",
+            "Let",
+            "Fn",
+            "Fn",
+            "Module",
+            "Import",
+            "For",
+            "If",
+        ]
         + ["Node"] * 6
         + ["Call", "Call", "MaterialUse", "MaterialUse"]
     )

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import scenelang as nsg
 from lab.frontier.fit import fit_cost
 from lab.frontier.measure import FEW_MARGIN, MARGIN, margin, promised
-from lab.frontier.record import Errors, Frontier, Point, Quality, Times, between, front
+from lab.frontier.record import FrameErrors, Frontier, Point, Quality, Times, between, front
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.image import enlarged, from_samples
@@ -51,7 +51,7 @@ def point(name: str, ms: float, flip: float | None, **more: object) -> Point:
         scenes=10,
         ms=Times(float(ms), 1.2 * ms),
         ratio_to_streaming=1000 / ms,
-        flip=None if flip is None else Errors(flip, flip / 2, 0.9 * flip, 1.1 * flip),
+        flip=None if flip is None else FrameErrors(flip, flip / 2, 0.9 * flip, 1.1 * flip),
         psnr=None if flip is None else Quality(40.0, 35.0, 30.0),
         cost=Cost(float(ms), 0.0, 0.0, 0.0, 0.0, 1.0),
         parameters=100,

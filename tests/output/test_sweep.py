@@ -17,7 +17,15 @@ import scenelang as nsg
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, ParamError, Source, param_named
 from scenelang.output.animate import Progress
-from scenelang.output.sweep import MOST_SIDE, Line, TableError, render_many, rows_of, values_of, write_sheet
+from scenelang.output.sweep import (
+    MOST_SIDE,
+    TableError,
+    TableRow,
+    render_many,
+    rows_of,
+    values_of,
+    write_sheet,
+)
 
 TEXT = """\
 canvas(24, 16);
@@ -172,7 +180,7 @@ def test_a_contact_sheet(scene: Path, tmp_path: Path) -> None:
         )
     assert made.errors == 0
     Image.new("RGB", (90, 30), "red").save(tmp_path / "p.png")
-    lines = [Line("p.png", ("1",), "digest"), Line("", ("2",), "", "E0309: …")] * 3000
+    lines = [TableRow("p.png", ("1",), "digest"), TableRow("", ("2",), "", "E0309: …")] * 3000
     shown = write_sheet(tmp_path / "sheet.png", tmp_path, ("k",), lines)
     with Image.open(tmp_path / "sheet.png") as sheet:
         assert max(sheet.size) <= MOST_SIDE

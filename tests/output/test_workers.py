@@ -30,7 +30,7 @@ from scenelang.inverse.sandbox import LIBRARIES
 from scenelang.output import painting as ours
 from scenelang.output import workers
 from scenelang.output.animate import Progress
-from scenelang.output.workers import GivenUp, Link, by_workers
+from scenelang.output.workers import Connection, GivenUp, by_workers
 from tests.output.scenes import DARK, HEAD
 
 
@@ -198,7 +198,7 @@ def test_workers_that_would_give_something_else(address: str, monkeypatch: pytes
             workers, "differences", lambda a, b, what=what: compare({**a, what: "another"}, b)
         )
         with pytest.raises(RenderError, match=rf"worker tcp\S+ has {what} \S+, where another is here"):
-            Link(address, others)
+            Connection(address, others)
     here = workers.fingerprint()
     assert here.keys().isdisjoint(others)
     assert workers.fingerprint(others)["no-such-library"] == "none"
@@ -209,7 +209,7 @@ def test_workers_that_would_give_something_else(address: str, monkeypatch: pytes
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "WAIT_S", 0.5)
     with pytest.raises(RenderError, match=r"no scheduler with workers at `tcp://127\.0\.0\.1:9`"):
-        Link("tcp://127.0.0.1:9")
+        Connection("tcp://127.0.0.1:9")
 
 
 def test_each_item_has_a_result_or_an_error_of_its_own(address: str) -> None:
@@ -287,7 +287,7 @@ def test_only_who_has_the_certificate_draws(tmp_path: Path, monkeypatch: pytest.
         strange = {name.removeprefix("DASK_").lower().replace("__", "."): at for name, at in others.items()}
         for where, config in ((address, {}), (plain, {}), (address, strange)):
             with dask.config.set(config), pytest.raises(nsg.RenderError) as caught:
-                Link(where)
+                Connection(where)
             assert str(caught.value).startswith(f"no scheduler with workers at `{where}`: ")
             assert "\n" not in str(caught.value)
 
@@ -326,7 +326,7 @@ def test_the_file_is_the_one_without_workers(
         ["star", "tent", "ball"],
     )
     whole = Path("two.safetensors").read_bytes()
-    monkeypatch.setattr(Link, "send", None)
+    monkeypatch.setattr(Connection, "send", None)
     heard.clear()
     nsg.learn(FILES, "two.safetensors", steps=2, cluster=address, say=heard.append)
     assert heard == [f"{name}: made before of this file" for name in ("ball", "star", "tent")]

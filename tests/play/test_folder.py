@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenelang.web.folder import MOST_DAYS, MOST_KEPT, Changed, Folder, Journal, Refused, fits, state_folder
+from scenelang.web.folder import MOST_DAYS, MOST_KEPT, Changed, Denied, Folder, Journal, fits, state_folder
 
 ESCAPES = [
     *("../out.nsg", "a/../../out.nsg", "..", ".", "", "/etc/passwd", "/tmp/out.nsg", "a//b.nsg", "/", "a/"),
@@ -34,12 +34,12 @@ def folder(tmp_path: Path) -> Folder:
 
 def test_names_that_lead_elsewhere(folder: Folder) -> None:
     for name in ESCAPES:
-        with pytest.raises(Refused):
+        with pytest.raises(Denied):
             folder.read(name)
-        with pytest.raises(Refused):
+        with pytest.raises(Denied):
             folder.write(name, "x", None)
         for names in (("a.nsg", name), (name, "b.nsg")):
-            with pytest.raises(Refused):
+            with pytest.raises(Denied):
                 folder.rename(*names)
     assert (folder.path.parent / "out.nsg").read_text() == "outside"
     assert [path.name for path in folder.path.iterdir()] == ["a.nsg"]
@@ -67,12 +67,12 @@ def test_links_are_not_written_through(folder: Folder, kind: str) -> None:
     if kind == "inside":
         assert folder.read(name)[0] == "square;"
     else:
-        with pytest.raises(Refused):
+        with pytest.raises(Denied):
             folder.read(name)
     for base in (None, folder.read("a.nsg")[1]):
-        with pytest.raises(Refused):
+        with pytest.raises(Denied):
             folder.write(name, "x", base)
-    with pytest.raises(Refused):
+    with pytest.raises(Denied):
         folder.rename("a.nsg", name)
     assert (outside / "out.nsg").read_text() == "outside"
     assert not (outside / "new.nsg").exists()
@@ -108,18 +108,18 @@ def test_what_is_not_a_scene_is_neither_read_nor_written(folder: Folder) -> None
     (folder.path / "binary.nsg").write_bytes(b"\xff")
     (folder.path / "large.nsg").write_bytes(b"x" * 10_000_001)
     for name in ("pipe.nsg", "binary.nsg", "large.nsg"):
-        with pytest.raises(Refused):
+        with pytest.raises(Denied):
             folder.read(name)
-    with pytest.raises(Refused):
+    with pytest.raises(Denied):
         folder.write("big.nsg", "x" * 10_000_001, None)
     assert not (folder.path / "big.nsg").exists()
 
 
 def test_renaming_takes_no_other_name(folder: Folder) -> None:
     folder.write("b.nsg", "b", None)
-    with pytest.raises(Refused):
+    with pytest.raises(Denied):
         folder.rename("a.nsg", "b.nsg")
-    with pytest.raises(Refused):
+    with pytest.raises(Denied):
         folder.rename("none.nsg", "c.nsg")
     folder.rename("a.nsg", "deep/c.nsg")
     assert folder.names() == ["b.nsg", "deep/c.nsg"]

@@ -30,7 +30,7 @@ from scenelang.language.scene import Camera
 from scenelang.language.values import POISON, Angle, RangeValue, Time, Vec
 from scenelang.language.words import FUNCTIONS
 from scenelang.web.arrays import rows_of, worn_of
-from scenelang.web.form import PageProgram, Scope, Writer, form_of
+from scenelang.web.form import PageProgram, PageScope, Writer, form_of
 from tests.assets.scenes import IMPORT
 from tests.compiler.random_scenes import blob_scene, full_scene
 from tests.language.test_elements import garage
@@ -390,7 +390,7 @@ def evaluated(text: str) -> tuple[Any, Any] | None:
     evaluation.run(0)
     context, stmt = evaluation.context, tree.statements[0]
     assert isinstance(stmt, nodes.Let)
-    form = Writer(context, MODEL, ()).expression(stmt.value, Scope())
+    form = Writer(context, MODEL, ()).expression(stmt.value, PageScope())
     return context.env[context.scope.names["v"].slot], form
 
 

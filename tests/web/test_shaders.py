@@ -29,7 +29,7 @@ from scenelang.drawing.neural.network import RADIUS
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted
-from scenelang.web.arrays import Store, script, shapes_of
+from scenelang.web.arrays import ArrayStore, script, shapes_of
 from scenelang.web.export import view_of
 from scenelang.web.plane import leaves
 from tests.assets.shapes import ball, element, noise, square, torus
@@ -264,7 +264,7 @@ def test_pyramids_unfold_as_elements_do(page: Any) -> None:
         element(ball, levels=3, finer=True),
     ]
     for shape in elements:
-        store = Store()
+        store = ArrayStore()
         shapes = shapes_of([shape], store)
         blob = base64.b64encode(zlib.compress(store.bytes())).decode()
         ask = "async (text) => Array.from(distances((await readView(JSON.parse(text))).shapes[0]))"

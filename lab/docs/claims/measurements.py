@@ -1,7 +1,7 @@
 """Figures in docs/measurements.md."""
 
 from lab.docs import paper
-from lab.docs.figures import Figure, Word, at, kilobytes, numbers, read
+from lab.docs.figures import Figure, Phrase, at, kilobytes, numbers, read
 from lab.docs.make_results import SOLIDS, WHAT
 
 PLANE = list(WHAT)
@@ -40,14 +40,14 @@ def most(names: list[str]) -> Figure:
     return max(at(name, "flip/mean") for name in names)
 
 
-def factor(base: str, slow: str, fast: str) -> Word:
+def factor(base: str, slow: str, fast: str) -> Phrase:
     """Ratio of two ways' times, with its interval where that was measured."""
     name = f"models/{base}/frontier"
     for ratio in read(name).get("ratios", ()):
         if (ratio["slow"], ratio["fast"]) == (slow, fast):
-            return Word(f"{ratio['mean']:.2f} ± {ratio['interval']:.2f}")
+            return Phrase(f"{ratio['mean']:.2f} ± {ratio['interval']:.2f}")
     times = [float(at(name, "points/ms/median", name=way)) for way in (slow, fast)]
-    return Word(f"{times[0] / times[1]:.2f}")
+    return Phrase(f"{times[0] / times[1]:.2f}")
 
 
 def probe(name: str, value: float, key: str = "psnr/mean", record: str = STABLE) -> Figure:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from scenelang.cli.inputs import Input
-    from scenelang.cli.options import Film
+    from scenelang.cli.options import FilmOptions
     from scenelang.drawing.image import Image, Output
     from scenelang.output.frames import Target
 
@@ -70,7 +70,7 @@ def command(
     files: tuple[str, ...],
     out: str,
     request: options.Request,
-    film: options.Film,
+    film: options.FilmOptions,
     how: How,
     outputs: tuple[Output, ...],
     prove: bool,
@@ -236,7 +236,7 @@ def _shape(
         click.echo(f"{job.name} -> {path}{lines}\n{clock.report()}", err=True)
 
 
-def _moves(job: Input, target: Target, film: Film, out: str) -> bool:
+def _moves(job: Input, target: Target, film: FilmOptions, out: str) -> bool:
     """True where a scene is drawn as an animation, or has errors; refuses ``out`` that holds no picture."""
     from scenelang.output.frames import PICTURES
 
@@ -255,7 +255,13 @@ def _moves(job: Input, target: Target, film: Film, out: str) -> bool:
 
 
 def _animate(
-    job: Input, target: Target, film: Film, out: str, outputs: tuple[Output, ...], strict: bool, verbose: bool
+    job: Input,
+    target: Target,
+    film: FilmOptions,
+    out: str,
+    outputs: tuple[Output, ...],
+    strict: bool,
+    verbose: bool,
 ) -> None:
     """Draw an animation and report what was written; ``out`` is the target as the user wrote it."""
     from rich.filesize import decimal

@@ -65,7 +65,7 @@ def command(
     out: str,
     request: options.Request,
     how: How,
-    film: options.Film,
+    film: options.FilmOptions,
     verbose: bool,
     **given: Any,  # arguments of `render_many` by their names
 ) -> None:

@@ -39,7 +39,7 @@ def command(
     file: Path,
     out: str | None,
     request: options.Request,
-    film: options.Film,
+    film: options.FilmOptions,
     how: How,
     show: Literal["auto", "never", "always"],
 ) -> None:

@@ -30,7 +30,7 @@ Rows = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Tints:
     """The colours of F triangles."""
 
     tint: npt.NDArray[np.float32]  # (F, 3, 3), at corners; of a texture what multiplies it
@@ -39,9 +39,9 @@ class Look:
     image: npt.NDArray[np.int32]  # (F,) which texture, -1 for none
     images: tuple[npt.NDArray[np.uint8], ...] = ()  # textures (h, w, 3), 0 to 255
 
-    def of(self, chosen: Rows) -> Look:
+    def of(self, chosen: Rows) -> Tints:
         """The look of some of the triangles."""
-        return Look(self.tint[chosen], self.linear[chosen], self.uv[chosen], self.image[chosen], self.images)
+        return Tints(self.tint[chosen], self.linear[chosen], self.uv[chosen], self.image[chosen], self.images)
 
     def at(self, triangles: Rows, share: Points) -> Points:
         """Colours (M, 3) of sRGB, 0 to 1, at points of triangles (M,), by barycentric shares (M, 3)."""
@@ -76,7 +76,7 @@ def _looked_up(image: npt.NDArray[np.uint8], uv: Points) -> Points:
     return np.stack(result, 1) / 255
 
 
-def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Look | None:
+def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]]) -> Tints | None:
     """Colours of a mesh as trimesh reads it, None where its file has none; ``textures`` were read before."""
     visual, faces = mesh.visual, np.asarray(mesh.faces)
     tint = np.ones((len(faces), 3, 3), np.float32)
@@ -101,7 +101,7 @@ def look_of(mesh: Any, linear: bool, textures: dict[int, npt.NDArray[np.uint8]])
     else:
         return None
     image = np.full(len(faces), len(images) - 1, np.int32)
-    return Look(tint, np.full(len(faces), linear), uv, image, images)
+    return Tints(tint, np.full(len(faces), linear), uv, image, images)
 
 
 def _shares(colour: Rows) -> Rows:
@@ -118,19 +118,19 @@ def _texture(image: Any) -> npt.NDArray[np.uint8]:
     return np.asarray(picture)
 
 
-def white(count: int) -> Look:
+def white(count: int) -> Tints:
     """The look of triangles of which nothing is said."""
     tint, uv = np.ones((count, 3, 3), np.float32), np.zeros((count, 3, 2), np.float32)
-    return Look(tint, np.zeros(count, bool), uv, np.full(count, -1, np.int32))
+    return Tints(tint, np.zeros(count, bool), uv, np.full(count, -1, np.int32))
 
 
-def joined(looks: Sequence[Look]) -> Look:
+def joined(looks: Sequence[Tints]) -> Tints:
     """The look of the triangles of all, in order."""
     shift = np.cumsum([0, *(len(look.images) for look in looks)])
     image = [np.where(a.image >= 0, a.image + s, -1) for a, s in zip(looks, shift, strict=False)]
     tint, linear, uv = (np.concatenate([getattr(a, n) for a in looks]) for n in ("tint", "linear", "uv"))
     images = tuple(image for look in looks for image in look.images)
-    return Look(tint, linear, uv, np.concatenate(image).astype(np.int32), images)
+    return Tints(tint, linear, uv, np.concatenate(image).astype(np.int32), images)
 
 
 Sign = Literal["auto", "winding", "closed"]
@@ -177,7 +177,7 @@ class Mesh:
     centre: tuple[float, float, float]  # of the ball in the file's own coordinates
     size: float
     notes: tuple[str, ...] = ()  # what was found and mended
-    look: Look | None = None  # the colours of its triangles, where they have any
+    look: Tints | None = None  # the colours of its triangles, where they have any
     dimension: ClassVar[int] = 3
 
     @cached_property
@@ -285,7 +285,7 @@ def needed(name: str) -> Iterator[None]:
 
 
 def mesh_of(
-    vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto", look: Look | None = None
+    vertices: Points, triangles: npt.NDArray[np.int64], sign: Sign = "auto", look: Tints | None = None
 ) -> Mesh:
     """The solid that triangles enclose, and what it looks like; raises `FitError`.
 
@@ -358,16 +358,16 @@ _UNDERSTOOD: Final = re.compile("KHR_(materials|lights|node|xmp)|EXT_texture_web
 _IGNORED: Final = ("animations", "cameras", "skins")
 
 
-class Solid(NamedTuple):
+class NamedMesh(NamedTuple):
     """A named mesh of a file."""
 
     name: str
     vertices: Points  # (V, 3), where they lie in the whole
     triangles: npt.NDArray[np.int64]  # (F, 3) indices
-    look: Look | None = None  # None where the file says nothing of it
+    look: Tints | None = None  # None where the file says nothing of it
 
 
-def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
+def whole(solids: Sequence[NamedMesh], sign: Sign = "auto") -> Mesh:
     """All solids as one mesh; as `mesh_of`."""
     if not solids:
         raise FitError("it holds no triangles")
@@ -377,7 +377,7 @@ def whole(solids: Sequence[Solid], sign: Sign = "auto") -> Mesh:
 
 def read_solids(
     data: bytes, suffix: str, files: Mapping[str, bytes] | None = None
-) -> tuple[list[Solid], list[str]]:
+) -> tuple[list[NamedMesh], list[str]]:
     """The solids in the bytes of a file with a suffix of `MOST_OF_MESH`, and what there is to say of it;
     without ``files``, materials and textures by name, looks are not read. Raises `FitError`.
     """
@@ -452,9 +452,9 @@ def _beside(files: Mapping[str, bytes] | None) -> Any:
     return Beside({})
 
 
-def _solids(scene: Any, suffix: str, looks: bool) -> list[Solid]:
+def _solids(scene: Any, suffix: str, looks: bool) -> list[NamedMesh]:
     """The solids of a scene, those of one name joined, in the order of the file."""
-    named: dict[str, list[Solid]] = {}
+    named: dict[str, list[NamedMesh]] = {}
     textures: dict[int, npt.NDArray[np.uint8]] = {}
     count = 0
     for node in reversed(scene.graph.nodes_geometry):
@@ -473,14 +473,14 @@ def _solids(scene: Any, suffix: str, looks: bool) -> list[Solid]:
             name = str(scene.graph.transforms.parents[node])
         elif suffix == ".obj" and mesh.visual.kind == "texture":
             name = name.removesuffix(f"_{mesh.visual.material.name}")
-        named.setdefault(name, []).append(Solid(name, vertices, triangles, look))
+        named.setdefault(name, []).append(NamedMesh(name, vertices, triangles, look))
     return [_joined(name, solids) for name, solids in named.items()]
 
 
-def _joined(name: str, solids: Sequence[Solid]) -> Solid:
+def _joined(name: str, solids: Sequence[NamedMesh]) -> NamedMesh:
     first = np.cumsum([0, *(len(solid.vertices) for solid in solids)])
     looks = [solid.look or white(len(solid.triangles)) for solid in solids]
-    return Solid(
+    return NamedMesh(
         name,
         np.concatenate([solid.vertices for solid in solids]),
         np.concatenate([s.triangles + at for s, at in zip(solids, first, strict=False)]),

@@ -20,7 +20,7 @@ from scenelang.assets.files import read_regular
 from scenelang.compiler.graph import Graph, leaves
 from scenelang.drawing.exact import mesh as meshes
 from scenelang.drawing.exact import outline
-from scenelang.drawing.exact.mesh import FitError, Look, Mesh, Points, Shape, Sign, Solid
+from scenelang.drawing.exact.mesh import FitError, Mesh, NamedMesh, Points, Shape, Sign, Tints
 from scenelang.drawing.exact.outline import Outline
 from scenelang.language import library
 from scenelang.language.scene import Scene
@@ -30,7 +30,7 @@ MOST_OF: Final = {**meshes.MOST_OF_MESH, **outline.MOST_OF_DRAWING, **outline.MO
 _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those of a copy
 
 
-class Brought(NamedTuple):
+class OriginalShapes(NamedTuple):
     """The shapes of a file."""
 
     shapes: dict[str, Shape]  # what each element is made of, by its name; the whole comes last
@@ -41,7 +41,7 @@ class Brought(NamedTuple):
 
 def brought(
     data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
-) -> Brought:
+) -> OriginalShapes:
     """Read shapes from the bytes of a file with a suffix of `MOST_OF`; ``files`` are those that it names.
     ``apart`` says whether its parts are elements of their own, by default those of drawings.
     """
@@ -73,16 +73,16 @@ def said(text: str) -> str:
     return "".join(c if c.isascii() and c.isalnum() else "_" for c in text).strip("_")
 
 
-def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Brought:
+def solid_parts(parts: list[NamedMesh], name: str, sign: Sign, apart: bool) -> OriginalShapes:
     """Shapes of a file of meshes, ``apart`` if its solids are elements of their own."""
     whole = meshes.whole(parts, sign)
     if not apart or len(parts) < 2:
         alone = Part(name, (0.0, 0.0, 0.0), 1.0, (), *_worn(whole.look, name))
-        return Brought({name: whole}, {}, () if whole.look is None else (alone,), whole.notes)
+        return OriginalShapes({name: whole}, {}, () if whole.look is None else (alone,), whole.notes)
     _few(len(parts))
     shapes: dict[str, Shape] = {}
     numbers = {}
-    firsts: list[tuple[Solid, Mesh, str]] = []
+    firsts: list[tuple[NamedMesh, Mesh, str]] = []
     group = []
     for number, solid in enumerate(parts, 1):
         mesh = meshes.whole([solid], sign)
@@ -101,10 +101,10 @@ def solid_parts(parts: list[Solid], name: str, sign: Sign, apart: bool) -> Broug
         turn = () if abs(rows - np.eye(3)).max() < _ALIKE else tuple(map(tuple, rows.tolist()))
         place = tuple(((centre - whole.centre) / whole.size).tolist())
         group.append(Part(called, place, size / whole.size, turn, *_worn(mesh.look, called)))
-    return Brought({**shapes, name: whole}, numbers, tuple(group), whole.notes)
+    return OriginalShapes({**shapes, name: whole}, numbers, tuple(group), whole.notes)
 
 
-def _worn(look: Look | None, name: str) -> tuple[Painted, str]:
+def _worn(look: Tints | None, name: str) -> tuple[Painted, str]:
     """The one colour of a look, or the name that its material is to have."""
     if look is None:
         return (), ""
@@ -116,7 +116,7 @@ def _few(count: int) -> None:
         raise FitError(f"{count:,} parts, at most {MOST_PARTS}; without --parts it is one element")
 
 
-def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
+def _copy(first: NamedMesh, other: NamedMesh) -> tuple[float, Points, Points] | None:
     """Size s, rotation or reflection R and shift t that make one solid another, s R p + t."""
     from trimesh.registration import procrustes
 
@@ -131,7 +131,7 @@ def _copy(first: Solid, other: Solid) -> tuple[float, Points, Points] | None:
     return size, matrix[:3, :3] / size, matrix[:3, 3]
 
 
-def _alike(one: Look | None, other: Look | None) -> bool:
+def _alike(one: Tints | None, other: Tints | None) -> bool:
     """True where copies may share an element: both have one colour each, or they look the same."""
     if one is None or other is None:
         return one is other
@@ -142,13 +142,13 @@ def _alike(one: Look | None, other: Look | None) -> bool:
     return images and all(np.array_equal(a, b) for a, b in pairs)
 
 
-def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
+def drawn_parts(whole: Outline, name: str, apart: bool | None) -> OriginalShapes:
     """Shapes of a drawing: areas of one colour, in the order in which they are painted."""
     painted = [(colour, Outline(layers)) for colour, layers in whole.painted()]
     if len(painted) < 2 or apart is False or (apart is None and len(painted) > MOST_PARTS):
         colours = {colour for colour, _ in painted if colour}
         group = tuple(Part(name, (0.0, 0.0), 1.0, (), colour) for colour in colours if len(colours) == 1)
-        return Brought({name: whole}, {}, group, whole.notes)
+        return OriginalShapes({name: whole}, {}, group, whole.notes)
     _few(len(painted))
     parts = []
     names = {f"{name}_{k}": k for k in range(1, len(painted) + 1)}
@@ -156,7 +156,7 @@ def drawn_parts(whole: Outline, name: str, apart: bool | None) -> Brought:
         x, y = ((a - b) / whole.size for a, b in zip(part.centre, whole.centre, strict=True))
         parts.append(Part(called, (x, y), part.size / whole.size, (), colour))
     shapes = dict(zip(names, (part for _, part in painted), strict=True))
-    return Brought({**shapes, name: whole}, names, tuple(parts), whole.notes)
+    return OriginalShapes({**shapes, name: whole}, names, tuple(parts), whole.notes)
 
 
 FOLDER: Final = "SCENELANG_ORIGINALS"

@@ -14,7 +14,7 @@ from scenelang.compiler.graph import Graph, Node, leaves
 from scenelang.compiler.spaces import EXTINCTION, Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
 from scenelang.drawing.exact.outline import of_curves
-from scenelang.drawing.exact.solid import OPAQUE, TILE, Field, facing, seen_along, solid_image, ways
+from scenelang.drawing.exact.solid import OPAQUE, TILE, ExactField, facing, seen_along, solid_image, ways
 from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
 
 
@@ -96,7 +96,7 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
             result[5][part] = covered.mean((1, 3))
         return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
     step = max(1, TILE // (graph.samples * width))
-    field = Field(graph.root, brought)
+    field = ExactField(graph.root, brought)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
@@ -109,7 +109,7 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     )
 
 
-def _covered(field: Field, stage: Stage, d: Array) -> Array:
+def _covered(field: ExactField, stage: Stage, d: Array) -> Array:
     """Share of the background (M,) that objects hide along unit directions d (3, M)."""
     _, end, changes = seen_along(field, stage, d)
     hit = changes.after == OPAQUE
@@ -120,7 +120,7 @@ def _covered(field: Field, stage: Stage, d: Array) -> Array:
     return 1.0 - (1.0 - covered) * np.exp(-EXTINCTION * depth)
 
 
-def _shown(field: Field, stage: Stage, d: Array) -> Array:
+def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
     """Depth, normal and object (5, M) along unit directions d (3, M)."""
     o, end, changes = seen_along(field, stage, d)
     forward = np.asarray(stage.camera.axes()[0])

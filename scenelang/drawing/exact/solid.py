@@ -45,7 +45,7 @@ def length(p: Array) -> Array:
     return np.sqrt(x * x + y * y + z * z)
 
 
-class Map(NamedTuple):
+class ExactMap(NamedTuple):
     """``p -> inverse p + shift``, (3, 3) and (3, 1), and the largest stretch of the inverse."""
 
     inverse: Array
@@ -56,15 +56,15 @@ class Map(NamedTuple):
         return self.inverse @ p + self.shift
 
     def stretch(self, most: Array | float) -> float:
-        """As `Turn.stretch`."""
+        """As `ExactTurn.stretch`."""
         return self.grows
 
     def pull(self, p: Array, g: Array) -> Array:
-        """As `Turn.pull`."""
+        """As `ExactTurn.pull`."""
         return self.inverse.T @ g
 
 
-class Turn(NamedTuple):
+class ExactTurn(NamedTuple):
     """See the module; ``other`` is the index of the other axis."""
 
     other: int
@@ -111,12 +111,12 @@ class Turn(NamedTuple):
 
 def way_back(steps: Sequence[Step]) -> Any:
     """Maps and turns, the world's first, which is a map; neighbouring affine maps are one."""
-    back: list[Map | Turn] = []
+    back: list[ExactMap | ExactTurn] = []
     pending = np.eye(4)
 
-    def affine() -> Map:
+    def affine() -> ExactMap:
         inverse: Array = np.linalg.inv(pending[:3, :3])
-        return Map(inverse, -inverse @ pending[:3, 3:], float(np.linalg.norm(inverse, 2)))
+        return ExactMap(inverse, -inverse @ pending[:3, 3:], float(np.linalg.norm(inverse, 2)))
 
     for step in reversed(steps):
         if isinstance(step, Affine):
@@ -126,11 +126,13 @@ def way_back(steps: Sequence[Step]) -> Any:
                 back.append(affine())
                 pending = np.eye(4)
             slope = (0.0, step.twist, 0.0) if isinstance(step, Twist) else (*step.bend, 0.0)
-            back.append(Turn(1, step.twirl, slope) if isinstance(step, Warp) else Turn(2, 0.0, slope))
+            back.append(
+                ExactTurn(1, step.twirl, slope) if isinstance(step, Warp) else ExactTurn(2, 0.0, slope)
+            )
     return back if back and (pending == np.eye(4)).all() else [*back, affine()]
 
 
-class Body:
+class ExactBody:
     """A leaf of linear colours with all steps into the world, and the ball of distances below a margin."""
 
     def __init__(
@@ -152,7 +154,7 @@ class Body:
         self.reach = _REACH * self.scale if self.back else np.inf
         centre = np.zeros((3, 1))
         for step in reversed(self.back):
-            if isinstance(step, Map):
+            if isinstance(step, ExactMap):
                 matrix = np.linalg.inv(step.inverse)
                 centre, radius = matrix @ (centre - step.shift), radius * float(np.linalg.norm(matrix, 2))
             else:  # it keeps lengths
@@ -220,7 +222,7 @@ _MARGIN = 2e-2
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class ExactState:
     """State of a fold, and optional values."""
 
     d: Any  # distance (M,)
@@ -236,10 +238,10 @@ class State:
         return np.asarray(kind, np.int8)
 
 
-NOTHING = State(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)), 0)
+NOTHING = ExactState(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)), 0)
 
 
-def join(op: str, k: float, a: State, b: State) -> State:
+def join(op: str, k: float, a: ExactState, b: ExactState) -> ExactState:
     """One step of the fold; of two operands of equal distance the gradient is the later's."""
     d, paint, turn = folded(np, TOKENS[op], k, a.d, b.d)
     near = None if a.near is None or b.near is None else np.minimum(a.near, b.near)
@@ -248,14 +250,14 @@ def join(op: str, k: float, a: State, b: State) -> State:
     side = -1.0 if op == "subtract" else 1.0
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
-        return State(d, a.medium, near, a.rgb, slope, a.owner)
+        return ExactState(d, a.medium, near, a.rgb, slope, a.owner)
     medium = np.where(paint > 0.5, b.medium, a.medium)
     rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
     owner = None if a.owner is None or b.owner is None else np.where(paint > 0.5, b.owner, a.owner)
-    return State(d, medium, near, rgb, slope, owner)
+    return ExactState(d, medium, near, rgb, slope, owner)
 
 
-class Field:
+class ExactField:
     """The objects of a graph's root, with every step into the world."""
 
     def __init__(self, root: Fold, brought: Brought | None = None) -> None:
@@ -264,9 +266,9 @@ class Field:
         # A leaf far from a point changes no sign there if it is further than all blends together can reach,
         # and one that is taken away further than anything is deep.
         blends = 1.25 * sum(_blends(root))
-        deep = max((Body(leaf, steps, 0.0).deep for leaf, steps, _ in result), default=0.0)
+        deep = max((ExactBody(leaf, steps, 0.0).deep for leaf, steps, _ in result), default=0.0)
         self.bodies = [
-            Body(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
+            ExactBody(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
             for leaf, steps, taken in result
         ]
         kinds = {body.medium for body in self.bodies}
@@ -275,7 +277,7 @@ class Field:
 
     def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
         """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each, at world
-        points (3, M); ``met`` (N, M) says in which objects' balls they lie, ``speed`` is as `Body.span`
+        points (3, M); ``met`` (N, M) says in which objects' balls they lie, ``speed`` is as `ExactBody.span`
         tells.
         """
         count = p.shape[1]
@@ -290,9 +292,9 @@ class Field:
                     most[at] = np.minimum(most[at], body.reach)
         rows = zip(self.bodies, d, strict=True)
 
-        def known() -> State:
+        def known() -> ExactState:
             body, row = next(rows)
-            return State(row, np.bool_(body.medium), abs(row) if self.mixed else None)
+            return ExactState(row, np.bool_(body.medium), abs(row) if self.mixed else None)
 
         state = _fold(self.root, known)
         way = abs(state.d)
@@ -300,19 +302,19 @@ class Field:
             way = np.where(state.d < 0.0, np.minimum(way, state.near), way)
         return state.d, state.kind(), np.minimum(way / fastest, most)
 
-    def at(self, p: Array, *, gradient: bool = False) -> State:
+    def at(self, p: Array, *, gradient: bool = False) -> ExactState:
         """All that the fold carries at world points (3, M), near left out, the gradient only if asked for."""
         bodies = enumerate(self.bodies, 1)
 
-        def known() -> State:
+        def known() -> ExactState:
             number, body = next(bodies)
             slope = body.gradient(p) if gradient else None
-            return State(body.distance(p)[0], np.bool_(body.medium), None, body.colour(p), slope, number)
+            return ExactState(body.distance(p)[0], np.bool_(body.medium), None, body.colour(p), slope, number)
 
         return _fold(self.root, known)
 
 
-def _fold(node: Node, known: Callable[[], State]) -> State:
+def _fold(node: Node, known: Callable[[], ExactState]) -> ExactState:
     """The fold of a node; ``known`` is called for each leaf in order."""
     if isinstance(node, Leaf):
         return known()
@@ -363,7 +365,7 @@ class Changes(NamedTuple):
         return ray, enter, sorted_(self.last, self.before, end)[1]
 
 
-def march(field: Field, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
+def march(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
     """Follow rays o + t d, t from 0 to ``end`` (M,), to 1e-9 or so if ``exact``, otherwise to 1e-6."""
     enter, leave, speed = spans = np.empty((3, len(field.bodies), o.shape[1]))
     for index, body in enumerate(field.bodies):
@@ -437,7 +439,7 @@ def solid_image(
     """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too."""
     if fault := stage.fault():
         raise ValueError(fault)
-    field = Field(root, brought)
+    field = ExactField(root, brought)
     width, height = canvas
     step = max(1, TILE // (width * per_side * per_side))
     picture = np.empty((4, height, width))
@@ -449,7 +451,7 @@ def solid_image(
     return from_light(picture, stage.transparent)
 
 
-def radiance(field: Field, stage: Stage, d: Array) -> Array:
+def radiance(field: ExactField, stage: Stage, d: Array) -> Array:
     """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M)."""
     behind = np.zeros((4, d.shape[1]))
     if not stage.transparent:
@@ -486,7 +488,7 @@ def radiance(field: Field, stage: Stage, d: Array) -> Array:
     return out
 
 
-def seen_along(field: Field, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
+def seen_along(field: ExactField, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
     """Origins (3, M) of rays along d (3, M), distances to the ground (M,), and materials on the way."""
     o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
     end = np.full(d.shape[1], np.inf)
@@ -507,14 +509,14 @@ def ways(stage: Stage, canvas: tuple[int, int], rows: range, per_side: int) -> A
     return way / length(way)
 
 
-def facing(field: Field, p: Array, d: Array) -> tuple[State, Array]:
+def facing(field: ExactField, p: Array, d: Array) -> tuple[ExactState, Array]:
     """The state just behind surface points that rays along d met, and unit normals against d."""
     state = field.at(p + _INSIDE * d, gradient=True)
     normal = state.slope / np.maximum(length(state.slope), 1e-12)
     return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
 
 
-def _received(field: Field, light: Light, p: Array, normal: Array) -> Array:
+def _received(field: ExactField, light: Light, p: Array, normal: Array) -> Array:
     """Light (3, M) that surfaces of a normal receive, ambient and direct."""
     way = np.reshape(light.position, (3, 1)) - p
     r = np.maximum(length(way), NEAREST)
@@ -524,7 +526,7 @@ def _received(field: Field, light: Light, p: Array, normal: Array) -> Array:
     return np.reshape(light.rgb, (3, 1)) * direct + AMBIENT[0] + AMBIENT[1] * normal[1]
 
 
-def _visible(field: Field, light: Light, p: Array) -> Array:
+def _visible(field: ExactField, light: Light, p: Array) -> Array:
     """Transmittance (M,) from points to the light."""
     way = np.reshape(light.position, (3, 1)) - p
     r = length(way)
@@ -537,7 +539,7 @@ def _visible(field: Field, light: Light, p: Array) -> Array:
 
 
 def _scattered(
-    field: Field, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
+    field: ExactField, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
 ) -> Array:
     """Light (3, K) that parts of rays in media from ``enter`` on, of a ``weight`` to the eye, scatter."""
     opaque = -np.expm1(-depth)

@@ -18,7 +18,7 @@ from scenelang.compiler.graph import LUMA, ColourStep
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import decoded
-from scenelang.drawing.neural.frames import Affine
+from scenelang.drawing.neural.frames import FrameMap
 from scenelang.drawing.neural.network import CELLS, NODE, RADII, RADIUS, STEEP, Slopes, around
 
 
@@ -202,7 +202,7 @@ class Texture:
         self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
         (a, b, u), (c, d, v) = _rows(frame)
-        self.place = Affine(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
+        self.place = FrameMap(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
         self.texels, self.sides = flat, values.shape[-2:]
         across = _across(self.place) if values.ndim == 3 else 0.5
         self.detail = across * max(values.shape)  # Texels that a way of a leaf unit may cross, about
@@ -231,7 +231,7 @@ class _Graded(Texture):
         self, xp: Arrays, gradient: Gradient, steps: tuple[ColourStep, ...], frame: np.ndarray
     ) -> None:
         self._xp, self.steps, self.gradient = xp, steps, gradient
-        self.place = Affine(_rows(frame))
+        self.place = FrameMap(_rows(frame))
         self.detail = EDGE if gradient.edges else min(_across(self.place) * gradient.slope, EDGE)
 
     def _colours(self, q: Array) -> Array:
@@ -260,7 +260,7 @@ def _rows(frame: np.ndarray) -> Any:
     return frame.astype(np.float64).reshape(2, 3).tolist()
 
 
-def _across(place: Affine) -> float:
+def _across(place: FrameMap) -> float:
     """The most that a coordinate changes over a leaf unit, about."""
     return float(abs(np.array([row[:2] for row in place.rows])).max())
 

@@ -18,7 +18,7 @@ from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
 from scenelang.drawing.neural.frames import FAR, Frames, Skins, read_skins
-from scenelang.drawing.neural.meetings import Interval, Meetings, Nesting, Shown, Turn, nesting, shown
+from scenelang.drawing.neural.meetings import Interval, Meetings, NestedSlot, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import (
     EMPTY,
     EXTENT,
@@ -45,7 +45,7 @@ _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is
 class Met(NamedTuple):
     """A turn and what came of it at points, (groups, n) each."""
 
-    turn: Turn
+    turn: NestedSlot
     rows: np.ndarray  # (n,) numbers of the objects, behind these of the groups
     distance: Array  # world units
     paint: Array  # how far the colour came in

@@ -26,7 +26,7 @@ Number = Array | float
 Point = Sequence[Array]  # the d coordinates, each (…, M), of points
 
 
-class Affine(NamedTuple):
+class FrameMap(NamedTuple):
     """An affine map: d rows of d factors and a shift."""
 
     rows: tuple[tuple[Number, ...], ...]
@@ -36,7 +36,7 @@ class Affine(NamedTuple):
         return [_combine(xp, row, p) + row[-1] for row in self.rows]
 
 
-class Warp(NamedTuple):
+class FrameTurn(NamedTuple):
     """A clockwise turn of the first two coordinates by an angle t |p| + b · p."""
 
     twirl: Number
@@ -165,11 +165,11 @@ class _Stage(NamedTuple):
     rate: Floats  # (N,) of a warp, how fast its angle changes at most, per distance
 
 
-def _step(factors: Array) -> Affine | Warp:
+def _step(factors: Array) -> FrameMap | FrameTurn:
     """The map of six numbers (6, P), or the warp of three."""
     if len(factors) == 6:
-        return Affine((tuple(factors[:3]), tuple(factors[3:])))
-    return Warp(factors[0], tuple(factors[1:]))
+        return FrameMap((tuple(factors[:3]), tuple(factors[3:])))
+    return FrameTurn(factors[0], tuple(factors[1:]))
 
 
 def _stretches(a: Floats, b: Floats, c: Floats, d: Floats) -> tuple[Floats, Floats]:
@@ -233,7 +233,7 @@ def read_skins(parts: Parts) -> Skins | None:
     return Skins(grow - last, shell / 2, last, (behind // 2).astype(np.float32))
 
 
-def way_back(xp: Arrays, steps: Iterable[Affine | Warp], p: Point) -> Point:
+def way_back(xp: Arrays, steps: Iterable[FrameMap | FrameTurn], p: Point) -> Point:
     """Points carried through maps and warps in turn."""
     for step in steps:
         p = step(xp, p)

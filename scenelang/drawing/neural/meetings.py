@@ -105,7 +105,7 @@ def meetings_of(pairs: Pairs) -> tuple[Meetings, Index]:
     return Meetings(block[first], pairs.take(index), lengths), index
 
 
-class Turn(NamedTuple):
+class NestedSlot(NamedTuple):
     """Pairs of one slot, or groups that end, one in each of some columns; what they join is n states."""
 
     which: Any  # a slice where the pairs lie, or numbers (n,) of the groups
@@ -118,10 +118,10 @@ class Turn(NamedTuple):
 class Nesting(NamedTuple):
     """Nested meetings."""
 
-    turns: list[Turn]  # in the order in which they join
+    turns: list[NestedSlot]  # in the order in which they join
     states: int  # how many there are; one a column where all pairs join the stream's own
 
-    def fold(self, pairs: int, join: Callable[[Turn], tuple[Mask, Mask]]) -> tuple[Mask, Mask]:
+    def fold(self, pairs: int, join: Callable[[NestedSlot], tuple[Mask, Mask]]) -> tuple[Mask, Mask]:
         """Let turns join; which pairs (P,) change nothing or are hidden, and which hide the rest.
 
         ``join`` takes a turn into its states, empties those of groups that end, and returns of each whether
@@ -142,7 +142,7 @@ class Nesting(NamedTuple):
 def flat_nesting(meetings: Meetings) -> Nesting:
     """The nesting of a stream without groups: all pairs join the stream's own state."""
     sizes = [(part, slice(part.stop - part.start)) for part in meetings.slots()]
-    turns = [Turn(part, own, own, None, np.zeros(own.stop, bool)) for part, own in sizes]
+    turns = [NestedSlot(part, own, own, None, np.zeros(own.stop, bool)) for part, own in sizes]
     return Nesting(turns, len(meetings.columns))
 
 
@@ -170,14 +170,16 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting:
     last_path = np.full((count, groups.deepest), -1)
     real = np.zeros((count, groups.deepest), bool)  # whether a group that is open has a state of its own
     every = np.arange(count)
-    turns, levels = list[Turn](), 1
+    turns, levels = list[NestedSlot](), 1
 
     def end(columns: Index, kept: Index) -> None:
         """Let the groups of columns (n,) end, but for the outermost ``kept`` (n,) of each."""
         for at in reversed(number.tolist() if len(columns) else ()):
             if len(some := columns[(kept <= at) & real[columns, at]]):
                 top = real[some, : at + 1].sum(1) * count + some
-                turns.append(Turn(last_path[some, at], some, top - count, top, np.zeros(len(some), bool)))
+                turns.append(
+                    NestedSlot(last_path[some, at], some, top - count, top, np.zeros(len(some), bool))
+                )
 
     for at, part in enumerate(slots):
         n = part.stop - part.start
@@ -186,7 +188,7 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting:
         last_path[:n] = paths[part]
         level = real[:n].sum(1)
         levels = max(levels, int(level.max(initial=0)) + 1)
-        turns.append(Turn(part, slice(n), level * count + every[:n], None, fresh[part]))
+        turns.append(NestedSlot(part, slice(n), level * count + every[:n], None, fresh[part]))
         left = slots[at + 1].stop - slots[at + 1].start if at + 1 < len(slots) else 0
         end(every[left:n], np.zeros(n - left, np.intp))
     return Nesting(turns, levels * count)
@@ -220,7 +222,7 @@ class State(NamedTuple):
         """Select some columns."""
         return type(self)(*(Interval(low[..., columns], high[..., columns]) for low, high in self))
 
-    def operands(self, turn: Turn, pairs: State, empty: float) -> State:
+    def operands(self, turn: NestedSlot, pairs: State, empty: float) -> State:
         """Select what joins in a turn, some of the ``pairs``, or states that end; these are emptied."""
         if turn.ending is None:
             return pairs.at(turn.which)
@@ -274,7 +276,7 @@ def shown(
     fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns if turn.ending is None)])
     gates = _Gates.of(cell, distance, given | fresh, None if lies is None else lies[0], slope)
 
-    def join(turn: Turn) -> tuple[Mask, Mask]:
+    def join(turn: NestedSlot) -> tuple[Mask, Mask]:
         which, operand = turn.which, state.operands(turn, operands, empty)
         if turn.ending is None:
             keeps, hides = state.join(turn.at, operand, gates.some(which))

@@ -32,7 +32,7 @@ from scenelang.compiler.program import Paint
 from scenelang.drawing.arrays import Array, Arrays, Smooth
 from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
-from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, Cell, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidCell, SolidNetwork, Wanted, element_box
 from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import (
     BEGIN,
@@ -51,7 +51,7 @@ from scenelang.drawing.solid.passes import (
 TAGS = np.array([[0.618034], [0.754878], [0.569840]])  # parts of whole numbers times these lie apart
 
 
-class Closing(NamedTuple):
+class SolidClosing(NamedTuple):
     """Groups that end, k of them."""
 
     inner: Array  # entries (k,): the point's number and, for each state below it, the number of points
@@ -60,7 +60,7 @@ class Closing(NamedTuple):
 
 
 # what happens at points in turn: a group ends, or the points (k,) meet an object, all where they are None
-Steps = list[Closing | Array | None]
+Steps = list[SolidClosing | Array | None]
 
 
 class Stacks:
@@ -82,7 +82,7 @@ class Stacks:
     def followed(
         self, places: Sequence[Array | None], rays: Array, objects: Array, every: Array
     ) -> tuple[Steps, int]:
-        """Steps and depth of `Pairs`, by places without states and all points' numbers."""
+        """Steps and depth of `SolidPairs`, by places without states and all points' numbers."""
         xp, count = self._xp, len(every)
         ways, begun = xp.take(self._ways, objects), 0 * every
         met = count if places[0] is None else len(places[0])
@@ -126,7 +126,7 @@ class Stacks:
             some = xp.where((ending & bit) > 0)
             if len(some):
                 inner = xp.take(points, some) + count * xp.take(self._states, xp.take(stack, some))
-                steps.append(Closing(inner, inner - count, self._count + xp.take(path[depth], some)))
+                steps.append(SolidClosing(inner, inner - count, self._count + xp.take(path[depth], some)))
                 stack = stack - (ending & bit)
         return stack
 
@@ -147,11 +147,11 @@ class Meeting(NamedTuple):
     met: int = 0  # pairs of points and objects that met
 
 
-class Pairs(NamedTuple):
+class SolidPairs(NamedTuple):
     """Points of M rays and the objects that they meet: P pairs."""
 
     # points that meet an object, those that meet a second, and so on; of points in groups they are those of
-    # their states, as `Closing` has them
+    # their states, as `SolidClosing` has them
     steps: Steps
     rays: Array  # (P,), place by place
     objects: Array  # their numbers (P,)
@@ -255,7 +255,7 @@ class SolidField:
         }
         cells = [known[key] for key in (keys[:1] if self.alike else keys)] or [network.cell(UNION, BLEND)]
         self.cells = [
-            Cell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
+            SolidCell(*(xp.concat(list(part), 1) for part in zip(*each, strict=True)))
             for each in zip(*cells, strict=True)
         ]
 
@@ -330,7 +330,7 @@ class SolidField:
         xp, like, solids = self.xp, self.network.codes, self.solids
         # the diameter of what an object changes: no distance in it is greater
         reach = np.array([2 * s.radius * s.frame.scale for s in solids], np.float32)
-        cell = Cell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
+        cell = SolidCell(*(weights[:, : len(solids)] for weights in self.cells[Wanted.ALL]))
         # factors of distances (N,) of objects that are met first; 0: the cell has to be asked
         self.first = self.network.alone(xp.array(reach, like), cell)
         drawn = xp.array(np.array([s.draws for s in solids], np.float32), like)
@@ -484,7 +484,7 @@ class SolidField:
 
     def meet(
         self,
-        passes: Passes | Pairs,
+        passes: Passes | SolidPairs,
         t: Array,
         wanted: Wanted,
         gradient: bool = False,
@@ -517,7 +517,7 @@ class SolidField:
         states.memory[0] = EMPTY
         stop = 0
         for index in steps:
-            if isinstance(index, Closing):
+            if isinstance(index, SolidClosing):
                 self._close(states, index, wanted)
                 continue
             start, stop = stop, stop + (count if index is None else len(index))
@@ -546,7 +546,7 @@ class SolidField:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
 
-    def pairs(self, passes: Passes, t: Array) -> Pairs:
+    def pairs(self, passes: Passes, t: Array) -> SolidPairs:
         """Pairs of points at t (M,) and the objects in whose balls these are."""
         xp, count = self.xp, len(t)
         inside = self.inside(passes, t)
@@ -570,9 +570,9 @@ class SolidField:
         depth = 1
         if most > 1 and self.stacks is not None:
             steps, depth = self.stacks.followed(places, rays, objects, every)
-        return Pairs(steps, rays, objects, xp.take(passes.origins, objects), pairs[WAY], depth)
+        return SolidPairs(steps, rays, objects, xp.take(passes.origins, objects), pairs[WAY], depth)
 
-    def _close(self, states: States, closing: Closing, wanted: Wanted) -> None:
+    def _close(self, states: States, closing: SolidClosing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
         xp, (inner, index, which) = self.xp, closing
         parts = states.memory, states.slope, states.bound, states.owner
@@ -591,7 +591,7 @@ class SolidField:
         xp, cell = self.xp, self.cells[wanted]
         near, look = operand.distance, operand.register
         if not self.alike:
-            cell = Cell(*(xp.take(weights, which) for weights in cell))
+            cell = SolidCell(*(xp.take(weights, which) for weights in cell))
         before = _part(xp, states.memory, index)
         if states.owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
             before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.solid.field import Pairs, SolidField
+from scenelang.drawing.solid.field import SolidField, SolidPairs
 from scenelang.drawing.solid.network import Wanted, folded
 from scenelang.drawing.solid.passes import BEGIN, END, INF, OBJECT, RATE, WAY, Passes, placed
 
@@ -87,7 +87,7 @@ class _Batch:
     bounds: list[int] = field(
         default_factory=list
     )  # where each group of rays of one object begins, and the end
-    pairs: Pairs | None = None  # of the others
+    pairs: SolidPairs | None = None  # of the others
 
 
 class Rays:

@@ -107,7 +107,7 @@ class SolidConfig:
     answered: int = 0  # geometries, the first ones, that these answer for; 0: all
 
 
-class Cell(NamedTuple):
+class SolidCell(NamedTuple):
     """Weights of the cell for a token and a width of blends, or (…, M) for those of each point."""
 
     own: Array  # (1 + L + K, 1): levels of the gates from the object's distance
@@ -176,7 +176,7 @@ class SolidNetwork:
             for w, b in zip(weights, biases, strict=True)
         )
 
-    def cell(self, token: int, width: float) -> tuple[Cell, ...]:
+    def cell(self, token: int, width: float) -> tuple[SolidCell, ...]:
         """The cell of a token for blends of a width, with each `Wanted`'s gates: s d and s D fold to s D'."""
         paint, scale = self.config.paint_lines, BLEND / width
         gain = self.xp.exp(self.cell_gain[token])[:, None]
@@ -184,13 +184,13 @@ class SolidNetwork:
         bias, bump = self.cell_bias[token][:, None], self.bump[token] / (gain[:1] * scale)
         kept = [[0], [0, *range(1 + paint, len(bias))], [*range(len(bias))]]
         candidate = self.candidate[token].reshape(1, 1)
-        return tuple(Cell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
+        return tuple(SolidCell(own[rows], past[rows], bias[rows], candidate, bump) for rows in kept)
 
-    def cut(self, token: int, width: float) -> tuple[Cell, ...]:
+    def cut(self, token: int, width: float) -> tuple[SolidCell, ...]:
         """As `cell`, of a rounded cut: `subtract` leaves -smooth(-D, d), `intersect` -smooth(-D, -d)."""
         blend, concat = self.cell(SMOOTH, width)[Wanted.DISTANCE], self.xp.concat
         side = -1.0 if token == SUBTRACT else 1.0
-        edge = Cell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
+        edge = SolidCell(-side * blend.own, -blend.past, blend.bias, side * blend.candidate, -blend.bump)
         return tuple(
             edge._replace(
                 own=concat([edge.own, sharp.own[1:]], 0),
@@ -244,7 +244,9 @@ class SolidNetwork:
             g = w.T @ (slope * g)
         return xp.concat([value, g], 0)
 
-    def join(self, d: Array, memory: Array, look: Array, cell: Cell, wanted: Wanted) -> tuple[Array, Array]:
+    def join(
+        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted
+    ) -> tuple[Array, Array]:
         """The memory behind an object at distances (M,), and how far the distance's gate is open (M,).
 
         Memory is the distance so far and the register behind it: (1, M), (2, M) with the medium alone, or,
@@ -266,13 +268,13 @@ class SolidNetwork:
         gate = xp.concat([paint] * (len(memory) - 2) + [kind], 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
-    def alone(self, reach: Array, cell: Cell) -> Array:
+    def alone(self, reach: Array, cell: SolidCell) -> Array:
         """Factors of distances (N,) up to a reach (N,) where nothing is met; 0 if a gate may not be open."""
         least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
         gates = (least[:1], least[1:n], least[n:])
         return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
 
-    def partials(self, d: Array, state: Array, take: Array, cell: Cell) -> tuple[Array, Array]:
+    def partials(self, d: Array, state: Array, take: Array, cell: SolidCell) -> tuple[Array, Array]:
         """Derivatives (M,) of the distance behind an object by its own and by that before it."""
         candidate, bump = cell.candidate[0], cell.bump[0]
         rate = d * candidate - state - (1 - 2 * take) * bump
