@@ -13,6 +13,7 @@ CLAIMS = [
     f"{Figure(QUICK.nodes)} |",
     f"with hard edges | {Figure(ONE.gap)} | {Figure(ONE.nodes)} |",
     f"2 x 2 pixels, enlarged | {Figure(ONE.gap)} | {Figure(ONE.nodes)} |",
+    f"as `adaptive`, with so many | {Figure(FOUR.gap)} | {Figure(FOUR.nodes)} |",
 ]
 GIVEN = {
     "under 0.002 nobody sees it": "a rule of thumb",
