@@ -176,7 +176,7 @@ def test_sets_of_textures_are_of_models_that_have_some() -> None:
     assert set(textured) - set(plain) == {"textures2d", "textures2d-mixed", "skins", "leaves2d"}
     for name, shapes, ops in (
         ("textures2d", {"square"}, {"flip", "rotate", "hue"}),
-        ("textures2d-mixed", {*GEOMETRIES}, {*OPERATIONS} - {"stop"}),
+        ("textures2d-mixed", {*GEOMETRIES}, {*OPERATIONS} - {"stop", "opacity"}),
     ):
         made = [textured[name](np.random.default_rng(index)) for index in range(60)]
         words = {*re.findall(r'"(?:geometry|name|kind)": ?"(\w+)"', "".join(s.to_json() for s in made))}
