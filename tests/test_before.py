@@ -33,7 +33,7 @@ SAVED = ("alpha", 2), ("white", 0), ("trees", 0), ("textures", 0)
 
 @pytest.mark.parametrize(("name", "frame"), SAVED)
 def test_saved_programs_are_those_of_today(name: str, frame: int, tmp_path: Path) -> None:
-    """All but the digest of weights that others replaced since; ``white`` is of a network for another size."""
+    """All but the digest of replaced weights; ``white`` is of a network for another size."""
     saved = BEFORE / f"{name}.safetensors"
     loaded = nsg.load_program(saved)
     if name == "white":

@@ -343,7 +343,8 @@ def trained_model(path: Path) -> Model:
     side = student["streaming"]["resolution"]
     sizes = ((side, side),) if student["renderer"] == "streaming" else ()
     manifest = replace(
-        load_manifest("shapes2d-streaming" if student["lifting"] == "exact" else "shapes2d-reading"),
+        load_manifest("shapes2d" if student["lifting"] == "exact" else "shapes2d-reading"),
+        geometries=load_manifest("shapes2d-streaming").geometries,
         renderer=student["renderer"],
         sizes=sizes,
         white=True,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -60,11 +60,14 @@ def weights_path(name: str, digest: str = "") -> Path:
     return weights_folder(name, digest) / "weights.safetensors"
 
 
-def manifest_of(name: str, digest: str = "") -> Manifest:
-    """A model's manifest, or that of its weights `replaced` since; raises as `load_manifest`, `ModelError`
-    for weights of another model.
+def manifest_of(name: str, digest: str = "", path: Path | None = None) -> Manifest:
+    """A model's manifest, or that of its weights `replaced` since; of weights at a path with the first of its
+    geometries, for which these have codes. Raises as `load_manifest`, and `ModelError`.
     """
     current = load_manifest(name)
+    if path is not None:
+        codes = open_weights(shipped_weights(name, path=path)).arrays.get("codes", current.geometries)
+        return replace(current, geometries=current.geometries[: len(codes)])
     if not replaced(digest):
         return current
     result = Manifest.from_json((REPLACED / digest / MANIFEST).read_bytes())

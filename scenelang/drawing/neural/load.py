@@ -168,7 +168,7 @@ _MAKERS: dict[str, _Make] = {
 
 def load_model(name: str, device: str = "cpu", path: Path | None = None, weights: str = "") -> Model:
     """Load a shipped model, or weights at ``path``; raises and takes ``weights`` as `load_arrays`."""
-    manifest, data = manifest_of(name, weights), shipped_weights(name, weights, path)
+    manifest, data = manifest_of(name, weights, path), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
     if isinstance(network, Framed):
         host = network.codes.cpu().numpy()
