@@ -74,8 +74,8 @@ def test_reference_difference_and_figures(page: Page) -> None:
     assert np.abs(exact - picture_of(SQUARE, backend="reference")).max() <= 1
     page.draw("d", "a.nsg", by="difference")
     difference = page.until("picture", id="d")
-    assert difference["size"] == [3 * 64 + 8, 48 + 14]
-    assert np.array_equal(pixels(difference)[14:, 68:132], exact)
+    assert difference["size"] == [3 * 64 + 8, 48 + 28]
+    assert np.array_equal(pixels(difference)[28:, 68:132], exact)
     page.draw("f", "a.nsg", by="figures")
     figures = page.until("figures", id="f")
     assert (figures["objects"], figures["rows"], figures["canvas"]) == (1, 1, [64, 48])
