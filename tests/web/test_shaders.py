@@ -408,7 +408,7 @@ def test_solid_trees_are_the_networks(page: Any) -> None:
     for seed in (0, 2, 6, 8):
         program = nsg.compile(random_solid(np.random.default_rng(seed), SOLID_SETS["trees"]).sized((64, 48)))
         assert read_groups(program.tokens).deepest > 0
-        check_points(page, program, inside=100, near=0.05)
+        check_points(page, program, inside=10, near=0.05)
         assert compared(page, program) > LEAST_DB[3], seed
 
 
