@@ -156,7 +156,7 @@ def drawable(source: SourceFile, **inputs: Any) -> tuple[PageProgram, Compiled |
     scene, _ = evaluation.run(0)
     if scene is None or found.errors:
         return None
-    if (manifest := find_model(scene, found)) is None or manifest.lifting != "exact":
+    if (manifest := find_model(scene, found)) is None or not manifest.framed:
         return None
     try:
         expected = compiled(source, **inputs)
