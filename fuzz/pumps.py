@@ -106,7 +106,7 @@ def _edit(scene: str) -> None:
     document = docs.put("untitled:pump", scene, 1)
     offset = len(scene) // 2
     middle = document.lines.position(offset)
-    navigation.document_symbols(document)
+    list(navigation.symbols(document, document.file.statements))
     navigation.folding(document)
     navigation.selection(document, offset)
     navigation.workspace_symbols(docs, "aaaaaaaab")

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from fuzz.drawn import drawn
 from fuzz.oracles import check_diagnostics
 from fuzz.target import hold, load_target
-from scenelang.compiler.program import WIDTH, Place, Program, ProgramError, parse_program, program_bytes
+from scenelang.compiler.lifting import WIDTH
+from scenelang.compiler.program import Place, Program, ProgramError, parse_program, program_bytes
 from scenelang.compiler.weights import load_codes
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.render import render

@@ -631,6 +631,59 @@ def _say_begin(model: str, reached: str, done: int, device: str, out: Path) -> N
 # ---------------------------------------------------------------- all of it, benchmarks, scripts
 
 
+@command.command()
+@click.argument("families", nargs=-1)
+@_count("--scenes", 40, 1, 10_000, "Number of scenes of a family.")
+@_count("--first", 0, 0, 10_000, "Index of the first.")
+@_count("--size", 128, 16, 1024, "Side of pictures in pixels.")
+@_count("--paths", 1024, 8, 1 << 20, "Most paths of a pixel; fewer where the noise is below 52 dB.")
+@click.option("--cache", type=_FOLDER, metavar="FOLDER", help="Folder of traced pictures.")
+@click.option("--trace", is_flag=True, help="Trace what the folder lacks, and draw nothing.")
+@_threads
+@_seed
+@_out
+def light(
+    families: tuple[str, ...],
+    scenes: int,
+    first: int,
+    size: int,
+    paths: int,
+    cache: Path | None,
+    trace: bool,
+    threads: int,
+    seed: int,
+    out: Path,
+) -> None:
+    """Draw scenes lit by a sky, and compare with path tracing; by default all FAMILIES.
+
+    Writes light-FAMILY.json and a picture of the three worst: traced, drawn, and four times the difference.
+    """
+    need_metrics()
+    import numpy as np
+    from PIL import Image
+
+    from lab.light.families import FAMILIES
+    from lab.light.measure import measure
+    from lab.light.probes import PROBES
+
+    _check_names("family", families, {**FAMILIES, **PROBES})
+    for family in families or FAMILIES:
+        how: dict[str, Any] = {"threads": threads, "cache": cache, "first": first, "drawn": not trace}
+        result, worst = measure(
+            family, scenes, size, paths, seed, say=lambda s: click.echo(s, err=True), **how
+        )
+        if trace:
+            continue
+        write_json(out / f"light-{family}.json", about() | result)
+        pixels = (255 * np.concatenate(worst) + 0.5).astype(np.uint8)
+        Image.fromarray(pixels).save(out / f"light-{family}.png")
+        click.echo(
+            f"{family:8} PSNR {result['mean_psnr']:.2f} dB, 5th percentile {result['psnr_5']:.2f}, "
+            f"FLIP {result['mean_flip']:.4f}, {result['mean_seconds']:.2f} s; "
+            f"traced to {result['own']:.1f} dB"
+        )
+
+
 @command.command("all")
 @_out
 @click.option(

@@ -56,10 +56,15 @@ operations = st.one_of(
     st.builds(nsg.Grayscale, amount=units),
     st.builds(nsg.Hue, angle=angles),
 )
+powers = st.floats(0, 1e6)
 materials = st.none() | st.builds(
     nsg.Material,
-    name=st.sampled_from(["flat", "diffuse", "volumetric"]),
+    name=st.sampled_from(["flat", "diffuse", "volumetric", "metal"]),
     ops=st.lists(operations, max_size=3).map(tuple),
+    opacity=st.just(1.0) | st.floats(0, 1),
+    glow=st.none() | st.builds(nsg.Glow, colours, powers),
+    density=st.none() | st.floats(1e-6, 100),
+    roughness=st.none() | st.floats(0.05, 1),
 )
 common: dict[str, Any] = {"transforms": st.lists(transforms, max_size=3).map(tuple), "material": materials}
 joins = st.sampled_from([(op, 0.15) for op in ("union", "smooth", "subtract", "intersect")]) | st.tuples(
@@ -73,7 +78,8 @@ cameras = st.builds(
     st.tuples(st.floats(1, 9), places, places),
     st.floats(0.01, 3.1),
 )
-lights = st.builds(nsg.Light, points, st.floats(0, 1e6), colours)
+lights = st.builds(nsg.Light, points, powers, colours, st.just(0.0) | powers)
+skies = st.builds(nsg.Sky, powers, colours | st.just("default"), colours | st.just("default"))
 grounds = st.builds(nsg.Ground, places, colours | st.just("default"))
 objects = st.builds(
     lambda geometry, transforms, material: nsg.Object(geometry, transforms=transforms, material=material),
@@ -104,8 +110,9 @@ scenes = st.builds(
     canvas=st.tuples(st.integers(1, 8192), st.integers(1, 8192)),
     background=st.just("default") | st.none() | colours,
     camera=st.just("default") | cameras,
-    light=st.just("default") | lights,
+    light=st.just("default") | st.none() | lights | st.lists(lights, max_size=8),
     ground=st.just("default") | st.none() | grounds,
+    sky=st.just("default") | skies,
     animation=st.none()
     | st.builds(nsg.Animation, seconds=st.floats(0.001, 100), fps=st.floats(0.1, 240), loop=st.booleans()),
     nodes=st.lists(st.recursive(objects, _nodes, max_leaves=6), max_size=3).map(tuple),

@@ -148,7 +148,7 @@ def test_every_picture_is_made_and_used() -> None:
     used = set(re.findall(r"\]\((?:docs/)?pictures/([^)\s]+)\)", text))
     stills_of_moving = {f"{name.removesuffix('.webp')}.png" for name in names if name.endswith(".webp")}
     assert names - used <= stills_of_moving
-    assert sum(path.stat().st_size for path in files) < 6_100_000
+    assert sum(path.stat().st_size for path in files) < 6_400_000
 
 
 def test_every_example_is_shown() -> None:

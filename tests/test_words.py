@@ -35,7 +35,7 @@ def test_everything_called_has_a_meaning() -> None:
     } <= modifiers.KINDS.keys()
     for model in map(load_manifest, available()):
         assert words.LEAVES[model.dimension].keys() >= {*model.geometries}
-        assert [*words.SHADINGS[model.dimension]] == [*model.materials]
+        assert [*words.SHADINGS[model.dimension]] == [*model.shadings]
     assert {*words.SOLID_TRANSFORMS} <= words.TRANSFORMS.keys()
     assert (*load_textures(),) == words.TEXTURES
 

@@ -58,15 +58,13 @@ def _known(scene: Scene) -> bool:
         manifest = load_manifest(name)
         offered = {("geometry", word) for word in manifest.geometries}
         offered |= {("material", word) for word in manifest.materials}
-        offered |= {("transform", word) for word in manifest.transforms}
-        offered |= {("operation", word) for word in manifest.material_ops}
         if words <= offered and scene.model in (None, name):
             return True
     return False
 
 
 def _words(scene: Scene) -> set[tuple[str, str]]:
-    """Geometries, materials, transforms and operations that a Scene names."""
+    """Geometries and materials that a Scene names."""
     found: set[tuple[str, str]] = set()
     todo: list[Any] = list(scene.nodes)
     while todo:
@@ -77,9 +75,8 @@ def _words(scene: Scene) -> set[tuple[str, str]]:
             todo += [link.node for link in node.children]
         else:
             todo += node.children
-        found |= {("transform", transform.kind) for transform in node.transforms}
         if node.material is not None:
-            found |= {("material", node.material.name), *(("operation", op.kind) for op in node.material.ops)}
+            found.add(("material", node.material.name))
     return found
 
 

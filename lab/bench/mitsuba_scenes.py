@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from scenelang.compiler.graph import Fold, Leaf
-from scenelang.compiler.spaces import Stage
+from scenelang.compiler.spaces import EXTINCTION, Stage
 
 SCALAR, VECTORS = "scalar_rgb", "llvm_ad_rgb"
 mi.set_variant(SCALAR)
@@ -52,8 +52,54 @@ def ring(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 0.3 * n + 0.7 * np.stack([np.cos(u), 0 * u, np.sin(u)]), n
 
 
+def capsule(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    p, _ = ball(u, v)
+    return 0.5 * p + 0.5 * np.sign(np.pi / 2 - v) * np.array([[0], [1], [0]]), p
+
+
+def octahedron(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    p, _ = ball(u, v)
+    return p / np.abs(p).sum(0), p
+
+
+def lathed(*corners: tuple[float, float]) -> Surface:
+    """What straight lines between four places (r, y) sweep around the axis; turns have no area."""
+    ends = np.array(corners)
+    along = np.diff(ends, axis=0)
+    normals = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1)[:, None]
+
+    def surface(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        part = np.minimum((v * 3 / np.pi).astype(int), 2)
+        t = np.clip((v * 3 / np.pi - part) * 1.05 - 0.025, 0.0, 1.0)[:, None]
+        p, n = (ends[part] + t * along[part]).T, normals[part].T
+        return tuple(np.stack([a[0] * np.cos(u), a[1], a[0] * np.sin(u)]) for a in (p, n))  # type: ignore[return-value]
+
+    return surface
+
+
+_SIDE, _RIM = 0.5**0.5, 0.75**0.5
+SURFACES: dict[str, Surface] = {
+    "sphere": ball,
+    "torus": ring,
+    "capsule": capsule,
+    "octahedron": octahedron,
+    "cylinder": lathed((0, _SIDE), (_SIDE, _SIDE), (_SIDE, -_SIDE), (0, -_SIDE)),
+    "cone": lathed((0, 1), (_RIM / 2, 0.25), (_RIM, -0.5), (0, -0.5)),
+}
+
+
 def diffuse(rgb: tuple[float, ...]) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(rgb)}}
+
+
+def worn(leaf: Leaf) -> dict[str, Any]:
+    """What a shape with the look of a leaf is made of."""
+    colour = leaf.look.colour()
+    if leaf.look.material == "diffuse":
+        return {"bsdf": {"type": "twosided", "bsdf": diffuse(colour)}}
+    medium: dict[str, Any] = {"type": "homogeneous", "sigma_t": leaf.look.density or EXTINCTION}
+    medium |= {"albedo": {"type": "rgb", "value": list(colour)}, "phase": {"type": "isotropic"}}
+    return {"bsdf": NO_BSDF, "interior": medium}
 
 
 def mesh(surface: Surface, matrix: np.ndarray, leaf: Leaf) -> Any:
@@ -66,17 +112,15 @@ def mesh(surface: Surface, matrix: np.ndarray, leaf: Leaf) -> Any:
     k = len(a) // 2 + 100  # a triangle in the middle; corners run to the left about the normal
     if np.linalg.det(np.stack([p[:, b[k]] - p[:, a[k]], p[:, c[k]] - p[:, a[k]], n[:, a[k]]])) < 0.0:
         b, d = d, b
-    properties, colour = mi.Properties(), leaf.look.colour()
-    if leaf.look.material == "diffuse":
-        properties["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": diffuse(colour)})
-    else:
-        albedo = {"type": "rgb", "value": list(colour)}
-        medium = {"type": "homogeneous", "sigma_t": 3.0, "albedo": albedo, "phase": {"type": "isotropic"}}
-        properties["bsdf"], properties["interior"] = mi.load_dict(NO_BSDF), mi.load_dict(medium)
-    made = mi.Mesh("surface", len(u), 2 * len(a), has_vertex_normals=True, props=properties)
+    properties = mi.Properties()
+    for name, part in worn(leaf).items():
+        properties[name] = mi.load_dict(part)
+    smooth = leaf.geometry != "octahedron"
+    made = mi.Mesh("surface", len(u), 2 * len(a), has_vertex_normals=smooth, props=properties)
     parameters = mi.traverse(made)
     parameters["vertex_positions"] = p.T.ravel()
-    parameters["vertex_normals"] = (n / np.linalg.norm(n, axis=0)).T.ravel()
+    if smooth:
+        parameters["vertex_normals"] = (n / np.linalg.norm(n, axis=0)).T.ravel()
     parameters["faces"] = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).ravel()
     parameters.update()
     return made
@@ -94,25 +138,22 @@ def solids(root: Fold) -> dict[str, Any]:
     return found
 
 
+def sensor(stage: Stage, canvas: tuple[int, int], **sampler: Any) -> dict[str, Any]:
+    """The camera; samples lie anywhere in their pixel and count the same."""
+    camera, (width, height) = stage.camera, canvas
+    film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}}
+    look = mi.ScalarTransform4f().look_at(camera.eye, camera.target, [0, 1, 0])
+    fov = {"fov": math.degrees(camera.fov_rad), "fov_axis": "smaller"}
+    return {"type": "perspective", "to_world": look, "film": film, "sampler": sampler} | fov
+
+
 def exported(objects: dict[str, Any], stage: Stage, canvas: tuple[int, int], samples: int) -> Any:
     """A scene as Mitsuba renders it; samples of a pixel, a square number."""
-    camera, light, ground = stage.camera, stage.light, stage.ground
+    light, ground = stage.lights[0], stage.ground
     scene = {
         "type": "scene",
         "integrator": {"type": "volpath", "max_depth": 2, "rr_depth": 100},
-        "sensor": {
-            "type": "perspective",
-            "fov": math.degrees(camera.fov_rad),
-            "fov_axis": "smaller",
-            "to_world": mi.ScalarTransform4f().look_at(camera.eye, camera.target, [0, 1, 0]),
-            "film": {
-                "type": "hdrfilm",
-                "width": canvas[0],
-                "height": canvas[1],
-                "rfilter": {"type": "box"},
-            },
-            "sampler": {"type": "stratified", "sample_count": samples},
-        },
+        "sensor": sensor(stage, canvas, type="stratified", sample_count=samples),
         "light": {
             "type": "point",
             "position": light.position,

@@ -192,7 +192,7 @@ def body(shape: str, leaf: Leaf) -> str:
 
 def staged(stage: Stage, canvas: tuple[int, int]) -> str:
     """Camera, light, ground and sky."""
-    camera, light, ground = stage.camera, stage.light, stage.ground
+    camera, light, ground = stage.camera, stage.lights[0], stage.ground
     eye, target = np.array(camera.eye), np.array(camera.target)
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, (0.0, 1.0, 0.0))

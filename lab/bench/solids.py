@@ -1,6 +1,6 @@
 """Solids drawn by us, by formulas in the same march, by the reference, POV-Ray and Mitsuba: time and error.
 
-    python -m lab bench solids [-o docs/results/solid-rivals.json] [--scenes N] [--weights FILE ...]
+    python -m lab bench solids [-o docs/results/solid-rivals.json] [--scenes N]
 
 Every way draws every scene once, in turn. Processor time of a warm frame counts, all threads together; the
 time of starting, with reading the scene, stands apart. A picture is compared with the same renderer's of many
@@ -18,7 +18,7 @@ import resource
 import statistics
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -34,14 +34,13 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.graph import Fold, Graph
 from scenelang.compiler.lower import lower
 from scenelang.compiler.manifest import load_manifest
-from scenelang.compiler.weights import Codes, codes_of
 from scenelang.drawing.closed import closed_forms
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.how import Samples, keep_memory
 from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import UNCAPPED_DB, flip, over_white, psnr
 from scenelang.drawing.neural.draw import draw_objects
-from scenelang.drawing.neural.files import load_arrays, solid_arrays
+from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.torch_backend import open_model
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
@@ -93,28 +92,22 @@ def graph_of(scene: Scene) -> Graph:
 
 
 class Net(NamedTuple):
-    """A network or formulas for distances along rays, and the codes of Programs for it."""
+    """A network or formulas for distances along rays, and the ways to sample that are timed."""
 
     field: Any
-    codes: Codes | None = None
     samples: tuple[Samples, ...] = get_args(Samples)
 
 
-def nets(weights: Sequence[Path]) -> dict[str, Net]:
-    """The shipped network, the same where every ray is marched, formulas, and networks of other widths."""
-    network, manifest = load_arrays(MODEL).network, load_manifest(MODEL)
+def nets() -> dict[str, Net]:
+    """The shipped network, the same where every ray is marched, and formulas."""
+    network = load_arrays(MODEL).network
     marched = copy.copy(network)
     marched.__dict__["segment_w"] = []
-    result = {
+    return {
         "network": Net(network),
         "marched": Net(marched, samples=("adaptive",)),
         "formulas": Net(closed_forms(MODEL)),
     }
-    for path in weights:
-        data = path.read_bytes()
-        other = solid_arrays(data, len(manifest.geometries), len(manifest.materials))
-        result[f"width {other.config.width}"] = Net(other, codes_of(manifest, data), ("adaptive", "one"))
-    return result
 
 
 def ours(known: dict[str, Net], scene: Scene) -> Renderer:
@@ -122,7 +115,7 @@ def ours(known: dict[str, Net], scene: Scene) -> Renderer:
     graph = graph_of(scene)
 
     def by(net: Net, samples: Samples) -> TimedPicture:
-        program, field = compile_scene(scene, model=MODEL, codes=net.codes), net.field
+        program, field = compile_scene(scene, model=MODEL), net.field
         image, seconds = timed(lambda: draw_objects(field, program, threads=1, samples=samples).image)
         return TimedPicture(over_white(image), seconds)
 
@@ -268,21 +261,13 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, default=OUT, metavar="FILE")
     parser.add_argument("--side", type=int, default=SIDE, metavar="PIXELS", help="of the pictures")
     parser.add_argument("--scenes", type=int, metavar="N", help="of each set, in place of the usual numbers")
-    parser.add_argument(
-        "--weights",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="of another width, beside ours",
-    )
     parser.add_argument("--kept", type=Path, metavar="FOLDER", help="of converged pictures")
     given = parser.parse_args()
     started = time.perf_counter()
     keep_memory()
     others = {"povray": povray_version(), "mitsuba": mitsuba_scenes.by_vectors()}
     renderers: Renderers = {
-        "ours": partial(ours, nets(given.weights)),
+        "ours": partial(ours, nets()),
         "povray": by_povray,
         "mitsuba": by_mitsuba,
     }

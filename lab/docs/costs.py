@@ -42,8 +42,8 @@ def viewer(found: Any) -> str:
 
 def proof(found: Any) -> str:
     """Proved shares of the pictures of each set, and their cost."""
-    heads = ("set", "scenes", "proved, %", "right, %", "largest bound", "largest error")
-    heads += ("proof", "drawn again", "exact field", "reference")
+    heads = ("set", "proved, %", "right, %", "largest bound", "largest error")
+    heads += ("proof", "drawn again", "exact field")
     rows = []
     for row in found["sets"]:
         shares = [
@@ -51,9 +51,8 @@ def proof(found: Any) -> str:
             f"{100 * row['right']:.2f}",
         ]
         costs = [f"{row[f'x_{way}']:.1f}" for way in ("proof", "redraw", "exact")]
-        costs.append(f"{row['x_reference']:.0f}")
         largest = [f"{row[key]:.2f}" for key in ("bound", "off")]
-        rows.append([f"`{row['set']}`", str(row["scenes"]), *shares, *largest, *costs])
+        rows.append([f"`{row['set']}`", *shares, *largest, *costs])
     return markdown(heads, rows)
 
 

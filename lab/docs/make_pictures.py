@@ -35,11 +35,13 @@ from PIL import ImageDraw, ImageFont
 import scenelang as nsg
 from lab import DOCS
 from lab.charts import budget_chart, stability_chart
-from lab.docs import solid_rivals
+from lab.docs import light_rivals, solid_rivals
 from lab.docs.blocks import pictured
-from lab.evaluate import SceneFigures, sheet
+from lab.docs.figures import read
+from lab.evaluate import SceneFigures, exact_of, sheet
 from lab.frontier.chart import frontier_chart
 from lab.frontier.record import Frontier
+from lab.sets.scenes import draw_scene, scenes_of
 from lab.shadows import measure_shadows
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.weights import read_facts
@@ -52,10 +54,10 @@ EXAMPLES = DOCS.parent / "examples"
 REFERENCE = EXAMPLES / "reference"
 PICTURES = DOCS / "pictures"
 GALLERY = (
-    *("gear", "chess", "flower", "stones", "lava", "lotus"),
-    *("lantern", "walker", "clouds", "mandala", "icecream", "vortex"),
+    *("letters", "chess", "flower", "stones", "watch", "lotus"),
+    *("lantern", "dusk", "clouds", "mandala", "castle", "vortex"),
 )
-GALLERY_FRAMES = {"vortex": 8, "lava": 30, "stones": 48}
+GALLERY_FRAMES = {"vortex": 8, "stones": 48}
 COMPARED = "chain"
 RECORDED = {
     "play.webp",  # by make_play.py
@@ -67,6 +69,7 @@ RECORDED = {
 WHITE_DB = 19.27  # PSNR of a white picture on the scenes of long trainings
 LONGEST_HOURS = 100  # to which their curves are drawn on
 GAP_PX = 8
+STREAMED = 8  # scenes of a strip
 LOUDER = 20  # factor on the difference of two pictures
 SHARPER = 2  # strips and the gallery are drawn larger by this and made smaller again, for screens' sake
 STRIP_PX, LABEL_PX = 150, 20  # a cell of a strip, and the line below it
@@ -256,6 +259,17 @@ def budgets() -> bytes:
     return _few_colours(budget_chart(curves, WHITE_DB, LONGEST_HOURS))
 
 
+def streamed() -> bytes:
+    """Unseen scenes, exact and by the paper's renderers, a row each."""
+    models = [load_model(f"shapes2d-{name}") for name in ("streaming", "streaming-learned", "reading")]
+    scene_at = scenes_of(models[0], "unions", 2021, 64)
+    scenes = [scene_at(index) for index in range(STREAMED)]
+    rows = [[exact_of(scene, models[0].manifest, None) for scene in scenes]]
+    rows += [[draw_scene(model, scene)[1] for scene in scenes] for model in models]
+    cells = [over_white(picture) for row in rows for picture in row]
+    return png(tiled(cells, STREAMED, (128, 128)).quantize(256))
+
+
 def frontier(model: str) -> bytes:
     """The charts of a shipped frontier."""
     return _few_colours(frontier_chart(Frontier.from_json(frontier_path(model).read_bytes())))
@@ -347,10 +361,11 @@ def plan() -> dict[str, Callable[[], bytes]]:
     for model, name in (("shapes2d", "frontier"), ("solids3d", "frontier-solids")):
         if frontier_path(model).exists():
             made[f"{name}.png"] = lambda model=model: frontier(model)
+    made["light-rivals.png"] = lambda: _few_colours(light_rivals.chart(read("light/rivals")["scenes"]))
     made["solid-rivals.png"] = lambda: _few_colours(solid_rivals.chart())
     made["worst-chains.png"] = lambda: worst_cases("chains", 6)
     made["shadows.png"] = shadows
-    made["budgets.png"] = budgets
+    made["budgets.png"], made["experiments/streamed.png"] = budgets, streamed
     made["worst-solids.png"] = lambda: worst_cases("booleans", 6, "solids3d", "solids3d")
     return made
 

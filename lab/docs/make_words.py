@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lab import ROOT
+from lab.docs import textmate
 from scenelang.editors import highlighting
 from scenelang.language import words
 from scenelang.language.tables import tables
@@ -104,7 +105,7 @@ def made() -> dict[Path, str]:
         syntax.read_text("utf-8"), '" Words, written by lab/docs/make_words.py.', '" End of words', vim()
     )
     web = ROOT / "scenelang/web/editor/words.js"
-    return {grammar: highlighting.encode(), syntax: coloured, web: script(), page: text}
+    return {grammar: textmate.encode(), syntax: coloured, web: script(), page: text}
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ from lab import RESULTS
 from lab.docs import solid_rivals
 from lab.docs.figures import kilobytes, numbers, read, told
 from lab.docs.tables import markdown
+from scenelang.drawing.solid.norms import FEATURES, LINES
 
 PLANE = (
     "shapes2d",
@@ -73,10 +74,19 @@ def plus_minus(found: Mapping[str, float], digits: int) -> str:
     return f"{said} ± {found['interval']:.{digits}f}" if "interval" in found else said
 
 
+def decoders(sizes: Mapping[str, int]) -> str:
+    """Layers of a network's decoders by the sizes in its weights."""
+    if "units" not in sizes:
+        return f"2, {sizes['decoder_width']}, {sizes['decoder_width']}, 1"
+    own = f"{FEATURES} features, {LINES * (sizes['units'] + 1)} lines, {sizes['units']} norms, 1"
+    return f"{own}; ways 5, {sizes['segment']}, {sizes['segment']}, 1"
+
+
 def budgets() -> str:
     """Parameters and training cost of each network."""
     rows = []
-    for model, decoder in (("shapes2d", "2, 32, 32, 1"), ("solids3d", "3, 8, 8, 1; ways 5, 32, 32, 1")):
+    for model in ("shapes2d", "solids3d"):
+        decoder = decoders(told(model)["config"]["network"])
         path, minutes = f"models/{model}/weights", told(model)["seconds"] / 60
         sizes = [f"{float(numbers(path)):,.0f}", f"{float(kilobytes(path)):.0f}"]
         rows.append([f"`{model}`", decoder, *sizes, f"{minutes:.0f} minutes of one core"])

@@ -15,13 +15,10 @@ TITLES = {
     OURS: "network",
     "formulas, adaptive": "formulas",
     "marched, adaptive": "network, all marched",
-    "width 4, adaptive": "network of width 4",
-    "width 16, adaptive": "network of width 16",
 }
 COLOURS = {
     "network": "#1f77b4",
     "formulas": "#b0872b",
-    "width": "#1f77b4",
     "reference": "#2f8f5b",
     "POV-Ray": "#c8452f",
     "Mitsuba": "#7b5ea7",
@@ -86,12 +83,6 @@ def _panel(axis: Any, ways: Ways) -> None:
         _line(axis, name, some, best, "-")
         ends = best if name == "Mitsuba" else [best[0], as_near(ways, name)]
         _labels(axis, name, {way: some[way] for way in ends})
-    widths = of(ways, "width")
-    for way, row in widths.items():
-        if way.endswith("adaptive"):
-            at = row["ms"]["median"], row["flip"]["mean"]
-            axis.plot(*at, "s", color=COLOURS["width"], markerfacecolor="white", markersize=6, zorder=3)
-            _label(axis, way.partition(",")[0], at, COLOURS["width"], (7, 5))
     axis.set_ylabel("FLIP against its own converged picture", fontsize=8.5)
     axis.xaxis.set_major_formatter(lambda x, _: f"{x:,g}")
     axis.yaxis.set_major_formatter(lambda y, _: f"{y:g}")

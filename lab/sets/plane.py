@@ -2,21 +2,25 @@
 
 ``shapes2d`` is the base set: 1 to 4 objects, twirl and bend in ±0.8, scale 0.2 to 0.55 per axis, any
 rotation, translation in ±0.7, in that order, colours uniform in 0.1 to 1, 40 % unions only, else tokens
-uniform. The others change one thing each: `leaves2d` has discs and hexagons. `textures2d` has 1 to 4 squares
-with one of the textures each: scale and translation, and of the texture flip, rotation and hue;
-`textures2d-mixed` has the four shapes, warps and booleans, and any moves and colours of textures, one object
-in five being plain.
+uniform. The others change one thing each: `leaves2d` has discs and hexagons, `trees2d` any trees of all
+leaves, with skins. `textures2d` has 1 to 4 squares with one of the textures each: scale and translation, and
+of the texture flip, rotation and hue; `textures2d-mixed` has the four shapes, warps and booleans, and any
+moves and colours of textures, one object in five being plain; `gradients` is that of gradients and all
+leaves. `letters` has 1 to 3 words.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import string
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from scenelang.language.evaluation import loads
 from scenelang.language.scene import (
     Bend,
     Boolean,
@@ -37,11 +41,12 @@ from scenelang.language.scene import (
     SceneNode,
     Shear,
     Shell,
+    Stop,
     Transform,
     Translate,
     Twirl,
 )
-from scenelang.language.words import COMBINE, TEXTURES, Combine
+from scenelang.language.words import COMBINE, LEAVES, TEXTURES, Combine
 
 GEOMETRIES = ("square", "triangle", "star", "pentagon")
 Rng = np.random.Generator
@@ -63,12 +68,14 @@ class SetConfig:
     geometries: tuple[str, ...] = GEOMETRIES
     rotated: bool = True
     # of textures: "few" are flipped, rotated and their hue turned, "any" moved and coloured in any
-    # order, "" has none
-    textures: Literal["", "few", "any"] = ""
+    # order, as "gradients" are, "" has none
+    textures: Literal["", "few", "any", "gradients"] = ""
+    clear: bool = False  # whether most objects show what lies behind
     # how objects are put together: "chain", "groups" (each in two nested groups), "tree", which needs no
     # group of a stream, "any" tree, or the "leaves" of such a tree as a chain
     nest: str = "chain"
     skins: bool = False  # whether objects grow, or are shells, or both
+    words: bool = False  # of the font that ships, in place of leaves
 
 
 SETS: dict[str, SetConfig] = {
@@ -90,7 +97,11 @@ SETS: dict[str, SetConfig] = {
     "crowd": SetConfig(objects=(100, 100), size=0.4),
     "strong": SetConfig(warp=2.4),
     "large": SetConfig(size=3.0),
-    "skins": SetConfig(skins=True),
+    "skins": SetConfig(skins=True, geometries=(*LEAVES[2],)),
+    "trees2d": SetConfig(nest="any", skins=True, geometries=(*LEAVES[2],)),
+    "gradients": SetConfig(textures="gradients", geometries=(*LEAVES[2],)),
+    "opacity": SetConfig(clear=True, geometries=(*LEAVES[2],)),
+    "letters": SetConfig(objects=(1, 3), words=True),
     "textures2d": SetConfig(
         unions=1.0, deformed=False, geometries=("square",), rotated=False, textures="few"
     ),
@@ -142,9 +153,20 @@ def _colour(rng: Rng) -> Color:
     return Color(rgb=(_uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0), _uniform(rng, 0.1, 1.0)))
 
 
+def random_gradient(rng: Rng) -> tuple[str, list[MaterialOp]]:
+    """The kind of a gradient and its 2 to 8 stops; of a quarter two share their place."""
+    places = sorted(rng.uniform(0.0, 1.0, int(rng.integers(2, 9))).tolist())
+    if rng.random() < 0.25:
+        places[-1] = places[-2]
+    return ("linear", "radial")[int(rng.integers(2))], [Stop(at, _colour(rng).rgb) for at in places]
+
+
 def _texture(rng: Rng, config: SetConfig) -> Material:
-    """One of the textures, moved and coloured."""
-    name = TEXTURES[int(rng.integers(len(TEXTURES)))]
+    """One of the textures or a gradient, moved and coloured."""
+    if config.textures == "gradients":
+        name, stops = random_gradient(rng)
+    else:
+        name, stops = TEXTURES[int(rng.integers(len(TEXTURES)))], []
     turn, hue = (_uniform(rng, -math.pi, math.pi) for _ in range(2))
     flips: list[MaterialOp] = [Flip()] if rng.random() < 0.5 else []
     if config.textures == "few":
@@ -159,9 +181,8 @@ def _texture(rng: Rng, config: SetConfig) -> Material:
         Grayscale(amount=_uniform(rng, 0.0, 1.0)),
         _colour(rng),
     ]
-    return Material(
-        name, tuple(some[i] for i in rng.permutation(len(some))[: int(rng.integers(len(some) + 1))])
-    )
+    chosen = [some[i] for i in rng.permutation(len(some))[: int(rng.integers(len(some) + 1))]]
+    return Material(name, (*stops, *chosen))
 
 
 def random_skin(rng: Rng) -> list[Transform]:
@@ -177,7 +198,26 @@ def random_object(rng: Rng, config: SetConfig) -> Object:
     moves = (*(random_skin(rng) if config.skins else ()), *_moves(rng, config))
     if config.textures == "few" or (config.textures and rng.random() < 0.8):
         return Object(geometry, moves, _texture(rng, config))
-    return Object(geometry, moves, Material("flat", (colour,)))
+    clear = config.clear and rng.random() < 0.7
+    return Object(
+        geometry, moves, Material("flat", (colour,), opacity=_uniform(rng, 0.1, 0.9) if clear else 1.0)
+    )
+
+
+def _words(rng: Rng, config: SetConfig) -> Scene:
+    """Words of random letters of the font that ships, a third of them bent."""
+    lines = ["nsg 1;", f"canvas{config.canvas};", 'import "std/letters" as abc;']
+    letters = string.ascii_letters + string.digits + string.punctuation
+    for _ in range(int(rng.integers(config.objects[0], config.objects[1] + 1))):
+        word = "".join(letters[i] for i in rng.integers(len(letters), size=int(rng.integers(1, 9))))
+        bend = f"bend({_uniform(rng, -0.5, 0.5)}); " if rng.random() < 1 / 3 else ""
+        turn, x, y = _uniform(rng, -math.pi, math.pi), _uniform(rng, -0.5, 0.5), _uniform(rng, -0.5, 0.5)
+        moves = (
+            f"{bend}rotate({turn}rad); translate({x}, {y}); material flat {{ color({[*_colour(rng).rgb]}); }}"
+        )
+        size = _uniform(rng, 0.15, 0.8)
+        lines.append(f'abc.text({json.dumps(word)}, size = {size}, align = "center") {{ {moves} }}')
+    return loads("\n".join(lines))
 
 
 def _tree(rng: Rng, leaves: list[SceneNode]) -> SceneNode:
@@ -221,6 +261,8 @@ def chained(rng: Rng, node: SceneNode) -> Chain:
 
 def random_scene(rng: Rng, config: SetConfig) -> Scene:
     model = "shapes2d"
+    if config.words:
+        return _words(rng, config)
     if config.nest in ("any", "leaves"):
         tree = any_tree(rng, lambda: random_object(rng, config))
         node = tree if config.nest == "any" else chained(rng, tree)

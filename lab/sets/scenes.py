@@ -52,7 +52,7 @@ def sets_of(manifest: Manifest) -> dict[str, Callable[[Rng], Scene]]:
         name: partial(random_scene, config=config)
         for name, config in SETS.items()
         if {*config.geometries} <= {*manifest.geometries}
-        and (manifest.elements or not (config.textures or config.skins))
+        and (manifest.elements or not (config.textures or config.skins or config.clear or config.words))
     }
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from lab.sets.plane import Rng, any_tree, random_skin
+from lab.sets.plane import Rng, any_tree, random_gradient, random_skin
 from scenelang.language.scene import (
     Bend,
     Brought,
@@ -35,7 +35,7 @@ from scenelang.language.scene import (
     Twist,
     load_elements,
 )
-from scenelang.language.words import COMBINE
+from scenelang.language.words import COMBINE, LEAVES
 
 Triple = tuple[float, float, float]
 AXES = "xy", "xz", "yx", "yz", "zx", "zy"
@@ -60,6 +60,7 @@ class SolidSet:
     meshes: str = ""  # a file of elements whose solids take the place of spheres and tori
     skins: bool = False  # whether objects grow, or are shells, or both
     trees: bool = False  # any trees of booleans; see `lab.sets.plane.any_tree`
+    gradients: bool = False  # in place of plain colours
     leaves: tuple[str, ...] = ("sphere", "torus")
 
 
@@ -71,12 +72,14 @@ SOLID_SETS: dict[str, SolidSet] = {
     "booleans": SolidSet(unions=0.0, objects=(2, 4), spread=0.5),
     "trees": SolidSet(trees=True, media=0.3, spread=0.5),
     "shuffled": SolidSet(shuffled=True),
-    "skins": SolidSet(skins=True, unions=0.5, size=0.7),
+    "skins": SolidSet(skins=True, unions=0.5, size=0.7, canvas=(256, 256), leaves=(*LEAVES[3],)),
     "wide": SolidSet(canvas=(160, 96)),
     "staged": SolidSet(staged=True),
     "many": SolidSet(objects=(16, 16), media=0.3, size=0.6),
     "mixed": SolidSet(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
     "leaves3d": SolidSet(media=0.3, canvas=(256, 256), leaves=EDGED),
+    "gradients": SolidSet(media=0.3, gradients=True, canvas=(256, 256), leaves=(*LEAVES[3],)),
+    "trees3d": SolidSet(trees=True, skins=True, media=0.3, spread=0.5, size=0.7, leaves=(*LEAVES[3],)),
     "meshes3d": SolidSet(objects=(1, 4), media=0.0, meshes="std/meshes"),
 }
 
@@ -131,7 +134,11 @@ def random_solid(rng: Rng, config: SolidSet) -> Scene:
 
     def solid() -> Object:
         kind = "volumetric" if rng.random() < config.media else "diffuse"
-        material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
+        if config.gradients:
+            name, stops = random_gradient(rng)
+            material = Material(name, (*stops, Rotate(angle=float(rng.uniform(0, math.tau)))), shading=kind)
+        else:
+            material = Material(kind, Color(_triple(rng, 0.1, 1.0)))
         moves = [*(random_skin(rng) if config.skins else ()), *_moves(rng, config)]
         return Object(geometries[int(rng.integers(len(geometries)))], moves, material)
 

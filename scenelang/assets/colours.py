@@ -15,21 +15,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Facts
+from scenelang.assets.pyramid import between
 
 Grid = npt.NDArray[np.float32]  # (3, n, n, n)
+Mask = npt.NDArray[np.bool_]
 _LUMA: Final = np.array([[0.25, 0.5, 0.25], [1.0, 0.0, -1.0], [-0.5, 1.0, -0.5]], np.float32)
-
-
-def between(grid: Grid) -> Grid:
-    """Grid (3, 2 n - 1, …) of a grid's nodes and the linear means between them."""
-    for axis in (1, 2, 3):
-        a = np.moveaxis(grid, axis, 0)
-        out = np.empty((2 * len(a) - 1, *a.shape[1:]), np.float32)
-        out[0::2] = a
-        out[1::2] = (a[:-1] + a[1:]) / 2
-        grid = np.moveaxis(out, 0, axis)
-    return np.ascontiguousarray(grid)
 
 
 def _turned(matrix: npt.NDArray[np.float32], grid: Grid) -> Grid:
@@ -41,9 +32,7 @@ def _widths(element: Element) -> Grid:
     return np.array([1.0, 2.0, 2.0], np.float32).reshape(3, 1, 1, 1) / np.float32(element.sizes[1])
 
 
-def packed(
-    name: str, colours: Grid, near: npt.NDArray[np.bool_], about: dict[str, str | float], steps: int = 40
-) -> Element:
+def packed(name: str, colours: Grid, near: Mask, about: Facts, steps: int = 40) -> Element:
     """The element of colours, 0 to 1; ``near`` (n, n, n) is true where a node counts.
 
     A node of a coarser grid counts where any around it does; in the coarsest grid all count. There are
@@ -54,7 +43,7 @@ def packed(
     result: list[bytes] = []
     for side in element.sides:
         apart = (len(near) - 1) // (side - 1)
-        expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid)
+        expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid, linear=True)
         wanted = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / widths)
         clipped = (wanted.clip(-127, 127) * (_around(near, apart) if result else True)).astype(np.int8)
         grid = expected + clipped * widths
@@ -62,7 +51,7 @@ def packed(
     return replace(element, data=bz2.compress(b"".join(result), 9))
 
 
-def _around(near: npt.NDArray[np.bool_], apart: int) -> npt.NDArray[np.bool_]:
+def _around(near: Mask, apart: int) -> Mask:
     """Mask of every ``apart``-th node: true where a node of ``near`` is closer than that along each axis."""
     for axis in (0, 1, 2) if apart > 1 else ():
         a = np.moveaxis(near, axis, 0)
@@ -79,7 +68,7 @@ def unpacked(element: Element) -> Grid:
     for side in element.sides:
         shape = (3, side, side, side)
         steps = flat[first : first + 3 * side**3].reshape(shape)
-        expected = np.zeros(shape, np.float32) if grid is None else between(grid)
+        expected = np.zeros(shape, np.float32) if grid is None else between(grid, linear=True)
         grid, first = expected + steps * widths, first + steps.size
     assert grid is not None
     return _turned(np.linalg.inv(_LUMA), grid).clip(0.0, 1.0)

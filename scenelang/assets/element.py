@@ -20,6 +20,10 @@ ROOM: Final = 12  # bytes of a curve
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
 
+Facts = dict[str, str | float]
+"""Facts of an element from its maker: text and numbers by name."""
+
+
 class Encoding(NamedTuple):
     """Form of elements."""
 
@@ -67,7 +71,7 @@ class Element:
     sizes: tuple[int, ...]
     coding: str
     data: bytes = field(repr=False)
-    about: dict[str, str | float] = field(default_factory=dict, hash=False, compare=False)
+    about: Facts = field(default_factory=dict, hash=False, compare=False)
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:

@@ -15,10 +15,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from scenelang.assets.element import FORMS, Element, Group, in_range, read_group
+from scenelang.assets.element import FORMS, Element, Facts, Group, in_range, read_group
 from scenelang.assets.element import entry_of as group_entry
 from scenelang.assets.files import read_regular
-from scenelang.assets.font import RESERVED, TENSORS, Font, is_glyph, read_font
+from scenelang.assets.font import GLYPH, RESERVED, TENSORS, Font, read_font
 from scenelang.assets.picture import pixels
 from scenelang.assets.tensors import Tensor, TensorError, read_tensors
 
@@ -46,9 +46,7 @@ class ElementFile:
         """The zoo of elements, without groups."""
         listed = list(elements)
         geometries = {element.name: element for element in listed if not element.material}
-        return ElementFile(
-            geometries, digest, {element.name: element for element in listed if element.material}
-        )
+        return ElementFile(geometries, digest, {e.name: e for e in listed if e.material})
 
     @property
     def elements(self) -> tuple[Element, ...]:
@@ -108,7 +106,7 @@ def read_zoo(data: bytes) -> ElementFile:
         raise TensorError(f"more than {MOST_ELEMENTS:,} groups")
     if font is not None:
         named = (name.removeprefix("material.") for name in (*tensors, *listed_groups))
-        if taken := next((name for name in named if name in RESERVED or is_glyph(name)), ""):
+        if taken := next((name for name in named if name in RESERVED or GLYPH.fullmatch(name)), ""):
             raise TensorError(f"an element called `{taken[:40]}` beside a font, to which that name belongs")
         zoo = replace(zoo, geometries=zoo.geometries | font.glyphs, font=font)
     held = zoo.geometries, zoo.materials
@@ -148,7 +146,7 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
     return Element(name, entry["form"], sizes, coding, bytes(body[tensor.first : tensor.last]), about)
 
 
-def _about(said: Any, whose: str) -> dict[str, str | float]:
+def _about(said: Any, whose: str) -> Facts:
     if not isinstance(said, dict) or not all(k.isidentifier() and is_said(v) for k, v in said.items()):
         raise TensorError(f"what {whose} says of itself is not text and numbers")
     return said

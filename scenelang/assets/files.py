@@ -24,6 +24,11 @@ _NO_BRACKETS: Final = re.compile(r'(?:"(?:[^"\\]++|\\.)*+"?|[^\[\]{}"]++)++', re
 _STEPS: Final = {"[": 1, "{": 1, "]": -1, "}": -1}
 
 
+def reason(error: BaseException) -> str:
+    """Reason that the system gives for an error, in lower case."""
+    return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()
+
+
 class NotWritten(OSError):
     """A file could not be written; its name is the one that was asked for."""
 

@@ -7,13 +7,14 @@ one's. Nothing here is learned, as curves are exact and small.
 
 from __future__ import annotations
 
+import re
 import sys
 from array import array
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
-from scenelang.assets.element import MOST_CURVES, ROOM, Element
+from scenelang.assets.element import MOST_CURVES, ROOM, Element, Facts
 from scenelang.assets.tensors import Tensor, TensorError
 
 MOST_LETTERS: Final = 40_000
@@ -64,7 +65,7 @@ class FontError(ValueError):
 class Font:
     """A font, by its tables as `TENSORS` has them; raises `TensorError` where they do not fit together."""
 
-    def __init__(self, tables: Mapping[str, Any], columns: int, about: dict[str, str | float]) -> None:
+    def __init__(self, tables: Mapping[str, Any], columns: int, about: Facts) -> None:
         self.tables, self.columns, self.about = dict(tables), columns, about
         codes, numbers, ends, classes, self._kerning, curves = (tables[name] for name in TENSORS)
         count = len(codes)
@@ -124,19 +125,16 @@ class Font:
         return float(self._kerning[row * self.columns + column]) / UNIT
 
 
+GLYPH: Final = re.compile("u[0-9a-f]{4,}")
+"""Names that elements of letters may have."""
+
+
 def name_of(character: str) -> str:
     """Name of a letter's element: ``u0041``."""
     return f"u{ord(character):04x}"
 
 
-def is_glyph(name: str) -> bool:
-    """Return whether elements of letters may have a name."""
-    return name[:1] == "u" and len(name) > 4 and all(c in "0123456789abcdef" for c in name[1:])
-
-
-def read_font(
-    columns: int, about: dict[str, str | float], tensors: Mapping[str, Tensor], body: memoryview
-) -> Font:
+def read_font(columns: int, about: Facts, tensors: Mapping[str, Tensor], body: memoryview) -> Font:
     """The font of a file of tensors; raises `TensorError`."""
     tables: dict[str, Any] = {}
     for name, (kind, code) in TENSORS.items():

@@ -12,7 +12,7 @@ import struct
 import warnings
 from typing import TYPE_CHECKING, Final
 
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Facts
 from scenelang.assets.tensors import TensorError
 
 if TYPE_CHECKING:
@@ -134,9 +134,7 @@ def texels(element: Element) -> npt.NDArray[np.float32]:
     return flat.astype(np.float32) / np.float32(255)
 
 
-def painted(
-    name: str, colours: npt.NDArray[np.uint8], about: dict[str, str | float] | None = None
-) -> Element:
+def painted(name: str, colours: npt.NDArray[np.uint8], about: Facts | None = None) -> Element:
     """The element of a picture (h, w, 3), without loss."""
     from PIL import Image
 

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import MOST_SIDE, Element
+from scenelang.assets.element import MOST_SIDE, Element, Facts
 
 Grid = npt.NDArray[np.float32]
 FINE: Final = 24.0  # steps in a cell's side near the surface
@@ -31,14 +31,17 @@ FIRST: Final = 400.0
 FARTHEST: Final = 4.0  # larger than any distance in the cube
 
 
-def between(grid: Grid) -> Grid:
-    """The grid of twice as many cells: the nodes, and what lies between them by cubics."""
-    for axis in range(grid.ndim):
+def between(grid: Grid, linear: bool = False) -> Grid:
+    """The grid of twice as many cells: the nodes, and what lies between them by cubics.
+
+    Of colours (3, n, …) it is ``linear``: the means of neighbours.
+    """
+    for axis in range(int(linear), grid.ndim):
         a = np.moveaxis(grid, axis, 0)
         n = len(a)
         out = np.empty((2 * n - 1, *a.shape[1:]), np.float32)
         out[0::2] = a
-        if n < 4:
+        if n < 4 or linear:
             out[1::2] = (a[:-1] + a[1:]) / 2
         else:
             middle = a[1:-2] + a[2:-1]
@@ -80,11 +83,7 @@ def refine(
 
 
 def packed(
-    name: str,
-    cells: int,
-    steps: list[npt.NDArray[np.int8]],
-    about: dict[str, str | float],
-    finer: bool = False,
+    name: str, cells: int, steps: list[npt.NDArray[np.int8]], about: Facts, finer: bool = False
 ) -> Element:
     """The element of a pyramid's steps, the last of them finer or not."""
     raw = b"".join(grid.tobytes() for grid in steps)

@@ -113,10 +113,8 @@ def _tensor(name: str, entry: Any) -> Tensor:
         raise TensorError(f"tensor `{name}` has no shape")
     if not _are_sizes(place) or len(place) != 2:
         raise TensorError(f"tensor `{name}` has no place in the file")
-    if math.prod(shape) * int(_TYPES[kind][2:]) != place[1] - place[0]:
-        raise TensorError(
-            f"tensor `{name}` is {kind} {shape}, which does not take {place[1] - place[0]:,} bytes"
-        )
+    if math.prod(shape) * int(_TYPES[kind][2:]) != (size := place[1] - place[0]):
+        raise TensorError(f"tensor `{name}` is {kind} {shape}, which does not take {size:,} bytes")
     return Tensor(kind, tuple(shape), place[0], place[1])
 
 

@@ -12,17 +12,8 @@ from scenelang.drawing.how import DEFAULT, Device, How
 from scenelang.drawing.small import load_of
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.reports import SceneError
-from scenelang.output.frontier import (
-    Limits,
-    NothingFits,
-    Point,
-    choose,
-    load_frontier,
-    machine_scale,
-    offers,
-    refusal,
-    yardstick,
-)
+from scenelang.output import frontier
+from scenelang.output.frontier import Limits, NothingFits, Point
 
 
 def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Input]:
@@ -35,7 +26,7 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Inp
             asked = "--max-ms" if limits.ms is not None else "--max-flip"
             other = "--device cuda" if job.how.device == "cuda" else "--backend and --samples"
             raise click.UsageError(f"{asked} chooses how to draw on processors; leave out {other}.")
-    here_ms, able = yardstick(), []
+    here_ms, able = frontier.yardstick(), []
     for job in jobs:
         try:
             _choose(job, limits, model, here_ms)
@@ -50,19 +41,19 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
     program = job.program
     assert program is not None
     try:
-        frontier = load_frontier(program.model)
+        measured = frontier.load_frontier(program.model)
     except ValueError as error:
         raise NothingFits(f"the frontier of `{program.model}` is damaged: {error}") from None
-    if frontier is None:
+    if measured is None:
         raise NothingFits(f"model `{program.model}` ships no frontier to choose from")
-    reasons = {point.name: refusal(point, job.scene, program, model) for point in frontier.points}
+    reasons = {point.name: frontier.refusal(point, job.scene, program, model) for point in measured.points}
     # those that are not offered are for charts only
-    refused = {p.name: why for p in frontier.points if (why := reasons[p.name]) is not None and p.offered}
-    able = [point for point in frontier.points if reasons[point.name] is None]
-    scale = machine_scale(frontier, here_ms)
-    result = offers(able, load_of(program), program.canvas, scale)
+    refused = {p.name: why for p in measured.points if (why := reasons[p.name]) is not None and p.offered}
+    able = [point for point in measured.points if reasons[point.name] is None]
+    scale = frontier.machine_scale(measured, here_ms)
+    result = frontier.offers(able, load_of(program), program.canvas, scale)
     while True:
-        offer, notes = choose(result, limits, refused)
+        offer, notes = frontier.choose(result, limits, refused)
         point, compiled = offer.point, _compiled(job, program, offer.point)
         if not isinstance(compiled, str):
             break
@@ -73,7 +64,7 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
     samples = point.samples if point.backend == "neural" else "adaptive"
     job.program, job.how = compiled, How(point.backend, device, job.how.threads, samples)
     speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
-    like = f"errors are promised for scenes like those of the set `{frontier.set}`"
+    like = f"errors are promised for scenes like those of the set `{measured.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""
     others = [f"not in question: {name}: {why}" for name, why in refused.items()]
     own = program_notes(compiled, "chosen by the frontier") if point.backend == "neural" else []

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import click
 
-from scenelang.assets.files import NotWritten, inputs_kept
+from scenelang.assets.files import NotWritten, inputs_kept, reason
 from scenelang.cli.say import say_diagnostics
 from scenelang.drawing.how import RenderError
 from scenelang.language.reports import SceneError
@@ -134,10 +134,10 @@ class Commands(Reporting):
 
 def describe(error: OSError) -> str:
     """A system error in a line."""
-    reason = (error.strerror or str(error) or "unreadable").lower()
+    why = reason(error)
     if isinstance(error, NotWritten):
-        return f"cannot write `{error.filename}`: {reason}"
-    return f"{error.filename}: {reason}" if error.filename else reason
+        return f"cannot write `{error.filename}`: {why}"
+    return f"{error.filename}: {why}" if error.filename else why
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

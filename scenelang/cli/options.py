@@ -18,7 +18,6 @@ from scenelang.drawing.how import CHOICES, HELP, How
 
 if TYPE_CHECKING:
     from scenelang.language.evaluation import Source
-    from scenelang.language.session import Defines
     from scenelang.output.encoders import Palette
     from scenelang.output.frames import FrameRange, Target
 
@@ -121,9 +120,8 @@ def positive(name: str, metavar: str, help: str, *, high: float | None = None, d
 
 def several(*names: str, of: tuple[str, ...], help: str) -> Option:
     """An option that takes one of some words, and may be given several times."""
-    return click.option(
-        *names, multiple=True, type=click.Choice(of), help=f"{help}; may be given several times."
-    )
+    help += "; may be given several times."
+    return click.option(*names, multiple=True, type=click.Choice(of), help=help)
 
 
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
@@ -149,12 +147,6 @@ def assignments(ctx: click.Context, param: click.Parameter, values: tuple[str, .
     return result
 
 
-def _defines(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> Defines:
-    from scenelang.language.session import Defines
-
-    return Defines(assignments(ctx, param, values))
-
-
 def _frames(ctx: click.Context, param: click.Parameter, value: str | None) -> FrameRange | None:
     if value is None:
         return None
@@ -176,7 +168,7 @@ define = click.option(
     "defines",
     multiple=True,
     metavar="NAME=VALUE",
-    callback=_defines,
+    callback=assignments,
     help="Set a param of the scene; may be given several times.",
 )
 model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
@@ -229,10 +221,11 @@ def _bundle(into: str, build: Callable[..., Any], options: Mapping[str, Option],
     return decorate
 
 
-def _requested(defines: Defines, frame: int | None, **own: Any) -> Request:
+def _requested(defines: Mapping[str, str], frame: int | None, **own: Any) -> Request:
     from scenelang.language.evaluation import Source
+    from scenelang.language.session import Defines
 
-    return Request(Source(params=defines, **own), frame)
+    return Request(Source(params=Defines(defines), **own), frame)
 
 
 def field(name: str) -> Option:

@@ -153,9 +153,7 @@ def fix_text(
         return [(name if d.span is not None and d.span.source.name == name else None, d) for d in result]
 
     settled = settle({name: text}, look)
-    left = Diagnostics()
-    left.items.extend(d for _, d in settled.left)
-    return settled.texts[name], left
+    return settled.texts[name], Diagnostics(d for _, d in settled.left)
 
 
 def _look(source: Source, all_frames: bool) -> Diagnostics:

@@ -115,7 +115,10 @@ def _lifted(leaves: list[Leaf], manifest: Manifest, codes: Codes) -> npt.NDArray
         shapes = [codes.geometry.get(leaf.geometry, nothing) for leaf in leaves]
         painted = [codes.material[leaf.look.material] for leaf in leaves]
         moved, opacities = [leaf.look.moved for leaf in leaves], [leaf.look.opacity for leaf in leaves]
-        vectors = lift_colours(colours, painted, layout, moved, opacities)
+        looks = [leaf.look for leaf in leaves]
+        more = () if all(look.matte for look in looks) else ("density", "roughness", "glow")
+        lights = {name: [getattr(look, name) for look in looks] for name in more}
+        vectors = lift_colours(colours, painted, layout, moved, opacities, **lights)
         vectors += lift_many(levels, shapes, layout)  # these fill other places of the vectors
     if (width := vectors.shape[1]) != WIDTH:
         raise ProgramError(f"model `{manifest.name}` lifts to {width} numbers, not {WIDTH}")

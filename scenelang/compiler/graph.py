@@ -4,8 +4,8 @@ A constant material is white everywhere, so its look folds to one colour, in the
 operations of a texture are kept in order, as each clamps, and no matrix clamps or turns a hue.
 
 A leaf is one object. A fold is a boolean node, a group or a chain, joined from the left: ``(first op second)
-op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a new graph. Walks are
-without recursion, so that depth costs memory and never the interpreter's stack.
+op third …``. Moves are nearest the leaf first. Everything is frozen; a pass builds a new graph. Walks may
+go as deep as the graph, for which `check_scene` makes room.
 
 A *level* asks for the box around all points whose world distance is below it, which a later `smooth` can
 feel. World distance is the leaf's own distance times the smallest stretch of its affine maps, so a level
@@ -29,10 +29,11 @@ from scenelang.compiler.spaces import Box, Space, Stage
 from scenelang.compiler.steps import Affine, Rows, Step, composed
 from scenelang.language.diagnostics import Span
 from scenelang.language.scene import Color, Grayscale, Hue, MaterialOp
-from scenelang.language.words import BLEND, Combine
+from scenelang.language.words import BLEND, REFLECTING, Combine
 
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
+BLACK: Triple = (0.0, 0.0, 0.0)
 LUMA: Triple = (0.2126, 0.7152, 0.0722)
 MOST_STEPS = 1_000  # operations on the colours of a texture, in their normal form
 
@@ -45,7 +46,8 @@ class Look(Record):
 
     ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture or a gradient
     (``element``) stand instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was
-    written first first. ``opacity`` is the share, in [0, 1], that it hides of what lies behind.
+    written first first. ``opacity`` is the share, in [0, 1], that it hides of what lies behind. ``density``,
+    ``roughness`` and ``glow`` are as in `Parts`; what reflects is ``diffuse`` with a roughness.
     """
 
     material: str
@@ -54,6 +56,9 @@ class Look(Record):
     element: Element | Gradient | None = None
     texture: tuple[Affine, ...] = ()
     opacity: float = 1.0
+    density: float = 0.0
+    roughness: float = 0.0
+    glow: Triple = BLACK
 
     def colour(self) -> Triple:
         """The colour of a constant material; of a texture, what white would become."""
@@ -62,13 +67,28 @@ class Look(Record):
     def folded(self) -> Look:
         """The same look in its normal form: of a constant material one colour."""
         if self.element is None:
-            plain = Look(self.material, rgb=self.colour(), opacity=self.opacity)
-            return plain if self.texture or self.colours else self
+            plain = (), self.colour(), None, ()
+            return Look(self.material, *plain, *self.own) if self.texture or self.colours else self
         colours, moved = normal(self.colours), composed(self.texture)
         texture = (Affine(moved),) if self.texture else ()
         if (colours, texture) == (self.colours, self.texture):
             return self
-        return Look(self.material, colours, self.rgb, self.element, texture, self.opacity)
+        return Look(self.material, colours, self.rgb, self.element, texture, *self.own)
+
+    @property
+    def own(self) -> tuple[float, float, float, Triple]:
+        """What operations on colours do not touch."""
+        return self.opacity, self.density, self.roughness, self.glow
+
+    @property
+    def shading(self) -> str:
+        """The word of its kind."""
+        return self.material if not self.roughness else REFLECTING[self.roughness < 0.0]
+
+    @property
+    def matte(self) -> bool:
+        """True where it sends out no light, and is of the usual density or reflects evenly."""
+        return not self.density and not self.roughness and self.glow == BLACK
 
     @property
     def plain(self) -> bool:
@@ -243,32 +263,26 @@ class Graph(Record):
     def rows(self) -> list[Row]:
         """The leaves in order; folds among the links of folds are groups, whose first link is a leaf."""
         result: list[Row] = []
-        open_folds = [(iter(self.root.links), False)]
-        first: Link | None = None  # of a group, before its first leaf
-        while open_folds:
-            links, cut = open_folds[-1]
-            link = next(links, None)
-            if link is None:
-                open_folds.pop()
-                if open_folds:
+
+        def walk(fold: Fold, cut: bool, group: Link | None) -> None:
+            for at, link in enumerate(fold.links):
+                begun, cuts = group if at == 0 else None, cut or link.op == "subtract"
+                if isinstance(link.node, Leaf):
+                    joined = begun or link
+                    result.append(Row(joined.op, link.node, joined.k, begun is not None, 0, cuts))
+                else:
+                    walk(link.node, cuts, link)
                     result[-1] = result[-1]._replace(ends=result[-1].ends + 1)
-                continue
-            cuts = cut or link.op == "subtract"
-            if isinstance(link.node, Fold):
-                first = link
-                open_folds.append((iter(link.node.links), cuts))
-                continue
-            op, k = (link.op, link.k) if first is None else (first.op, first.k)
-            result.append(Row(op, link.node, k, first is not None, 0, cuts))
-            first = None
+
+        walk(self.root, False, None)
         return result
 
     def window(self) -> Box:
         """The part of the world that decides the picture; below the ground nothing is seen or lit."""
         if (stage := self.stage) is not None:
             floor = -inf if stage.ground is None else stage.ground.y
-            seen = stage.camera.eye[1] > floor and stage.light.position[1] > floor
-            return (-inf, floor - BELOW if seen else -inf, inf, inf, -inf, inf)
+            lowest = min([stage.camera.eye[1], *(at.position[1] - at.radius for at in stage.lights)])
+            return (-inf, floor - BELOW if lowest > floor else -inf, inf, inf, -inf, inf)
         width, height = self.canvas
         side = min(width, height)
         return -width / side, -height / side, width / side, height / side, 0.0, 0.0
@@ -278,21 +292,7 @@ def bottom_up(root: Node, leaf: Callable[[Leaf], T], fold: Callable[[Fold, list[
     """The value of ``root``: a leaf is worth ``leaf(it)``, a fold ``fold(it, its children's values)``."""
     if isinstance(root, Leaf):
         return leaf(root)
-    open_folds: list[tuple[Fold, list[T]]] = [(root, [])]
-    while True:
-        node, done = open_folds[-1]
-        if len(done) < len(node.links):
-            child = node.links[len(done)].node
-            if isinstance(child, Leaf):
-                done.append(leaf(child))
-            else:
-                open_folds.append((child, []))
-            continue
-        value = fold(node, done)
-        open_folds.pop()
-        if not open_folds:
-            return value
-        open_folds[-1][1].append(value)
+    return fold(root, [bottom_up(link.node, leaf, fold) for link in root.links])
 
 
 def nodes(root: Node) -> Iterator[Node]:
@@ -454,9 +454,8 @@ def _fold_fault(fold: Fold, depth: int, holds: frozenset[Invariant]) -> str | No
         return "the first link of a fold is a union"
     if fold.moves and Invariant.AT_LEAVES in holds:
         return Invariant.AT_LEAVES.value
-    if Invariant.STREAM in holds and (
-        depth > MOST_OPEN or (fold.links and isinstance(fold.links[0].node, Fold))
-    ):
+    begun = bool(fold.links) and isinstance(fold.links[0].node, Fold)
+    if Invariant.STREAM in holds and (depth > MOST_OPEN or begun):
         return Invariant.STREAM.value
     if depth and Invariant.COMPOSITE in holds and len(fold.links) < 2:
         return Invariant.COMPOSITE.value

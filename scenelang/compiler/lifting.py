@@ -10,7 +10,7 @@ the other); the outermost of a group comes first. Behind them lie, in the order 
 and frequency of a displacement (in space), the width of a blend (0 where it is the usual one, or none), the
 frame of the texture, the colour and the code of the material. The colour is the diagonal of a 3 x 4 matrix,
 row by row, whose other nine places, `OTHERS`, hold what is rarely written: how far the leaf grows, how thick
-its shell is, 1 - opacity, and the order of growing and shell (`Skin`); the others are free.
+its shell is, 1 - opacity, the order of growing and shell (`Skin`), density, roughness and glow.
 
 Every part is a function of the scene alone, and each transformation acts on the vector linearly: an affine
 map multiplies its frame by its inverse; a warp shifts the warps of its group by one place and writes itself
@@ -63,6 +63,9 @@ class Parts(NamedTuple):
     grow: Array = 0.0  # this and what follows as in `Skin`
     shell: Array = 0.0
     order: Array = 0.0
+    density: Array = 0.0  # (…,) extinction of a medium per world unit; 0: the usual one
+    roughness: Array = 0.0  # (…,) of what is glossy, minus it of metal; 0: neither
+    glow: Array = 0.0  # (…, 3) linear
 
 
 class Layout:
@@ -79,9 +82,12 @@ class Layout:
         colour = at.pop("colour").start
         at.pop("free", None)
         one, width = at.pop("one").start, at.pop("width").start
-        grow, shell, clear, order, *_ = self.others = [colour + place for place in OTHERS]
+        self.others = [colour + place for place in OTHERS]
+        grow, shell, clear, order, density, *_, roughness = self.others
+        # of colours the diagonal
         own = {"rgb": slice(colour, colour + 12, 5), "clear": clear, "grow": grow, "shell": shell}
-        self.places = Parts(**at, **own, one=one, width=width, order=order)  # of colours the diagonal
+        light = {"density": density, "roughness": roughness, "glow": slice(colour + 7, colour + 10)}
+        self.places = Parts(**at, **own, **light, one=one, width=width, order=order)
         self.dimension, self.geometry = dimension, int(self.places.bulge.stop)
         self.outer, self.inner = sizes["outer"] // STRENGTHS, sizes["inner"] // STRENGTHS
         rows = range(dimension)
@@ -156,9 +162,10 @@ def lift_colours(
     layout: Layout = PLANE_LAYOUT,
     moved: Sequence[Rows] = (),
     opacities: Sequence[float] = (),
+    **lights: Sequence[Any],
 ) -> np.ndarray:
     """Vectors (N, 64) in float64 of materials: colours (r, g, b) in [0, 1], maps that move textures, and
-    opacities in [0, 1].
+    opacities in [0, 1]; densities and the like by the names of `Parts`.
     """
     count = len(colours)
     texture = [PLANE_LAYOUT.identity] * count  # textures lie in a plane
@@ -167,7 +174,7 @@ def lift_colours(
             texture[at] = tuple(inverse_frame(map, 2))
     rgb, material = (np.asarray(each, np.float64).reshape(count, -1) for each in (colours, codes))
     clear = 1.0 - np.asarray(opacities or [1.0] * count, np.float64)
-    return layout.pack(count, texture=texture, rgb=rgb, clear=clear, material=material)
+    return layout.pack(count, texture=texture, rgb=rgb, clear=clear, material=material, **lights)
 
 
 Doubles = npt.NDArray[np.float64]

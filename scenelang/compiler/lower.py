@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
 from scenelang.compiler import graph, steps
-from scenelang.compiler.graph import MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
+from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, stage_of
+from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, decoded, stage_of
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, compose
 from scenelang.language import nodes as schema
 from scenelang.language import words
-from scenelang.language.diagnostics import Diagnostics, Label, Span, listing
+from scenelang.language.diagnostics import Diagnostics, Edit, Fix, Label, Span, listing
+from scenelang.language.library import SpanMap
 from scenelang.language.scene import Brought, Scene
 from scenelang.language.words import SCENES, Combine
 
@@ -59,17 +61,12 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
     return Refusal("E0312", fact, f"stretches between {1 / REACH:g} and {REACH:g} can be undone")
 
 
+ROUGHNESS: Final = 0.3  # of what reflects, where it is not written
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
 
 
-class Spans(Protocol):
-    """Places of a Scene's nodes in text, such as the evaluator's SpanMap."""
-
-    def span(self, node: object) -> Span | None:
-        """The place of ``node``, None where it is unknown."""
-
-
+Spans = SpanMap
 Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
 """Objects, by identity, with the material around them and their leaves."""
 
@@ -93,13 +90,16 @@ def lower(
     _check_canvas(scene, manifest, spans.span(scene) if spans else None, diagnostics)
     for word in words.STAGE if manifest.dimension == 2 else ():
         if (stated := getattr(scene, word)) != "default":
-            place = None if spans is None else spans.span(stated) or spans.span(scene)
+            first = stated[0] if isinstance(stated, tuple) else stated
+            place = None if spans is None else spans.span(first) or spans.span(scene)
             fact = f"model `{manifest.name}` is flat and has no {word}"
             diagnostics.add("E0511", fact, place, help="leave it out; flat scenes have none")
     space = SPACES[manifest.dimension]
     old: Leaves = {} if memory is None or memory.model != manifest.name else memory.leaves
     brought = Brought.of(scene.elements)
-    lowering = _Lowering(manifest, space, spans, diagnostics, old, None if memory is None else {}, brought)
+    created: Leaves | None = None if memory is None else {}
+    lit = scene.sky != "default"
+    lowering = _Lowering(manifest, space, spans, diagnostics, old, created, brought, lit)
     root = lowering.run(scene)
     if memory is not None and lowering.created is not None:
         memory.leaves, memory.model = lowering.created, manifest.name
@@ -166,6 +166,7 @@ class _Lowering:
     old: Leaves  # of the previous frame
     created: Leaves | None  # leaves of this frame; None without a memory
     brought: Brought
+    lit: bool  # by a sky
     objects: int = 0
     origin: object = None  # decides between flat and solid: a scene with a model, else the first object
     looks: dict[int, Look] = field(default_factory=dict)
@@ -283,22 +284,58 @@ class _Lowering:
             shading = name
             if material.shading is not None:
                 self.say("E0502", f"`{name}` is not a texture", material, f"leave `{material.shading}` out")
-        if shading not in manifest.materials:
-            offered = (*manifest.materials, *words.PAINTS) if shading is name else manifest.materials
+        if shading not in manifest.shadings:
+            offered = (*manifest.shadings, *words.PAINTS) if shading is name else manifest.shadings
             self.refuse("E0502", "material", shading, offered, material)
         moves = tuple(self.texture_moves(material, element))
         colours = graph.colour_steps(map(self.space.inked, material.ops))
         if len(graph.normal(colours)) > MOST_STEPS and element is not None:
             self.say("E0320", f"more than {MOST_STEPS:,} operations on the colours of `{name}`", material)
-        if material.opacity != 1.0 and not manifest.translucent:
-            fact = f"model `{manifest.name}` has no `opacity`"
-            flat = "leave it out, or draw with another model"
-            help = flat if self.space.dimension == 2 else "in space mist is translucent: material volumetric"
-            self.say("E0380", fact, material, help)
-        look = self.looks[id(material)] = Look(
-            shading, colours, element=element, texture=moves, opacity=material.opacity
-        )
+        own = self.properties(material, shading)
+        kind = "diffuse" if shading in words.REFLECTING else shading
+        look = self.looks[id(material)] = Look(kind, colours, graph.WHITE, element, moves, *own)
         return look
+
+    def properties(
+        self, material: schema.Material, shading: str
+    ) -> tuple[float, float, float, tuple[float, float, float]]:
+        """Opacity, density, roughness and glow, as looks have them; reports those that do not fit."""
+        manifest, solid = self.manifest, self.space.dimension == 3
+        for name in words.PROPERTIES:
+            if getattr(material, name) == schema.LATER[name]:
+                continue
+            if not (manifest.framed and not solid if name == "opacity" else manifest.lights):
+                help = "leave it out, or draw with another model"
+                if name == "opacity" and solid:
+                    help = "in space mist is translucent: material volumetric, with a density"
+                self.say("E0380", f"model `{manifest.name}` has no `{name}`", material, help)
+            elif shading not in words.KINDS_WITH.get(name, (shading,)):
+                kinds = " and ".join(f"`{kind}`" for kind in words.KINDS_WITH[name])
+                self.say("E0393", f"a `{name}` of `{shading}`", material, f"it is of {kinds}")
+        roughness = 0.0
+        if shading in words.REFLECTING and manifest.lights:
+            if not self.lit:
+                self.dark(material, shading)
+            roughness = ROUGHNESS if material.roughness is None else material.roughness
+        glow, power = BLACK, 0.0
+        if material.glow is not None:
+            glow, power = decoded(material.glow.color), material.glow.power
+        r, g, b = (power * channel for channel in glow)
+        signed = -roughness if shading == "metal" else roughness
+        return material.opacity, material.density or 0.0, signed, (r, g, b)
+
+    def dark(self, material: schema.Material, shading: str) -> None:
+        """Report what reflects where no sky is, once; the fix adds one at the end of the scene's text."""
+        if ("E0392", "") in self.said:
+            return
+        self.said.add(("E0392", ""))
+        fix, main = None, None if self.spans is None else self.spans.main
+        if main is not None and not re.search(r"\bmodule\s+sky\b", main.text):
+            end = len(main.text)
+            line = "sky();\n" if main.text.endswith("\n") else "\nsky();\n"
+            fix = Fix("add `sky();`", (Edit(Span(main, end, end), line),))
+        fact, help = f"`{shading}` reflects light from everywhere, and there is no sky", "write sky();"
+        self.diagnostics.add("E0392", fact, self.place(material), help=help, fix=fix)
 
     def gradient(self, material: schema.Material) -> Gradient | None:
         """The gradient of a material, with colours in the space that they are averaged in."""
@@ -340,7 +377,7 @@ class _Lowering:
             fact = f"{what} `{name}` belongs to {SCENES[other]} scenes, and this one is {SCENES[here]}"
             help = f"a scene is flat or solid; model `{self.manifest.name}` has {listed}"
             if what == "material":
-                help = f"write material {' or '.join(self.manifest.materials)} in its place"
+                help = f"write material {' or '.join(self.manifest.shadings)} in its place"
             place = self.place(self.origin)
             labels = () if place in (None, self.place(node)) else (Label(place, f"{SCENES[here]} by this"),)
             self.say(code, fact, node, help, labels)

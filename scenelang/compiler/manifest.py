@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenelang.assets.files import note_input, read_json
+from scenelang.language.words import REFLECTING
 
 ROOT = Path(__file__).parent / "models"
 ALIASES: Final = {"textures2d": "shapes2d"}
 """Earlier names of models, which scenes, Programs and commands may go on to use."""
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 """The model of scenes of a dimension that name none."""
-_DRAWN: Final = {
-    2: ("element of the plane", "texture"),
-    3: ("element of space", "texture", "colouring of space"),
-}
+_DRAWN = {2: ("element of the plane", "texture"), 3: ("element of space", "texture", "colouring of space")}
 """Kinds of users' elements that renderers draw, for models of the exact lifting."""
 
 
@@ -87,9 +85,14 @@ class Manifest:
         return self.renderer in ("framed", "solid") and self.lifting == "exact"
 
     @property
-    def translucent(self) -> bool:
-        """True where it draws objects of any opacity."""
-        return self.framed and self.dimension == 2
+    def lights(self) -> bool:
+        """True where it draws what glows, reflects or is of any density, under any lights."""
+        return self.framed and self.dimension == 3
+
+    @property
+    def shadings(self) -> tuple[str, ...]:
+        """The ways of lighting that materials may name: its own, and those that reflect."""
+        return self.materials + REFLECTING if self.lights else self.materials
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""

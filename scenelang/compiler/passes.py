@@ -269,7 +269,11 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is inside this `{holder.geometry}`"
         context.diagnostics.add("E0408", fact, holder.span, help="move the camera or the object")
-    elif depth < 0.0 and holder is not None and (through := exp(EXTINCTION * depth)) < _DIM:
+    elif (
+        depth < 0.0
+        and holder is not None
+        and (through := exp((holder.look.density or EXTINCTION) * depth)) < _DIM
+    ):
         x, y, z = eye
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is deep inside this `{holder.geometry}`, a medium"
         help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
@@ -427,9 +431,8 @@ def _unseen(graph: Graph, leaf: Leaf) -> tuple[str, Span | None, str]:
     if graph.stage is None:
         far = _is_far(leaf_box(leaf, 0.0, graph.space))
         return "everything lies off the canvas", leaf.span, _units(graph, far)
-    eye, target = (
-        ", ".join(f"{v:g}" for v in p) for p in (graph.stage.camera.eye, graph.stage.camera.target)
-    )
+    camera = graph.stage.camera
+    eye, target = (", ".join(f"{v:g}" for v in p) for p in (camera.eye, camera.target))
     help = f"the camera at [{eye}] looks at [{target}], and the ground hides what is below it; "
     return "no object is in sight", leaf.span, f"{help}move the objects, or turn the camera by `target`"
 

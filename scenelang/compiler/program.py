@@ -8,7 +8,8 @@ header lists them, ``forms`` I32 (N,) has the index of each row's geometry, and 
 their bytes. Where some are materials it is format 3, with a table of paints (`Paint`) and ``worn`` I32 (N,),
 the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
 where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
-places `OTHERS` of vectors, or ``samples`` other than 4, which the header then has, it is format 5.
+places `OTHERS` of vectors, ``samples`` other than 4, which the header then has, or a stage that has a sky or
+another count of lights than one, or one of a radius, it is format 5.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
 from scenelang.compiler.manifest import ALIASES, available, load_manifest
 from scenelang.compiler.spaces import Stage, read_stage, stage_data
 from scenelang.language.diagnostics import plural
-from scenelang.language.nodes import SAMPLES
+from scenelang.language.nodes import MOST, SAMPLES
 from scenelang.language.words import TOKENS
 
 GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
@@ -257,7 +258,13 @@ class Program:
         if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
             return True
         outlines = any(element.form == "outline" for element in self.elements)
-        return outlines or any(isinstance(paint.element, Gradient) for paint in self.palette)
+        return outlines or self.lit or any(isinstance(paint.element, Gradient) for paint in self.palette)
+
+    @property
+    def lit(self) -> bool:
+        """True where not one point light lights all, or an object glows, reflects or is of a density."""
+        others = LAYOUTS[3].others[4:]
+        return self.stage is not None and (not self.stage.plain or bool(self.vectors[:, others].any()))
 
     def _layout(self) -> Layout | None:
         """The layout of its vectors, None where their numbers are those of a learned lifting."""
@@ -376,10 +383,29 @@ def _check_settings(program: Program) -> None:
         raise ProgramError(fault)
     if type(program.samples) is not int or program.samples not in SAMPLES:
         raise ProgramError(f"{program.samples!r} samples of a pixel, where 4 and 16 are allowed")
+    if fault := _light_fault(program):
+        raise ProgramError(fault)
     if not program.model:
         raise ProgramError("no model is named")
     if len(program.weights) != 64 or not set(program.weights) <= set("0123456789abcdef"):
         raise ProgramError("the digest of the weights is not 64 hexadecimal digits")
+
+
+def _light_fault(program: Program) -> str | None:
+    """Say what is wrong with densities, roughnesses and glow, None where nothing is."""
+    if program.stage is None or not program.lit:
+        return None
+    parts = LAYOUTS[3].unpack(program.vectors)
+    if not ((parts.density >= 0.0) & (parts.density <= 100.0)).all():
+        return "a density outside 0..100"
+    rough = abs(parts.roughness[parts.roughness != 0.0])
+    if not ((rough >= np.float32(0.05)) & (rough <= 1.0)).all():
+        return "a roughness outside 0.05..1"
+    if rough.size and program.stage.sky is None:
+        return "an object that reflects, and no sky"
+    if not ((parts.glow >= 0.0) & (parts.glow <= MOST)).all():
+        return f"a glow outside 0..{MOST:g}"
+    return None
 
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
@@ -457,6 +483,8 @@ def parse_program(data: bytes) -> Program:
         staged = None if stage is None else read_stage(stage)
     except ValueError as error:
         raise ProgramError(f"a damaged stage: {error}") from None
+    if staged is not None and not staged.plain and header["format"] < NEWEST:
+        raise ProgramError(f"a damaged stage: lights that format {header['format']} does not have")
     return Program(
         vectors=tensors["vectors"],
         tokens=tensors["tokens"],

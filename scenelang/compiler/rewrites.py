@@ -14,7 +14,6 @@ Later links of the operand that may stand apart do: ``S u (x n y u z)`` is ``S u
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
 from functools import partial
 
 from scenelang.assets.records import Record
@@ -85,13 +84,10 @@ def _linked(fold: Fold, children: list[Node | None], context: Context) -> list[L
     for index, (link, child) in enumerate(zip(fold.links, children, strict=True)):
         if child is None:
             if link.op == "intersect" and links:
-                context.diagnostics.add(
-                    "W0401",
-                    "an intersection with an empty node, which leaves nothing",
-                    link.node.span,
-                    labels=[Label(fold.span, "the intersection")] if fold.span is not None else [],
-                    help="give the node a child, or drop it",
-                )
+                fact = "an intersection with an empty node, which leaves nothing"
+                help = "give the node a child, or drop it"
+                labels = [] if fold.span is None else [Label(fold.span, "the intersection")]
+                context.diagnostics.add("W0401", fact, link.node.span, labels=labels, help=help)
                 links.clear()
         elif links:
             links.append(Link(link.op, child, link.k))
@@ -269,42 +265,27 @@ def _core(link: Link, operand: Fold) -> int:
     return 1
 
 
-class _OpenFold(Record, frozen=False):
-    """A fold whose children are being visited, and the moves from its children's space to the world."""
-
-    fold: Fold
-    outward: Moves
-    links: list[Link] = field(default_factory=list)
-
-
 def push_transforms(graph: Graph, context: Context) -> Graph:
     """Append to each leaf's moves those of all folds around it, from the inside out.
 
     Moves that do nothing vanish and neighbouring affine maps compose, so that chains stay short at any depth.
     Before: any graph. After: AT_LEAVES, MERGED.
     """
-    stack = [_OpenFold(graph.root, graph.root.moves)]
-    while True:
-        here = stack[-1]
-        if len(here.links) < len(here.fold.links):
-            link = here.fold.links[len(here.links)]
+
+    def pushed(fold: Fold, outward: Moves) -> Fold:
+        links: list[Link] = []
+        for link in fold.links:
             node = link.node
             if isinstance(node, Fold):
-                stack.append(_OpenFold(node, _tidy(node, here.outward)))
+                node = pushed(node, _tidy(node, outward))
+            elif outward:
+                node = node.changed(node.look, _tidy(node, outward))
             else:
-                if here.outward:
-                    leaf = node.changed(node.look, _tidy(node, here.outward))
-                else:
-                    leaf = node.noted("push_transforms", _alone)
-                here.links.append(Link(link.op, leaf, link.k))
-            continue
-        stack.pop()
-        fold = Fold(here.fold.kind, tuple(here.links), (), here.fold.span)
-        if not stack:
-            return graph.rooted(fold)
-        above = stack[-1]
-        link = above.fold.links[len(above.links)]
-        above.links.append(Link(link.op, fold, link.k))
+                node = node.noted("push_transforms", _alone)
+            links.append(Link(link.op, node, link.k))
+        return Fold(fold.kind, tuple(links), (), fold.span)
+
+    return graph.rooted(pushed(graph.root, graph.root.moves))
 
 
 def _alone(leaf: Leaf) -> Leaf:
@@ -342,10 +323,7 @@ def fold_warps(graph: Graph, context: Context) -> Graph:
     def change(leaf: Leaf) -> Leaf:
         if not leaf.moves:
             return leaf
-        if exact:
-            moves = normal(leaf.moves, graph.space)
-        else:
-            moves = merged([move for move in leaf.moves if not move.step.idle])
+        moves = normal(leaf.moves, graph.space) if exact else _tidy(leaf, ())
         return leaf if moves == leaf.moves else leaf.changed(leaf.look, moves)
 
     return map_leaves(graph, change, "fold_warps")

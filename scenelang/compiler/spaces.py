@@ -43,7 +43,7 @@ from scenelang.compiler.steps import (
     inverted,
 )
 from scenelang.language import scene
-from scenelang.language.nodes import MOST, camera_fault, light_fault
+from scenelang.language.nodes import LAMPS, MOST, camera_fault, light_fault
 
 if TYPE_CHECKING:
     from scenelang.language.scene import Scene
@@ -91,11 +91,23 @@ class Camera(Record):
 
 
 class Light(Record):
-    """A point light: at distance r it sends ``power rgb / r²``."""
+    """A lamp: at distance r it sends ``power rgb / r²``; one of a ``radius`` is a sphere of even radiance."""
 
     position: Triple = (2.5, 4.0, 3.0)
     power: float = 28.0
     rgb: Triple = (1.0, 1.0, 1.0)
+    radius: float = 0.0
+
+    def __repr__(self) -> str:
+        return _said(self)
+
+
+class Sky(Record):
+    """The sky as it lights a scene: ``power`` times these linear colours, from everywhere."""
+
+    power: float = 1.0
+    horizon: Triple = HORIZON
+    zenith: Triple = ZENITH
 
 
 class Ground(Record):
@@ -106,39 +118,86 @@ class Ground(Record):
 
 
 class Stage(Record):
-    """A 3D scene without its objects; the ground fades into ``horizon``, ``transparent`` draws no sky."""
+    """A 3D scene without its objects; the ground fades into ``horizon``, ``transparent`` draws no sky.
+
+    Light goes on from surface to surface where there is a ``sky``, and there is no ambient light.
+    """
 
     camera: Camera = Camera()
-    light: Light = Light()
+    lights: tuple[Light, ...] = (Light(),)  # LAMPS at most
     ground: Ground | None = Ground()
     horizon: Triple = HORIZON
     zenith: Triple = ZENITH
     transparent: bool = False
+    sky: Sky | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether one point light lights it, and no sky: what stages were before there was more."""
+        return self.sky is None and len(self.lights) == 1 and not self.lights[0].radius
+
+    def __repr__(self) -> str:
+        return _said(self)
 
     def fault(self) -> str | None:
         """Say why it shows nothing, None where it does."""
         camera = camera_fault(self.camera.eye, self.camera.target, self.camera.fov_rad)
-        return light_fault(self.light.power) if camera is None else camera[1]
+        faults = [] if camera is None else [camera[1]]
+        faults += [f"more than {LAMPS} lights"] if len(self.lights) > LAMPS else []
+        faults += [f"a radius of {light.radius:g} is negative" for light in self.lights if light.radius < 0.0]
+        powers = [light.power for light in self.lights] + ([self.sky.power] if self.sky else [])
+        faults += [fault for power in powers if (fault := light_fault(power))]
+        return faults[0] if faults else None
 
 
-def stage_data(part: Record) -> dict[str, Any]:
-    """A stage, or a part of it, as JSON data: an object of its fields."""
+def _fields(part: Record) -> dict[str, Any]:
+    """The fields of a stage or a part of it, of a plain one those that it had when there was no more."""
     names: tuple[str, ...] = part.__match_args__
-    values = [getattr(part, name) for name in names]
-    return {n: stage_data(v) if isinstance(v, Record) else v for n, v in zip(names, values, strict=True)}
+    fields = {name: getattr(part, name) for name in names}
+    if isinstance(part, Light) and not part.radius:
+        del fields["radius"]
+    if isinstance(part, Stage) and part.plain:
+        del fields["sky"]
+        (light,) = part.lights
+        return {"light" if n == "lights" else n: light if n == "lights" else v for n, v in fields.items()}
+    return fields
+
+
+def _said(part: Record) -> str:
+    """The text of a stage or a part of it, which digests of Programs hold."""
+    return f"{type(part).__name__}({', '.join(f'{n}={v!r}' for n, v in _fields(part).items())})"
+
+
+def stage_data(part: Any) -> Any:
+    """A stage, or a part of it, as JSON data: an object of its fields. A plain stage has one ``light``."""
+    if isinstance(part, tuple) and part and isinstance(part[0], Record):
+        return [stage_data(each) for each in part]
+    if not isinstance(part, Record):
+        return part
+    return {name: stage_data(value) for name, value in _fields(part).items()}
 
 
 def read_stage(data: object) -> Stage:
     """Read a stage from JSON data, the inverse of `stage_data`; raises ValueError for other data."""
+    if isinstance(data, dict) and "light" in data:
+        data = {"lights" if n == "light" else n: [v] if n == "light" else v for n, v in data.items()}
+        data.setdefault("sky", None)
     return cast("Stage", _read(Stage(), data, "stage"))
 
 
 def _read(usual: Any, value: Any, name: str) -> Any:
     """A value of the kind that the default has."""
+    if name == "lights":
+        if not isinstance(value, list) or len(value) > LAMPS:
+            raise ValueError(f"`lights` are not a list of {LAMPS} at most")
+        return tuple(_read(Light(), each, "light") for each in value)
+    if name in {"ground", "sky"} and value is None:
+        return None
+    usual = Sky() if name == "sky" else usual
     if isinstance(usual, Record):
         names: tuple[str, ...] = usual.__match_args__
-        if name == "ground" and value is None:
-            return None
+        if isinstance(usual, Light) and isinstance(value, dict):
+            value = {"radius": 0.0, **value}
         if not isinstance(value, dict) or value.keys() != set(names):
             raise ValueError(f"`{name}` has fields missing or unknown")
         return type(usual)(**{n: _read(getattr(usual, n), value[n], n) for n in names})
@@ -153,17 +212,27 @@ def _read(usual: Any, value: Any, name: str) -> Any:
 
 def stage_of(scene: Scene) -> Stage:
     """The stage of a scene, with defaults for what it does not state; written colours are decoded."""
-    camera, light, ground, sky = Camera(), Light(), scene.ground, scene.background
+    camera, ground, backdrop = Camera(), scene.ground, scene.background
+    lights: tuple[Light, ...] = (Light(),)
     if scene.camera != "default":
         camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov)
     if scene.light != "default":
-        light = Light(scene.light.position, scene.light.power, decoded(scene.light.color))
+        written = scene.light if isinstance(scene.light, tuple) else (scene.light,)
+        lamps = [lamp for lamp in written if lamp is not None]
+        lights = tuple([Light(at.position, at.power, decoded(at.color), at.radius) for at in lamps])
     plane = None if ground is None else Ground()
     if ground is not None and ground != "default":
         plane = Ground(ground.y, Ground().rgb if ground.color == "default" else decoded(ground.color))
-    if sky is None or sky == "default":
-        return Stage(camera, light, plane, transparent=sky is None)
-    return Stage(camera, light, plane, decoded(sky), decoded(sky))
+    horizon, zenith, own = HORIZON, ZENITH, scene.sky
+    if painted := backdrop is not None and backdrop != "default":
+        horizon = zenith = decoded(backdrop)
+    if own == "default":
+        return Stage(camera, lights, plane, horizon, zenith, backdrop is None)
+    low = horizon if own.horizon == "default" else decoded(own.horizon)
+    high = zenith if own.zenith == "default" else decoded(own.zenith)
+    if not painted:  # the eye sees what lights
+        horizon, zenith = low, high
+    return Stage(camera, lights, plane, horizon, zenith, backdrop is None, Sky(own.power, low, high))
 
 
 def _cross(a: Triple, b: Triple) -> Triple:

@@ -45,45 +45,38 @@ class Warp(Record):
         return self.twirl == 0.0 and self.bend == (0.0, 0.0)
 
 
-class Twist(Record):
+class _Measured(Record):
+    """A step that changes nothing where a number of it is 0."""
+
+    @property
+    def idle(self) -> bool:
+        names: tuple[str, ...] = self.__match_args__
+        return 0.0 in [getattr(self, name) for name in names]
+
+
+class Twist(_Measured):
     """A turn of each point about the y axis by ``twist p.y`` radians; see the module for its sense."""
 
     twist: float
 
-    @property
-    def idle(self) -> bool:
-        return self.twist == 0.0
 
-
-class Displace(Record):
+class Displace(_Measured):
     """Adds ``amount sin(f x) sin(f y) sin(f z)`` to the leaf's distance at (x, y, z), f the ``frequency``."""
 
     amount: float
     frequency: float
 
-    @property
-    def idle(self) -> bool:
-        return self.amount == 0.0 or self.frequency == 0.0
 
-
-class Grow(Record):
+class Grow(_Measured):
     """Takes ``r`` off the leaf's distance."""
 
     r: float
 
-    @property
-    def idle(self) -> bool:
-        return self.r == 0.0
 
-
-class Shell(Record):
+class Shell(_Measured):
     """Makes the leaf's distance d to ``|d| - w / 2``."""
 
     w: float
-
-    @property
-    def idle(self) -> bool:
-        return self.w == 0.0
 
 
 Turn = Warp | Twist

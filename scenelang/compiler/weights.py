@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from scenelang.assets.files import read_regular
+from scenelang.assets.files import read_regular, reason
 from scenelang.assets.tensors import TensorError, read_tensors
 from scenelang.compiler.manifest import MANIFEST, ROOT, Manifest, load_manifest, model_folder
 
@@ -81,8 +81,7 @@ def shipped_weights(name: str, digest: str = "", path: Path | None = None) -> by
     try:
         return read_regular(path or weights_path(name, digest), MOST_BYTES)
     except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        raise ModelError(f"cannot read the weights of `{name}`: {why}") from error
+        raise ModelError(f"cannot read the weights of `{name}`: {reason(error)}") from error
 
 
 class Weights(NamedTuple):
@@ -155,7 +154,6 @@ def _rows(
     table = tensors.get(key)
     if table is None or table.dtype not in ("float32", "float16") or table.shape != (len(names), side):
         held = "is missing" if table is None else f"is {table.dtype} {list(table.shape)}"
-        raise ModelError(
-            f"damaged weights: tensor `{key}` {held}; {len(names)} rows of {side} floats are needed"
-        )
+        needed = f"{len(names)} rows of {side} floats are needed"
+        raise ModelError(f"damaged weights: tensor `{key}` {held}; {needed}")
     return {name: tuple(row) for name, row in zip(names, table.tolist(), strict=True)}

@@ -8,7 +8,6 @@ place.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -35,58 +34,39 @@ class Arrays:
     """Functions on arrays of numpy; a subclass has those of another library."""
 
     to_numpy: ClassVar[Any] = staticmethod(np.asarray)
+    array: ClassVar[Any] = staticmethod(lambda values, like: values)  # of a numpy array, where another lies
+    full: ClassVar[Any] = staticmethod(lambda shape, value, like: np.full(shape, value, like.dtype))
     concat: ClassVar[Any] = staticmethod(np.concatenate)  # (parts, axis)
     stack: ClassVar[Any] = staticmethod(np.stack)  # (parts, axis)
     copy: ClassVar[Any] = staticmethod(np.copy)
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     order: ClassVar[Any] = staticmethod(lambda x: x.argsort(kind="stable"))  # indices that sort (M,)
+    take: ClassVar[Any] = staticmethod(lambda x, index: x.take(index, -1))  # entries (…, k) of (…, M)
     frozen: ClassVar[Any] = staticmethod(lambda x: x)  # the same numbers, without their gradients
+    wide: ClassVar[Any] = staticmethod(lambda x: x.astype(np.float64))
+    narrow: ClassVar[Any] = staticmethod(lambda x: x.astype(np.float32))
+    whole: ClassVar[Any] = staticmethod(lambda x: x.astype(np.intp))  # integers, to index with
+    largest: ClassVar[Any] = staticmethod(lambda x: x.max(-2, keepdims=True))  # over rows: (…, 1, M)
+    least: ClassVar[Any] = staticmethod(lambda x: x.min(0))  # (M,) of (R, M)
+    total: ClassVar[Any] = staticmethod(lambda x: np.add.reduce(x, 0))  # the sum (M,) of (R, M)
+    above: ClassVar[Any] = staticmethod(lambda x: np.maximum(x, 0.0, out=x))  # parts above zero, in place
+    sigmoid: ClassVar[Any] = staticmethod(lambda x: 1.0 / (1.0 + np.exp(-x)))
     exp: ClassVar[Any] = np.exp
     log: ClassVar[Any] = np.log
     cos: ClassVar[Any] = np.cos
     sin: ClassVar[Any] = np.sin
+    acos: ClassVar[Any] = np.arccos
     sqrt: ClassVar[Any] = np.sqrt
     floor: ClassVar[Any] = np.floor
     minimum: ClassVar[Any] = np.minimum
     maximum: ClassVar[Any] = np.maximum
     select: ClassVar[Any] = staticmethod(np.where)  # (mask, where it holds, elsewhere)
-
-    def array(self, values: np.ndarray, like: Array) -> Array:
-        """An array of a numpy array, where another one lies."""
-        return values
-
-    def full(self, shape: tuple[int, ...], value: float, like: Array) -> Array:
-        """An array of one value, of the type of another one and where that lies."""
-        return np.full(shape, value, like.dtype)
-
-    def wide(self, x: Array) -> Array:
-        """In float64."""
-        return x.astype(np.float64)
-
-    def narrow(self, x: Array) -> Array:
-        """In float32."""
-        return x.astype(np.float32)
-
-    def whole(self, x: Array) -> Array:
-        """As integers, to index with."""
-        return x.astype(np.intp)
-
-    def largest(self, x: Array) -> Array:
-        """The largest over rows: (…, 1, M) of (…, R, M)."""
-        return x.max(-2, keepdims=True)
-
-    def least(self, x: Array) -> Array:
-        """The least of the first axis: (M,) of (R, M)."""
-        return x.min(0)
-
-    def above(self, x: Array) -> Array:
-        """The parts above zero, in place."""
-        return np.maximum(x, 0.0, out=x)
-
-    def total(self, x: Array) -> Array:
-        """The sum over the first axis: (M,) of (R, M)."""
-        return np.add.reduce(x, 0)
+    # a context: no gradients are kept, and numbers beyond float32 pass without a warning
+    inference: ClassVar[Any] = staticmethod(lambda: np.errstate(all="ignore"))
+    one_core: ClassVar[Any] = staticmethod(
+        lambda: None
+    )  # have this thread compute each operation on one core
 
     def unit(self, x: Array) -> Array:
         """Clamped to [0, 1], in place."""
@@ -121,10 +101,6 @@ class Arrays:
             np.maximum(x, 0.0, out=x)
         return self.dense(x, *layers[-1]).swapaxes(0, 1).reshape(-1, blocks * each)[:, :count]
 
-    def sigmoid(self, x: Array) -> Array:
-        """``1 / (1 + exp(-x))``."""
-        return 1.0 / (1.0 + np.exp(-x))
-
     def smooth(self, x: Array, layers: Smooth) -> Array:
         """Layers with SiLU between: (out, M) of (in, M)."""
         result = np.empty((len(layers[-1][1]), x.shape[1]), x.dtype)
@@ -143,10 +119,6 @@ class Arrays:
             np.matmul(layers.joined[-1], inputs, out=into)
         return result
 
-    def take(self, x: Array, index: Array) -> Array:
-        """Entries (…, k) of (…, M)."""
-        return x.take(index, -1)
-
     def put(self, x: Array, index: Array, values: Array) -> None:
         """Overwrite entries of (M,) or (R, M) by values (k,) or (R, k)."""
         if x.ndim == 1:
@@ -158,14 +130,7 @@ class Arrays:
     def add(self, x: Array, index: Array, values: Array) -> None:
         """Add values (R, k) to entries of (R, M), to some of them more than once."""
         for row, value in zip(x, values, strict=True):
-            row += np.bincount(index, value, len(row))
-
-    def inference(self) -> AbstractContextManager[object]:
-        """Within it no gradients are kept, and numbers beyond float32 pass without a warning."""
-        return np.errstate(all="ignore")
-
-    def one_core(self) -> None:
-        """Have this thread compute each operation on one core."""
+            np.add.at(row, index, value)
 
     def each(self, threads: int, work: Callable[[Any], object], items: Sequence[Any]) -> None:
         """Call ``work`` on each item, in so many threads if there is more than one item."""

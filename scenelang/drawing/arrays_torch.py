@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from functools import reduce
 
 import numpy as np
@@ -30,9 +29,22 @@ class Torch(Arrays):
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
     order = staticmethod(lambda x: x.argsort(stable=True))
+    take = staticmethod(lambda x, index: x.index_select(-1, index))  # many times as fast as a subscript
+    put = staticmethod(lambda x, index, values: x.index_copy_(-1, index, values))
+    add = staticmethod(lambda x, index, values: x.index_add_(-1, index, values))
     frozen = staticmethod(Tensor.detach)
+    full = staticmethod(lambda shape, value, like: like.new_full(shape, value))
+    wide, narrow, whole = (staticmethod(convert) for convert in (Tensor.double, Tensor.float, Tensor.long))
+    largest = staticmethod(lambda x: x.amax(-2, keepdim=True))
+    least = staticmethod(lambda x: x.amin(0))
+    total = staticmethod(lambda x: x.sum(0))
+    above = staticmethod(lambda x: x.relu_())
+    unit = staticmethod(lambda x: x.clamp(0.0, 1.0))
+    sigmoid = staticmethod(Tensor.sigmoid)
+    inference = staticmethod(torch.no_grad)
+    one_core = staticmethod(lambda: torch.set_num_threads(1))
     exp, log, cos, sin = torch.exp, torch.log, torch.cos, torch.sin
-    sqrt, floor = torch.sqrt, torch.floor
+    acos, sqrt, floor = torch.acos, torch.sqrt, torch.floor
     minimum, maximum, select = torch.minimum, torch.maximum, torch.where
 
     def array(self, values: np.ndarray, like: Tensor) -> Tensor:
@@ -40,33 +52,6 @@ class Torch(Arrays):
         if like.device.type == "cuda":  # from page-locked memory, for which the host need not wait
             result = result.pin_memory()
         return result.to(like.device, non_blocking=True)
-
-    def full(self, shape: tuple[int, ...], value: float, like: Tensor) -> Tensor:
-        return like.new_full(shape, value)
-
-    def wide(self, x: Tensor) -> Tensor:
-        return x.double()
-
-    def narrow(self, x: Tensor) -> Tensor:
-        return x.float()
-
-    def whole(self, x: Tensor) -> Tensor:
-        return x.long()
-
-    def largest(self, x: Tensor) -> Tensor:
-        return x.amax(-2, keepdim=True)
-
-    def least(self, x: Tensor) -> Tensor:
-        return x.amin(0)
-
-    def above(self, x: Tensor) -> Tensor:
-        return x.relu_()
-
-    def total(self, x: Tensor) -> Tensor:
-        return x.sum(0)
-
-    def unit(self, x: Tensor) -> Tensor:
-        return x.clamp(0.0, 1.0)
 
     def length(self, p: Sequence[Tensor]) -> Tensor:
         first, *rest = p
@@ -93,28 +78,10 @@ class Torch(Arrays):
             x = self.dense(x, *layer).relu()
         return self.dense(x, *layers[-1])
 
-    def sigmoid(self, x: Tensor) -> Tensor:
-        return x.sigmoid()
-
     def smooth(self, x: Tensor, layers: Smooth) -> Tensor:
         for layer in layers[:-1]:
             x = silu(self.dense(x, *layer), inplace=not torch.is_grad_enabled())
         return self.dense(x, *layers[-1])
-
-    def take(self, x: Tensor, index: Tensor) -> Tensor:
-        return x.index_select(-1, index)  # many times as fast as a subscript
-
-    def put(self, x: Tensor, index: Tensor, values: Tensor) -> None:
-        x.index_copy_(-1, index, values)
-
-    def add(self, x: Tensor, index: Tensor, values: Tensor) -> None:
-        x.index_add_(-1, index, values)
-
-    def inference(self) -> AbstractContextManager[object]:
-        return torch.no_grad()
-
-    def one_core(self) -> None:
-        torch.set_num_threads(1)
 
 
 TORCH = Torch()

@@ -149,7 +149,7 @@ class ClosedSolids(SolidArrays):
         return np.stack(slopes(q))
 
     def join(
-        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted
+        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted, switched: int = 1
     ) -> tuple[Array, Array]:
         tokens, joined = cell.own[0], None
         for token in np.unique(tokens):
@@ -159,7 +159,8 @@ class ClosedSolids(SolidArrays):
         register, paint = memory[1:], joined[2]
         if wanted != Wanted.DISTANCE:
             register = register + paint * (look[-len(register) :] - register)
-            register[-1] = np.where(paint > 0.5, look[-1], memory[-1])
+            last = slice(-min(switched, len(register)), None)
+            register[last] = np.where(paint > 0.5, look[last], memory[last])
         return np.concatenate([joined[:1], register]), joined[1]
 
     def box(self, layers: Smooth | Norms) -> np.ndarray:

@@ -265,6 +265,8 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
 
     credit: str = ""
     """Whose work it shows and under which licenses; PNG files hold it, and a copy of the array does not."""
+    noise: float = 0.0
+    """Standard error of a channel where the picture was found by chance; a copy does not hold it."""
 
     def to_uint8(self) -> npt.NDArray[np.uint8]:
         """8-bit values, floor(255 v + 1/2)."""

@@ -43,6 +43,7 @@ from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
 from scenelang.drawing.arrays import NUMPY, Layers
 from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
+from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
@@ -77,23 +78,21 @@ class WrittenObject(NamedTuple):
         """Leaf units by which points within a reach of the leaf, and ``far`` from the world's, may be off."""
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
-    def mispainted(self, reach: float, far: float) -> float:
-        """Distance by which (u, v) of a texture may be off there."""
+    def mispainted(self, reach: float, far: float) -> tuple[float, float]:
+        """Distance by which (u, v) of a texture may be off there, and a channel of its colours, apart from
+        hard edges.
+        """
+        if (element := self.look.element) is None:
+            return 0.0, 0.0
         reach = min(reach, _seen(self.steps, far))
-        return _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
-
-    def discoloured(self, off: float) -> float:
-        """Greatest error of a channel of a texture's colours, apart from hard edges, where (u, v) is off."""
-        if self.look.element is None:
-            return 0.0
-        element = self.look.element
+        lost = off = _misplaced((*self.look.texture, *self.steps), _seen(self.look.texture, reach))
         off *= element.slope if isinstance(element, Gradient) else max(element.sizes)
         for kind, *numbers in self.look.colours:
             if kind == "hue":
                 off = 6 * (off + EPS * abs(numbers[0]))
             else:  # shares clamp nothing and tear no colours apart
                 off *= 1 + 2 * max(0.0, max(numbers) - 1.0, -min(numbers))
-        return off
+        return lost, off
 
 
 def _seen(steps: Sequence[Step], far: float) -> float:
@@ -362,10 +361,7 @@ class Stream:
         opacity = np.array([leaf.look.opacity for leaf in self._leaves])
         self._opacity = opacity if (opacity < 1.0).any() else None
         self._painted = np.array([leaf.look.element is not None for leaf in leaves], bool)
-        self._mispainted = [leaf.mispainted(w, far) if leaf.look.element else 0.0 for leaf, w in own]
-        self._discoloured = [
-            leaf.discoloured(off) for leaf, off in zip(leaves, self._mispainted, strict=True)
-        ]
+        self._off = [leaf.mispainted(within, far) for leaf, within in own]  # of textures, (u, v) and colours
 
     def crowd(self, canvas: tuple[int, int]) -> float:
         """Mean number of objects that reach a place on the canvas."""
@@ -391,9 +387,8 @@ class Stream:
             else:
                 result = self._known[name].exact(p)
             low[some], high[some] = result
-        return (
-            _worn(Interval(low, high), *self._skins[:, which]) if self._skins.any() else Interval(low, high)
-        )
+        bare = Interval(low, high)
+        return _worn(bare, *self._skins[:, which]) if self._skins.any() else bare
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
         """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or in regions about them, which
@@ -405,10 +400,11 @@ class Stream:
             low[:, some], high[:, some] = 0.0, 1.0
             if sampled:
                 p = carry_back(look.texture, q[:, some])
-                seen, off = colour_at(look, p).T, self._discoloured[at] * np.ones(len(p[0]))
+                seen, (torn, lost) = colour_at(look, p).T, self._off[at]
+                off = lost * np.ones(len(p[0]))
                 if isinstance(look.element, Gradient):
-                    s, torn = along(look.element, p[0], p[1]), self._mispainted[at] + HARD
-                    off[np.any([abs(s - edge) <= torn for edge in look.element.edges or (np.inf,)], 0)] = 1.0
+                    s, edges = along(look.element, p[0], p[1]), look.element.edges or (np.inf,)
+                    off[np.any([abs(s - edge) <= torn + HARD for edge in edges], 0)] = 1.0
                 low[:, some], high[:, some] = np.fmax(seen - off, 0.0), np.fmin(seen + off, 1.0)
         if self._opacity is None:
             return Interval(low, high)
@@ -512,10 +508,6 @@ CROWD = 32  # objects in reach of a place, above which fewer pixels are asked at
 ROUNDING = 2e-7  # of a channel: what is lost where pictures are kept in float32
 
 
-class ProofError(Exception):
-    """A picture of a kind of which nothing is proved."""
-
-
 def prove_image(
     lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
 ) -> tuple[Image, Proof]:
@@ -523,7 +515,7 @@ def prove_image(
     picture and its proof, from the scene as written and its stream of leaves.
 
     If ``redraw``, pixels not proved right to `PROVED` are drawn again, by exact distances where bounds are
-    not enough. Raises `ProofError` where the model is not of the plane, learned more than distances, or a
+    not enough. Raises `RenderError` where the model is not of the plane, learned more than distances, or a
     file is missing, `ModelError` where one is damaged.
     """
     stream = Stream(lowered, graph, manifest, known_errors(manifest))
@@ -531,7 +523,7 @@ def prove_image(
     if graph.background is not None:
         behind = np.asarray(graph.background, np.float64)
     if image.shape != (height, width, len(behind)):
-        raise ProofError(f"a picture of {image.shape}, where the scene has {(height, width, len(behind))}")
+        raise RenderError(f"a picture of {image.shape}, where the scene has {(height, width, len(behind))}")
     picture = np.array(image, np.float64)
     if clear := graph.background is None:
         picture[..., :3] *= picture[..., 3:]
@@ -567,9 +559,9 @@ def _off(drawn: Floats, shown: Interval) -> Floats:
 def known_errors(manifest: Manifest) -> dict[str, Errors]:
     """Proved errors of the distances of geometries; raises as `prove_image`."""
     if manifest.dimension != 2:
-        raise ProofError("pictures of solids are not proved, those of the plane are")
+        raise RenderError("pictures of solids are not proved, those of the plane are")
     if not manifest.framed:
-        raise ProofError(f"pictures of `{manifest.name}` are not proved, as it learned where points lie too")
+        raise RenderError(f"pictures of `{manifest.name}` are not proved, as it learned where points lie too")
     if not (known := load_errors()):
-        raise ProofError(f"no proof comes with these weights of `{PROVER}`")
+        raise RenderError(f"no proof comes with these weights of `{PROVER}`")
     return known

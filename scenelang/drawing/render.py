@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from scenelang.compiler.graph import Graph
     from scenelang.compiler.lower import Spans
     from scenelang.compiler.program import Place, Program
-    from scenelang.drawing.exact.mesh import Shape
+    from scenelang.drawing.exact.originals import Shape
     from scenelang.drawing.image import Image
     from scenelang.drawing.neural.draw import Drawing, Run
 
@@ -68,8 +68,8 @@ def draw(program: Program, how: How = DEFAULT, *, place: str | None = None, **ru
     if place is None:
         from scenelang.drawing.small import choose_drawer
 
-        drawer = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
-        place = drawer.library if drawer.library == "numpy" else how.device
+        library, _ = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
+        place = library if library == "numpy" else how.device
     if place == "numpy":
         from scenelang.drawing.small import draw_small
 
@@ -199,14 +199,14 @@ def prove_drawn(
     """
     from scenelang.compiler.manifest import load_manifest
     from scenelang.compiler.weights import ModelError
-    from scenelang.drawing.proof import ProofError, known_errors, prove_image
+    from scenelang.drawing.proof import known_errors, prove_image
 
     keep_memory()
     try:
         known_errors(manifest := load_manifest(model))
         lowered, stream = (how.sampled(graphs[name]) for name in ("lower", "flatten"))
         return prove_image(lowered, stream, manifest, draw(), redraw=redraw)
-    except (ProofError, ModelError) as error:
+    except ModelError as error:
         raise RenderError(str(error)) from None
 
 

@@ -75,11 +75,8 @@ _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Shares of that for other ways to sample."""
 
 
-class Drawer(NamedTuple):
-    """The library that draws a picture, and the reason in words."""
-
-    library: Literal["numpy", "torch"]
-    why: str
+Drawer = tuple[Literal["numpy", "torch"], str]
+"""The library that draws a picture, and the reason in words."""
 
 
 def choose_drawer(
@@ -87,21 +84,21 @@ def choose_drawer(
 ) -> Drawer:
     """Choose the library for a single picture; `RenderError` where there is no such model."""
     if exact:
-        return Drawer("numpy", "formulas in the network's place")
+        return "numpy", "formulas in the network's place"
     if device != "auto":
-        return Drawer("torch", f"asked for by device {device}")
+        return "torch", f"asked for by device {device}"
     try:
         renderer = load_manifest(program.model).renderer
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     if renderer == "solid":
-        return Drawer("numpy", "solids are")
+        return "numpy", "solids are"
     if renderer != "framed":
-        return Drawer("torch", f"a `{renderer}` network is large work for any picture")
+        return "torch", f"a `{renderer}` network is large work for any picture"
     ms = work_ms(program, samples)
     numpy = ms <= MOST_MS
     bound = "at most" if numpy else "more than"
-    return Drawer("numpy" if numpy else "torch", f"about {ms:,.0f} ms of work, {bound} {MOST_MS:.0f}")
+    return "numpy" if numpy else "torch", f"about {ms:,.0f} ms of work, {bound} {MOST_MS:.0f}"
 
 
 def work_ms(program: Program, samples: Samples = "adaptive") -> float:

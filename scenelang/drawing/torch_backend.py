@@ -7,8 +7,6 @@ after every small product, and beside another busy process took up to thirty tim
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import lru_cache
 from typing import Unpack
 
@@ -65,17 +63,6 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
         raise RenderError(str(error)) from None
 
 
-@contextmanager
-def _one_torch_thread() -> Iterator[None]:
-    """One thread per operation of torch; set around the pool, whose threads take it over."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
 def _by_kernel(network: Network, program: Program, samples: str) -> Drawing | None:
     """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
     if not isinstance(network, Framed) or place_of(network).type != "cuda":
@@ -101,7 +88,9 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
     run["threads"] = threads_for(program.canvas) if threads is None else threads
     if place_of(network).type != "cpu":
         run |= {"threads": 1, "split": 1}  # the device is busy with one tile
-    with _drawing, _one_torch_thread():
+    with _drawing:
+        before = torch.get_num_threads()
+        torch.set_num_threads(1)  # set around the pool, whose threads take it over
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
@@ -118,3 +107,5 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
             return draw_whole(network, program, progress=progress)
         except ProgramError as error:
             raise RenderError(str(error)) from None
+        finally:
+            torch.set_num_threads(before)

@@ -29,7 +29,8 @@ from scenelang.language.tree import walk
 from scenelang.language.values import Angle, MaterialValue, RangeValue, Time, Vec, pack, show
 from scenelang.language.words import COMBINE, LEAVES, OPERATIONS, SETTINGS, UNITS
 
-COLOURED: Final = ("color", "background", "light", "ground")
+COLOURS: Final = ("c", "color", "horizon", "zenith")
+COLOURED: Final = ("color", "background", "glow", "light", "ground", "sky")
 """Words with an argument `c` or `color`."""
 
 TYPES: Final = (
@@ -140,7 +141,7 @@ def colours(document: Document) -> list[types.ColorInformation]:
             if isinstance(node, tree.Call) and node.args and node.name.text in COLOURED:
                 params = (OPERATIONS | SETTINGS)[node.name.text].params
                 for arg, param in zip(node.args, params, strict=False):
-                    if (arg.name.text if arg.name else param) in ("c", "color"):
+                    if (arg.name.text if arg.name else param) in COLOURS:
                         wanted.add(id(arg.value))
             rgb = _colour(node, id(node) in wanted)
             if rgb is not None:
@@ -179,11 +180,9 @@ def _number(expr: tree.Expr) -> float | None:
     return expr.value / per_turn[expr.unit] if expr.unit in per_turn else None
 
 
-def presentations(
-    document: Document, color: types.Color, place: types.Range
-) -> list[types.ColorPresentation]:
+def presentations(document: Document, rgb: types.Color, place: types.Range) -> list[types.ColorPresentation]:
     """The notations of a picked colour, the current one first."""
-    red, green, blue = color.red, color.green, color.blue
+    red, green, blue = rgb.red, rgb.green, rgb.blue
     bytes_ = [min(max(round(255 * x), 0), 255) for x in (red, green, blue)]
     long = "#" + "".join(f"{b:02x}" for b in bytes_)
     short = "#" + "".join(f"{b:02x}"[0] for b in bytes_) if all(b % 17 == 0 for b in bytes_) else long
@@ -445,9 +444,8 @@ class _Maker:
             text, kind = f"{name} {{ ${{1:color(#d33);}} }}", "material" if name in constant else "texture"
             if name in words.GRADIENTS:
                 text, kind = f"{name} {{ stop(0, ${{1:#d33}}); stop(1, ${{2:#33d}}); }}", "gradient"
-            yield Proposal(
-                name, Kind.EnumMember, text, "a", kind, (words.MATERIALS | words.PAINTS)[name], True
-            )
+            about = (words.MATERIALS | words.PAINTS)[name]
+            yield Proposal(name, Kind.EnumMember, text, "a", kind, about, True)
         for symbol in self.names.visible(self.cursor.offset):
             stmt = symbol.node
             zoo = self.docs.zoo(self.document, stmt) if isinstance(stmt, tree.Import) else None
@@ -508,11 +506,11 @@ class _Maker:
             for value, unit in (("30", "deg"), ("0.25", "turn"), ("0.5", "rad")):
                 text = f"${{1:{value}}}{unit}"
                 yield Proposal(f"{value}{unit}", Kind.Unit, text, "0", "an angle", "", True)
-        elif param in ("c", "color") and callee in COLOURED:
+        elif param in COLOURS and callee in COLOURED:
             yield Proposal("#d33", Kind.Color, "#${1:d33}", "0", "a colour", "", True)
             for name in ("rgb", "hsv"):
                 yield Proposal(name, Kind.Function, words.FUNCTIONS[name].snippet, "0", "a colour", "", True)
-        if (callee, param) in (("background", "c"), ("ground", "y")):
+        if (callee, param) in (("background", "c"), ("ground", "y"), ("light", "position")):
             yield Proposal("none", Kind.EnumMember, "", "0", about=words.CONSTANTS["none"].text)
 
     def _members(self, before: tuple[str, ...]) -> Iterator[Proposal]:

@@ -17,17 +17,7 @@ from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured
-from scenelang.compiler.spaces import (
-    HORIZON,
-    PLANE,
-    SPACES,
-    ZENITH,
-    Space,
-    Stage,
-    Triple,
-    encoded,
-    stage_data,
-)
+from scenelang.compiler.spaces import PLANE, SPACES, Space, Stage, Triple, stage_data
 from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Twist, Warp
 from scenelang.language import scene as schema
 from scenelang.language import tree
@@ -104,7 +94,7 @@ def dump(graph: Graph) -> str:
         node = link.node
         if isinstance(node, Leaf):
             name = f"{node.geometry} {look_text(node.look, graph.space)}"
-            name += "" if node.look.material == "flat" else f" {node.look.material}"
+            name += "" if node.look.material == "flat" else f" {node.look.shading}"
         else:
             name = f"({node.kind})"
         moves = " ".join(move_text(move, graph.space) for move in node.moves)
@@ -115,13 +105,25 @@ def dump(graph: Graph) -> str:
 
 
 def look_text(look: Look, space: Space) -> str:
-    """A colour; or a texture with its moves and the operations on its colours."""
-    clear = "" if look.opacity == 1.0 else f" opacity({look.opacity:.6g})"
+    """A colour; or a texture with its moves and the operations on its colours; then its properties."""
+    own = [f" {name}({' '.join(f'{v:.6g}' for v in numbers)})" for name, *numbers in _properties(look)]
     if look.element is None:
-        return hex_text(space.written(look.colour())) + clear
+        return "".join([hex_text(space.written(look.colour())), *own])
     moves = [move_text(Move(step), PLANE) for step in look.texture]
     steps = [f"{kind}({' '.join(f'{v:.6g}' for v in numbers)})" for kind, *numbers in look.colours]
-    return " ".join([look.element.name, *moves, *steps]) + clear
+    return "".join([" ".join([look.element.name, *moves, *steps]), *own])
+
+
+def _properties(look: Look) -> Iterator[tuple[str, *tuple[float, ...]]]:
+    """Names of what operations on colours do not touch, where it is not as usual, each with its numbers."""
+    if look.opacity != 1.0:
+        yield "opacity", look.opacity
+    if look.density:
+        yield "density", look.density
+    if look.roughness:
+        yield "roughness", abs(look.roughness)
+    if any(look.glow):
+        yield "glow", *look.glow
 
 
 def move_text(move: Move, space: Space) -> str:
@@ -152,20 +154,26 @@ def stage_text(stage: Stage | None) -> list[str]:
     """A stage as the statements that set it, colours as they are written; none without a stage."""
     if stage is None:
         return []
-    camera, light, ground = stage.camera, stage.light, stage.ground
+    camera, ground, sky = stage.camera, stage.ground, stage.sky
 
     def point(p: Triple) -> str:
         return "[{:g}, {:g}, {:g}]".format(*p)
 
     def colour(rgb: Triple) -> str:
-        return hex_text(encoded(rgb))
+        return hex_text(SPACES[3].written(rgb))
 
-    sky = "sky" if (stage.horizon, stage.zenith) == (HORIZON, ZENITH) else colour(stage.horizon)
+    lamps = [
+        f"light({point(lamp.position)}, {lamp.power:g}, {colour(lamp.rgb)}"
+        + (f", {lamp.radius:g})" if lamp.radius else ")")
+        for lamp in stage.lights
+    ]
+    seen = "sky" if stage.horizon != stage.zenith else colour(stage.horizon)
     return [
         f"camera({point(camera.eye)}, {point(camera.target)}, {degrees(camera.fov_rad):g}deg)",
-        f"light({point(light.position)}, {light.power:g}, {colour(light.rgb)})",
+        *(lamps or ["light(none)"]),
         f"ground({'none' if ground is None else f'{ground.y:g}, {colour(ground.rgb)}'})",
-        f"background({'none' if stage.transparent else sky})",
+        *([] if sky is None else [f"sky({sky.power:g}, {colour(sky.horizon)}, {colour(sky.zenith)})"]),
+        f"background({'none' if stage.transparent else seen})",
     ]
 
 
@@ -193,11 +201,10 @@ def _node(node: Node) -> dict[str, Any]:
     if isinstance(node, Leaf):
         look: dict[str, Any] = {
             "geometry": node.geometry,
-            "material": node.look.material,
+            "material": node.look.shading,
             "rgb": list(node.look.colour()),
         }
-        if node.look.opacity != 1.0:
-            look["opacity"] = node.look.opacity
+        look |= {n: numbers if len(numbers) > 1 else numbers[0] for n, *numbers in _properties(node.look)}
         if (element := node.look.element) is not None:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
@@ -302,19 +309,12 @@ class Box(NamedTuple):
     word: str = ""  # on that arrow
 
 
-class Diagram(NamedTuple):
-    """Boxes, from top to bottom or from left to right."""
-
-    boxes: list[Box]
-    sideways: bool = False
-
-
 def _draw_tree(
     head: tuple[str, ...],
     nodes: Sequence[tuple[str, T]],
     look: Callable[[T], tuple[Box, Sequence[tuple[str, T]]]],
     most: int,
-) -> Diagram:
+) -> list[Box]:
     """A tree, level by level: its first box, its nodes with their words, and each one's box and children."""
     boxes = [Box(head)]
     todo = deque([(0, nodes)])
@@ -327,10 +327,10 @@ def _draw_tree(
             box, below = look(node)
             todo.append((len(boxes), below))
             boxes.append(box._replace(parent=parent, word=word))
-    return Diagram(boxes)
+    return boxes
 
 
-def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> Diagram:
+def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> list[Box]:
     """The tree of a scene with its transforms, materials and boolean words."""
     manifest = find_model(scene, Diagnostics())
     space = SPACES[manifest.dimension if manifest is not None else 2]
@@ -363,7 +363,7 @@ def _rounded(statement: str) -> str:
     return re.sub(r"\d+\.\d{5,}(e-?\d+)?", lambda match: f"{float(match[0]):.5g}", statement.rstrip(";"))
 
 
-def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Diagram:
+def draw_graph(graph: Graph, most: int = MOST_BOXES) -> list[Box]:
     """A graph after `lower` or any pass."""
 
     def links(fold: Fold) -> list[tuple[str, Node]]:
@@ -382,7 +382,7 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> Diagram:
     )
 
 
-def draw_program(program: Program, most: int = MOST_BOXES) -> Diagram:
+def draw_program(program: Program, most: int = MOST_BOXES) -> list[Box]:
     """The stream of a Program: each object and the token that joins it to what came before."""
     head = ("program {} x {}".format(*program.canvas), f"model {program.model}", *stage_text(program.stage))
     boxes, tokens = [Box(head)], token_names(program)
@@ -392,7 +392,7 @@ def draw_program(program: Program, most: int = MOST_BOXES) -> Diagram:
         boxes.append(Box((name, f"row {at}", *where), leaf=True, parent=at, word=tokens[at]))
     if len(program) > most:
         boxes.append(Box((f"{len(program) - most:,} more",), parent=most))
-    return Diagram(boxes, sideways=True)
+    return boxes
 
 
 def _short(lines: list[str]) -> list[str]:
@@ -400,14 +400,14 @@ def _short(lines: list[str]) -> list[str]:
     return lines if more <= 0 else [*lines[:_MOST_LINES], f"{more:,} more"]
 
 
-def to_mermaid(drawn: Diagram) -> str:
+def to_mermaid(boxes: list[Box], sideways: bool = False) -> str:
     """Text for Mermaid, as Markdown pages of code hosts draw it; special characters by their numbers."""
 
     def escaped(text: str) -> str:
         return "".join(c if c.isalnum() or c in " .,:+-_=()[]" else f"#{ord(c)};" for c in text)
 
-    lines, arrows, styles = [f"flowchart {'LR' if drawn.sideways else 'TB'}"], [], []
-    for number, box in enumerate(drawn.boxes):
+    lines, arrows, styles = [f"flowchart {'LR' if sideways else 'TB'}"], [], []
+    for number, box in enumerate(boxes):
         text = "<br/>".join(map(escaped, box.lines))
         lines.append(f'  n{number}("{text}")' if box.leaf else f'  n{number}["{text}"]')
         if box.parent is not None:
@@ -417,16 +417,16 @@ def to_mermaid(drawn: Diagram) -> str:
     return "\n".join([*lines, *arrows, *styles]) + "\n"
 
 
-def to_dot(drawn: Diagram) -> str:
+def to_dot(boxes: list[Box], sideways: bool = False) -> str:
     """Text for Graphviz."""
     lines = [
         "digraph scene {",
-        f"  rankdir={'LR' if drawn.sideways else 'TB'};",
+        f"  rankdir={'LR' if sideways else 'TB'};",
         '  node [shape=box, fontname="Helvetica", fontsize=10];',
         '  edge [fontname="Helvetica", fontsize=9];',
     ]
     arrows = []
-    for number, box in enumerate(drawn.boxes):
+    for number, box in enumerate(boxes):
         text = "\\n".join(line.replace("\\", "\\\\").replace('"', '\\"') for line in box.lines)
         look = [f'label="{text}"']
         if box.leaf:
@@ -457,13 +457,8 @@ def scene_schema() -> dict[str, Any]:
     return head | described
 
 
-def diagnostics_schema() -> dict[str, Any]:
-    """The schema of the output of ``scenelang check --format json``."""
-    path = files("scenelang").joinpath("editors/schemas/diagnostics.json")
-    return json.loads(path.read_text("utf-8"))  # type: ignore[no-any-return]
-
-
-SCHEMAS: Final[dict[str, Callable[[], dict[str, Any]]]] = {
+_CHECKED: Final = files("scenelang").joinpath("editors/schemas/diagnostics.json")
+SCHEMAS: Final[dict[str, Callable[[], Any]]] = {
     "scene": scene_schema,
-    "diagnostics": diagnostics_schema,
+    "diagnostics": lambda: json.loads(_CHECKED.read_text("utf-8")),  # what `check --format json` prints
 }

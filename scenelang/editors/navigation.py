@@ -177,12 +177,8 @@ _COMMENT: Final = re.compile(
 )
 
 
-def document_symbols(document: Document) -> list[types.DocumentSymbol]:
-    """The file's definitions and objects as a tree."""
-    return list(_symbols(document.file.statements, document))
-
-
-def _symbols(statements: Iterable[tree.Stmt], document: Document) -> Iterator[types.DocumentSymbol]:
+def symbols(document: Document, statements: Iterable[tree.Stmt]) -> Iterator[types.DocumentSymbol]:
+    """Definitions and objects among statements, as a tree."""
     for stmt in statements:
         word = ""
         if isinstance(stmt, tree.Combined):
@@ -197,7 +193,7 @@ def _symbols(statements: Iterable[tree.Stmt], document: Document) -> Iterator[ty
             range=document.lines.span(stmt.span),
             selection_range=document.lines.span(selection),
             detail=detail or None,
-            children=list(_symbols(inner, document)),
+            children=list(symbols(document, inner)),
         )
 
 
@@ -245,9 +241,7 @@ def workspace_symbols(docs: Workspace, query: str) -> list[types.WorkspaceSymbol
                     continue
                 place = types.Location(document.uri, document.lines.span(stmt.name.span))
                 kind = _DEFINES[type(stmt)]
-                result.append(
-                    types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name)
-                )
+                result += [types.WorkspaceSymbol(place, stmt.name.text, kind, container_name=document.name)]
                 if len(result) >= 500:
                     return result
     return result

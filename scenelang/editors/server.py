@@ -32,7 +32,6 @@ from scenelang.editors.workspace import (
     ClientSettings,
     Document,
     Lines,
-    Superseded,
     Workspace,
     check,
     difference,
@@ -41,6 +40,7 @@ from scenelang.editors.workspace import (
 )
 from scenelang.language import pages, tree
 from scenelang.language.diagnostics import Diagnostic, Span, apply_fixes
+from scenelang.language.limits import Halt
 from scenelang.language.reports import SceneError
 
 
@@ -270,7 +270,7 @@ class Server(LanguageServer):
                 return
             try:
                 checked = check(file, document.path, root, texts, model, whole, stop)
-            except Superseded:
+            except Halt:
                 return
             except Exception:
                 log.exception("internal error while checking %s", uri)
@@ -445,7 +445,7 @@ _LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
     types.TEXT_DOCUMENT_SELECTION_RANGE: lambda s, d, p: [
         navigation.selection(d, d.lines.offset(place)) for place in p.positions
     ],
-    types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: navigation.document_symbols(d),
+    types.TEXT_DOCUMENT_DOCUMENT_SYMBOL: lambda s, d, p: [*navigation.symbols(d, d.file.statements)],
     types.TEXT_DOCUMENT_FOLDING_RANGE: lambda s, d, p: navigation.folding(d),
     types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: completion.colours(d),
     types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: completion.presentations(d, p.color, p.range),

@@ -13,6 +13,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from pathlib import Path, PureWindowsPath
 from typing import Any, Final, Literal
 
@@ -121,10 +122,6 @@ def width(text: str, encoding: Encoding) -> int:
 MAX_SEEN: Final = 4  # values and nodes that are recorded of one place
 
 
-class Superseded(Exception):
-    """The text has changed: nobody wants this check any more."""
-
-
 @dataclass(slots=True)
 class Seen:
     """The first few values or nodes of one place in an evaluation, each once, and the number of all."""
@@ -153,7 +150,7 @@ def check(
     parsed: bool,
     stop: threading.Event,
 ) -> Checked:
-    """Evaluate a scene and run the compiler's checks; raises `Superseded` where ``stop`` was set meanwhile.
+    """Evaluate a scene and run the compiler's checks; raises `Halt` where ``stop`` was set meanwhile.
 
     Imports read ``texts`` of open files and cannot leave ``root``, by default the file's folder. ``parsed``
     says that the text has no syntax mistakes.
@@ -173,7 +170,7 @@ def check(
 
     def after(stage: str, graph: Graph | None = None) -> None:
         if stop.is_set():
-            raise Superseded
+            raise Halt
 
     source = Source(path, tree=file, model=model, root=root, texts=texts)
     evaluation = source.evaluation(result, replays=True, watch=watch)
@@ -478,21 +475,14 @@ class Workspace:
 
     def uses(self, document: Document, symbol: Symbol) -> Iterator[tuple[Document, Use]]:
         """All uses of a definition, its own place among them."""
-        for use in document.names.uses:
-            target = self.definition(document, use) if use.text == symbol.name else None
-            if target is not None and target[1] is symbol:
-                yield document, use
-        if not (symbol.is_exported or (symbol.owner is not None and symbol.owner.is_exported)):
-            return
-        for other in self.known():
-            if other.uri == document.uri or symbol.name not in other.text:
-                continue
-            for use in other.names.uses:
-                if use.text != symbol.name or use.role not in ("member", "argument"):
-                    continue
-                target = self.definition(other, use)
-                if target is not None and target[1] is symbol:
-                    yield other, use
+        abroad = symbol.is_exported or (symbol.owner is not None and symbol.owner.is_exported)
+        others = (other for other in (self.known() if abroad else ()) if other.uri != document.uri)
+        for other in chain((document,), others):
+            for use in other.names.uses if symbol.name in other.text else ():
+                if use.text == symbol.name and (other is document or use.role in ("member", "argument")):
+                    target = self.definition(other, use)
+                    if target is not None and target[1] is symbol:
+                        yield other, use
 
 
 def scenes_below(folder: Path, most: int) -> Iterator[Path]:

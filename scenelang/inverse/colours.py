@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.colours import Grid, packed, unpacked
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Facts
 from scenelang.drawing.exact.mesh import Mesh
 from scenelang.inverse.grids import corners
 
@@ -35,7 +35,7 @@ def fit_colours(
     max_error: float | None = None,
     budget_s: float = np.inf,
     steps: int | None = None,
-    about: dict[str, str | float] | None = None,
+    about: Facts | None = None,
     report: Callable[[int, int, float], None] = lambda side, size, error: None,
 ) -> Element:
     """Fit the smallest grid that gives a mesh the look in its file, or the best of at most `MOST_BYTES`.

@@ -341,7 +341,7 @@ def fit(
     evaluation, first_scene = moments[0].evaluated(start)
     space = space_of(evaluation, params, fixed)
     for name in start:
-        if name not in space.names:
+        if all(name != knob.name for knob in space.knobs):
             raise FitError(f"a start for `{name}`, which is not among the params to find")
     goals = [
         target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)

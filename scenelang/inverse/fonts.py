@@ -11,19 +11,20 @@ from array import array
 from collections.abc import Callable
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 from unicodedata import category
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import GRAIN, MOST_CURVES
+from scenelang.assets.element import GRAIN, MOST_CURVES, Facts
 from scenelang.assets.font import MOST_CLASSES, MOST_LETTERS, TENSORS, UNIT, Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact.mesh import FitError, needed
 from scenelang.drawing.exact.outline import winding
 from scenelang.drawing.neural.outlines import MEET
 from scenelang.language.diagnostics import plural
+from scenelang.output.roots import crossed
 
 MOST_OF_FONT: Final = dict.fromkeys((".ttf", ".otf", ".ttc"), 32 << 20)  # bytes of a file
 _CUBIC: Final = 2e-5  # em: how far quadratic curves may be off a cubic one
@@ -38,20 +39,10 @@ _LEAST: Final = 1e-6  # em: the least radius of what shows
 Curves = npt.NDArray[np.float64]  # (n, 3, 2) start, control point, end
 
 
-class Read(NamedTuple):
-    """A font that was read."""
-
-    font: Font
-    notes: tuple[str, ...]
-
-
 def read_font(
-    data: bytes,
-    about: dict[str, str | float],
-    letters: str | None = None,
-    say: Callable[[str], None] = lambda line: None,
-) -> Read:
-    """Read the letters of a font that lie in ranges, by default all; raises `FitError`.
+    data: bytes, about: Facts, letters: str | None = None, say: Callable[[str], None] = lambda line: None
+) -> tuple[Font, list[str]]:
+    """Read the letters of a font that lie in ranges, by default all, and lines about it; raises `FitError`.
 
     ``say`` is called when the file is known to be a font, before its letters are read.
     """
@@ -69,7 +60,7 @@ def read_font(
         ranges = ranges_of(letters)
         held = {code: glyph for code, glyph in held.items() if any(code in some for some in ranges)}
     if not 0 < len(held) <= MOST_LETTERS:
-        raise FitError(f"{len(held):,} letters, where 1 to {MOST_LETTERS:,} are allowed")
+        raise FitError(f"{len(held):,} of these letters, where 1 to {MOST_LETTERS:,} are allowed")
     say(plural(len(held), "letter"))
     codes, numbers, ends, parts = list[int](), list[float](), list[int](), list[bytes]()
     left_out, count = list[str](), 0
@@ -90,16 +81,14 @@ def read_font(
     glyphs = [held[code] for code in codes]
     classes, kerning, columns = _kerning(uharfbuzz, font, codes, glyphs, face.upem)
     values: list[Any] = [codes, numbers, ends, classes, kerning, b"".join(parts)]
-    tables = {
-        name: array(kind, value) for (name, (_, kind)), value in zip(TENSORS.items(), values, strict=True)
-    }
+    tables = {name: array(TENSORS[name][1], value) for name, value in zip(TENSORS, values, strict=True)}
     try:
         result = Font(tables, columns, about)
     except TensorError as error:
         raise FitError(str(error)) from None
     notes = [plural(len(codes), "letter"), plural(count, "curve"), f"{len(kerning):,} pairs of classes"]
     notes += [f"left out, as they are damaged: {', '.join(left_out[:20])}"] if left_out else []
-    return Read(result, tuple(notes))
+    return result, notes
 
 
 def ranges_of(text: str) -> list[range]:
@@ -198,15 +187,15 @@ def _apart(curves: Curves, size: float) -> Curves:
     start, way = edges[:, :, 0], edges[:, :, 1] - edges[:, :, 0]
     between = start[pairs[1]][:, None] - start[pairs[0]][:, :, None]  # (pairs, n, n, 2)
     one, other = way[pairs[0]][:, :, None], way[pairs[1]][:, None]
-    turn = _crossed(one, other)
-    shares = [_crossed(between, w) / np.where(turn, turn, 1e-30) for w in (other, one)]
+    turn = crossed(one, other)
+    shares = [crossed(between, w) / np.where(turn, turn, 1e-30) for w in (other, one)]
     pair, *place = np.nonzero((abs(np.array(shares) - 0.5) < 0.6).all(0))
     curve = np.array(pairs)[:, pair]
     t = np.array([(k + share[pair, *place]) / n for k, share in zip(place, shares, strict=True)])
     for _ in range(8):  # Newton's method
         (a, u), (b, v) = (_moving(curves[which], x) for which, x in zip(curve, t, strict=True))
-        turn = _crossed(u, v)
-        t = t + np.stack([_crossed(b - a, v), _crossed(b - a, u)]) / np.where(turn, turn, np.inf)
+        turn = crossed(u, v)
+        t = t + np.stack([crossed(b - a, v), crossed(b - a, u)]) / np.where(turn, turn, np.inf)
         t = t.clip(-0.1, 1.1)
     met = (abs(t - 0.5) <= 0.5 + _MEET).all(0) & (np.hypot(*(a - b).T) < _MEET * size)
     result = []
@@ -214,10 +203,6 @@ def _apart(curves: Curves, size: float) -> Curves:
         cuts = np.unique([0, *np.round(t[:, met][curve[:, met] == at].clip(0, 1), 6), 1])
         result += [_part(one, s, e) for s, e in pairwise(cuts)]
     return np.array(result)
-
-
-def _crossed(a: Curves, b: Curves) -> Curves:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _moving(curves: Curves, t: Curves) -> tuple[Curves, Curves]:

@@ -29,7 +29,7 @@ from scenelang.compiler.program import Program
 from scenelang.drawing.arrays_torch import TORCH
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
-from scenelang.drawing.neural.frames import FrameMap, FrameTurn, way_back
+from scenelang.drawing.neural.frames import FrameMap, FrameTurn
 from scenelang.drawing.neural.load import Framed, load_model
 from scenelang.drawing.neural.network import EMPTY, Cell, FramedArrays
 from scenelang.inverse.search import WHITE, Point, SearchBox
@@ -159,7 +159,9 @@ class SoftPlane:
                 if at in self.turning:
                     twirl, *bend = geometry[:, at : at + STRENGTHS].unbind(1)
                     steps.append(FrameTurn(twirl, tuple(bend)))
-        points = way_back(TORCH, steps, [x.expand(self.count, -1) for x in p])
+        points: Any = [x.expand(self.count, -1) for x in p]
+        for step in steps:
+            points = step(TORCH, points)
         q = torch.stack(list(points))
         result: list[Any] = [None] * self.count
         for shape, decoder in enumerate(self.decoders):

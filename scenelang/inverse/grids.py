@@ -16,10 +16,11 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import MOST_SIDE, Element
+from scenelang.assets.element import MOST_SIDE, Element, Facts
 from scenelang.assets.pyramid import Grid, finest, packed, refine, unpacked
 from scenelang.drawing.arrays import NUMPY
-from scenelang.drawing.exact.mesh import Points, Shape
+from scenelang.drawing.exact.mesh import Points
+from scenelang.drawing.exact.originals import Shape
 from scenelang.drawing.neural.assets import GridShape
 
 ROUNDS: Final = 8
@@ -123,7 +124,7 @@ def fit(
     max_error: float | None = None,
     budget_s: float = np.inf,
     steps: int | None = None,
-    about: dict[str, str | float] | None = None,
+    about: Facts | None = None,
     report: Callable[[Rung], None] = lambda rung: None,
     progress: Callable[[int, float], None] = lambda side, share: None,
 ) -> tuple[Element, list[Rung]]:

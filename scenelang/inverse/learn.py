@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
-from scenelang.assets.element import TEXELS, Element
+from scenelang.assets.element import TEXELS, Element, Facts
 from scenelang.assets.element_file import (
     MOST_ELEMENT_BYTES,
     ElementFile,
@@ -27,24 +27,17 @@ from scenelang.assets.font import Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
-from scenelang.drawing.exact.mesh import Mesh, Shape, Sign
-from scenelang.drawing.exact.originals import MOST_OF, said
+from scenelang.drawing.exact.mesh import Mesh, Sign, read_solids
+from scenelang.drawing.exact.originals import MOST_OF, Shape, said
 from scenelang.inverse.colours import fit_colours
 from scenelang.inverse.fonts import MOST_OF_FONT, ranges_of, read_font
 from scenelang.inverse.grids import NEAR, THIN, Rung, fit
-from scenelang.inverse.sandbox import (
-    CPU_S,
-    LIBRARIES,
-    Asked,
-    Hear,
-    SandboxProcess,
-    files_beside,
-    run_in_sandbox,
-)
+from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Asked, Hear, SandboxProcess, files_beside, run_alone
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene import Elements, load_elements
 from scenelang.output.workers import GivenUp, by_workers
 
+FilePath = str | os.PathLike[str]
 SEEN: Final = 960  # assumed width of a solid in pixels, by which the report states its smallest details
 COARSER: Final = 2.0  # most times the error of the whole that a part may have, in its own radii
 
@@ -66,6 +59,7 @@ class LearnOptions:
     # root mean square off of a mesh's colours that is near enough, of channels in [0, 1]
     color_error: float | None = None
     letters: str | None = None  # of fonts: ranges of code points, as `ranges_of` reads them
+    font: str | None = None  # file of the font that texts of drawings are set in
 
     def __post_init__(self) -> None:
         if self.letters is not None:
@@ -74,7 +68,7 @@ class LearnOptions:
             if text is not None and not is_said(text):
                 raise ValueError("a license or a source is at most 2,000 characters, all of them printable")
 
-    def about(self, original: Path, data: bytes) -> dict[str, str | float]:
+    def about(self, original: Path, data: bytes) -> Facts:
         """Facts of an element about its origin; equal files and options give equal facts."""
         name = "".join(c if c.isprintable() else "?" for c in original.name)
         said = {"license": self.license, "source": self.source, "original": name}
@@ -90,28 +84,25 @@ class LearnOptions:
         """Return whether files of a suffix become textures."""
         return self.pictures == "texture" and suffix.lower() in outline.MOST_OF_PICTURE
 
-    def made(self, element: Element | Font, about: dict[str, str | float]) -> bool:
+    def made(self, element: Element | Font, about: Facts) -> bool:
         """Return whether making an element or a font again would give the same one."""
         said = element.about
         usual = self.steps is None and self.budget_s == math.inf
         cut_short = said.get("ended") == "steps" or (said.get("ended") == "time" and not usual)
-        known = (
-            isinstance(element, Font) or element.material or element.size is not None
-        )  # early ones do not say
+        # early ones do not say how large they are
+        known = isinstance(element, Font) or element.material or element.size is not None
         ended = not cut_short or said.get("steps") == self.steps
         return known and ended and about.items() <= said.items() and not said.keys() & ASKED - about.keys()
 
 
-ASKED: Final = frozenset(
-    ("license", "source", "sign", "max_error", "texels", "color_error", "parts", "letters")
-)
+ASKED = {"license", "source", "sign", "max_error", "texels", "color_error", "parts", "letters", "font"}
 
 
 class _Job(NamedTuple):
     """One element to make, and the end of its file's time."""
 
     options: LearnOptions
-    about: dict[str, str | float]
+    about: Facts
     end_s: float
     tell: Callable[..., None]
 
@@ -133,12 +124,26 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
     if suffix in MOST_OF_FONT:
-        read = read_font(data, request["about"], options.letters, lambda said: job.say(f"{name}: {said}"))
-        job.say(f"{name}: {', '.join(read.notes)}")
-        return element_file_bytes([], font=read.font)
+        found = read_font(data, request["about"], options.letters, lambda said: job.say(f"{name}: {said}"))
+        job.say(f"{name}: {', '.join(found[1])}")
+        return element_file_bytes([], font=found[0])
     if options.paints(suffix):
         return element_file_bytes([_texture(data, name, job)])
-    brought = originals.brought(data, suffix, name, request["files"], options.sign, options.parts)
+
+    def face(letters: str) -> Font:
+        try:
+            return read_font(files["font"], {}, ",".join(f"U+{ord(letter):X}" for letter in letters))[0]
+        except FitError as error:
+            raise FitError(f"the font `{options.font}`: {error}") from None
+
+    files = request["files"]
+    if suffix in outline.MOST_OF_DRAWING:
+        drawing = outline.read_outline(data, suffix, face if options.font else None)
+        brought = originals.drawn_parts(drawing, name, options.parts)
+    else:
+        solids, notes = read_solids(data, suffix, files)
+        brought = originals.solid_parts(solids, name, options.sign, bool(options.parts))
+        brought = brought._replace(notes=(*brought.notes, *notes))
     job.say(f"{name}: {', '.join(brought.notes)}")
     group, elements = list(brought.group), []
     for called, shape in brought.shapes.items():
@@ -230,8 +235,8 @@ Answers = Generator[tuple[int, Callable[[], bytes]], None, None]
 
 
 def learn_files(
-    files: Sequence[str | os.PathLike[str]],
-    out: str | os.PathLike[str],
+    files: Sequence[FilePath],
+    out: FilePath,
     options: LearnOptions = LearnOptions(),
     *,
     name: str | None = None,
@@ -259,7 +264,7 @@ def learn_files(
         except NotWritten:
             raise
         except OSError as error:
-            troubles[index] = f"{files[index]}: {(error.strerror or str(error)).lower()}"
+            troubles[index] = f"{error.filename or files[index]}: {(error.strerror or str(error)).lower()}"
 
     def asked() -> Iterator[tuple[int, Asked]]:
         for index, (file, called) in enumerate(zip(map(Path, files), names, strict=True)):
@@ -309,13 +314,11 @@ def _by_workers(cluster: str, asked: Iterable[tuple[int, Asked]], hear: Mapping[
             raise result
         return result
 
-    for index, answer in by_workers(cluster, run_in_sandbox, asked, LIBRARIES):
+    for index, answer in by_workers(cluster, run_alone, asked, LIBRARIES):
         yield index, partial(taken, answer)
 
 
-def names_of(
-    files: Sequence[str | os.PathLike[str]], options: LearnOptions, name: str | None = None
-) -> list[str]:
+def names_of(files: Sequence[FilePath], options: LearnOptions, name: str | None = None) -> list[str]:
     """Names of the elements of files; raises `ValueError` where one is not a name, or two are the same."""
     if name is not None and len(files) > 1:
         raise ValueError("a name is for one file")
@@ -326,7 +329,7 @@ def names_of(
     fonts = [file for file in files if Path(file).suffix.lower() in MOST_OF_FONT]
     if len(fonts) > 1:
         raise ValueError(f"`{fonts[0]}` and `{fonts[1]}` are fonts, of which a file of elements has one")
-    owners: dict[tuple[str, bool], str | os.PathLike[str]] = {}
+    owners: dict[tuple[str, bool], FilePath] = {}
     for file, word in zip(files, names, strict=True):
         if not (word.isascii() and word.isidentifier()):
             raise ValueError(f"`{word}` is not a name; letters, digits and _ are, as --name says them")
@@ -336,7 +339,7 @@ def names_of(
     return names
 
 
-def _writable(out: str | os.PathLike[str]) -> ElementFile:
+def _writable(out: FilePath) -> ElementFile:
     """Contents of the output file; raises before the work where it could not be written afterwards."""
     place = output_place(out)
     for path, right in ((place.parent, os.W_OK | os.X_OK), (place, os.W_OK)):
@@ -359,9 +362,7 @@ def _named(zoo: ElementFile) -> dict[tuple[str, bool], Element]:
     return {(e.name, e.material): e for e in zoo.elements if e.material or e.name not in letters}
 
 
-def _written(
-    out: str | os.PathLike[str], held: ElementFile, made: Iterable[tuple[str, ElementFile]]
-) -> ElementFile:
+def _written(out: FilePath, held: ElementFile, made: Iterable[tuple[str, ElementFile]]) -> ElementFile:
     """Write a file's elements and the new ones, which replace those of the same names and their groups."""
     elements, groups, font = _named(held), dict(held.groups), held.font
     for name, zoo in made:
@@ -385,21 +386,29 @@ def _request(
         raise FitError("a packed font for the web: unpack it to .ttf or .otf first")
     if suffix not in sizes:
         raise FitError(f"not one of {', '.join(sizes)}")
-    data = read_regular(path, sizes[suffix])
-    if len(data) > sizes[suffix]:
-        raise FitError(f"more than {sizes[suffix] >> 20:,} MiB")
-    about = options.about(path, data)
+    data = _read(path, sizes[suffix])
+    about, files = options.about(path, data), files_beside(data, suffix, path.parent)
+    if options.font is not None and suffix == ".svg":
+        files["font"] = _read(Path(options.font), sizes[".ttf"])
+        about["font"] = hashlib.sha256(files["font"]).hexdigest()
     if known is not None and options.made(known, about):
         return known
     usual_s = CPU_S * (4 if options.parts else 1)
     limit_s = max(usual_s, 2 * options.budget_s) if options.budget_s < 1e6 else usual_s
     request = {"name": name, "suffix": suffix, "options": asdict(options), "about": about, "cpu_s": limit_s}
-    return {**request, "files": files_beside(data, suffix, path.parent)}, data
+    return {**request, "files": files}, data
+
+
+def _read(path: Path, most: int) -> bytes:
+    data = read_regular(path, most)
+    if len(data) > most:
+        raise FitError(f"`{path.name}` has more than {most >> 20:,} MiB")
+    return data
 
 
 def learn(
-    files: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
-    out: str | os.PathLike[str],
+    files: FilePath | Sequence[FilePath],
+    out: FilePath,
     *,
     name: str | None = None,
     max_error: float | None = None,
@@ -411,6 +420,7 @@ def learn(
     pictures: Literal["texture", "outline"] = "texture",
     parts: bool | None = None,
     letters: str | None = None,
+    font: FilePath | None = None,
     cluster: str | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Elements:
@@ -431,6 +441,7 @@ def learn(
         pictures: kind of element that a picture becomes: a texture or, by its outline, a geometry.
         parts: true makes each part of a file an element; if left out, only those of drawings.
         letters: ranges of code points to take of a font, ``"U+20-7E, U+3B1"``; by default all.
+        font: a font's file for all texts of drawings, by default those of sans-serif are in `std/letters`.
         cluster: address of a dask scheduler whose workers make them, several at a time, or ``"local"``; needs
             the extra ``dask``, and what makes elements on each.
         say: called with lines of the report; with a cluster, for each file when it is done.
@@ -447,6 +458,7 @@ def learn(
     options = LearnOptions(
         sign=sign, max_error=max_error, budget_s=budget_s, steps=steps,
         license=license, source=source, pictures=pictures, parts=parts, letters=letters,
+        font=None if font is None else os.fspath(font),
     )  # fmt: skip
     listed = [files] if isinstance(files, str | os.PathLike) else files
     learn_files(listed, out, options, name=name, cluster=cluster, say=say)

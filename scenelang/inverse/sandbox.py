@@ -108,7 +108,7 @@ def _environment() -> dict[str, str]:
     return result
 
 
-def run_in_sandbox(asked: Asked) -> tuple[list[str], bytes | FitError]:
+def run_alone(asked: Asked) -> tuple[list[str], bytes | FitError]:
     """Run one request in a sandbox, as workers do; returns its lines, and the bytes or the error."""
     lines: list[str] = []
     with SandboxProcess() as apart:
@@ -136,9 +136,8 @@ def serve(make: Callable[[dict[str, Any], bytes, Callable[..., None]], bytes]) -
         data = sys.stdin.buffer.read(request["bytes"])
         request["files"] = {name: sys.stdin.buffer.read(size) for name, size in request["files"].items()}
         size = len(data) + sum(map(len, request["files"].values()))
-        memory = _bound(
-            min(READ_S + MEGABYTE_S * size / 1e6, MOST_READ_S, request["cpu_s"]), READ + TIMES * size
-        )
+        read_s = min(READ_S + MEGABYTE_S * size / 1e6, MOST_READ_S, request["cpu_s"])
+        memory = _bound(read_s, READ + TIMES * size)
         limits = iter([request["cpu_s"]])
 
         def tell(kind: str, *values: Any, limits: Iterator[float] = limits) -> None:

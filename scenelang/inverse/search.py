@@ -38,6 +38,7 @@ from scenelang.language.evaluation import (
 from scenelang.language.values import Vec, unpack
 
 Point = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 MOST_AXES: Final = 64
 
 
@@ -70,10 +71,6 @@ class SearchBox:
             result[knob.name] = Vec(tuple(items)) if knob.inner else items[0]
         return result
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(knob.name for knob in self.knobs)
-
     def literals(self, u: Point) -> dict[str, str]:
         """Values at a point, as text of the language."""
         values = self.values(u)
@@ -89,17 +86,16 @@ class SearchBox:
 
 
 def _where(axis: Axis, value: Any) -> float:
+    def plain(value: Any) -> Any:
+        if value.__class__ is Vec:
+            return tuple(map(plain, value.items))
+        return value if isinstance(value, bool | str) else round(unpack(value)[0], 9)
+
     if axis.choices:
-        same = [_plain(choice) == _plain(value) for choice in axis.choices]
-        return float(same.index(True)) if True in same else 0.0
+        known = [plain(choice) for choice in axis.choices]
+        return float(known.index(plain(value))) if plain(value) in known else 0.0
     width = axis.high - axis.low
     return (unpack(value)[0] - axis.low) / width if width > 0 else 0.0
-
-
-def _plain(value: Any) -> Any:
-    if value.__class__ is Vec:
-        return tuple(_plain(item) for item in value.items)
-    return value if isinstance(value, bool | str) else round(unpack(value)[0], 9)
 
 
 def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[str] = ()) -> SearchBox:
@@ -108,9 +104,8 @@ def space_of(evaluation: Evaluation, names: Iterable[str] = (), fixed: Iterable[
         named = [param_named(evaluation, name) for name in dict.fromkeys(names)]
         chosen = named or [stmt for stmt in params_of(evaluation).values() if stmt.range is not None]
         excluded = set(fixed)
-        space = SearchBox(
-            [knob_of(stmt, evaluation.context) for stmt in chosen if stmt.name.text not in excluded]
-        )
+        left = [stmt for stmt in chosen if stmt.name.text not in excluded]
+        space = SearchBox([knob_of(stmt, evaluation.context) for stmt in left])
     except ParamError as error:
         raise FitError(str(error)) from None
     if not space.axes:
@@ -275,13 +270,7 @@ def spread(space: SearchBox, count: int, seed: int) -> Iterator[Point]:
 
 
 def slopes(
-    residuals: Residuals,
-    space: SearchBox,
-    u: Point,
-    at: Point,
-    step: float,
-    free: npt.NDArray[np.bool_],
-    fine: bool = False,
+    residuals: Residuals, space: SearchBox, u: Point, at: Point, step: float, free: Mask, fine: bool = False
 ) -> Matrix:
     """Derivatives (R, n) of residuals (``at`` u), 0 of axes not free; steps are in shares of a range."""
     result = np.zeros((len(at), len(u)))
@@ -300,9 +289,7 @@ def slopes(
     return result
 
 
-def central(
-    residuals: Residuals, space: SearchBox, u: Point, step: float, free: npt.NDArray[np.bool_]
-) -> Matrix | None:
+def central(residuals: Residuals, space: SearchBox, u: Point, step: float, free: Mask) -> Matrix | None:
     """Derivatives (R, n) of residuals by central differences, 0 of axes that are not free."""
     columns: dict[int, Point] = {}
     for axis in np.flatnonzero(free).tolist():
@@ -446,14 +433,13 @@ def solve(
     *,
     seed: int = 0,
     until: float = math.inf,
-    near: float = NEAR,
     noise: Callable[[Found], bool] = lambda place: False,
     report: Report = lambda what, done, count: None,
 ) -> tuple[list[Found], bool]:
     """Distinct places with the nearest pictures, the best first, and whether the search converged by itself.
 
     Each round looks around, follows the best places down in the smallest pictures, and the best of these
-    through larger ones. It ends when a picture is near enough (``near``, a sum of squares), when nothing but
+    through larger ones. It ends when a picture is `NEAR` enough (a sum of squares), when nothing but
     ``noise`` is left, or when a round or two found none nearer. No descent is begun after the time ``until``.
     ``problems`` are residuals at sizes from small to large, those of the last by pixels alone.
     """
@@ -467,7 +453,7 @@ def solve(
         fresh = [one for one in low if not any(one is other for other in before)]
         for at, one in enumerate(fresh):
             for fine, (problem, step) in product((False, True), zip(problems[1:], STEPS[1:], strict=False)):
-                if fine and (one.cost <= near or one.cost > ALIKE * min(one.cost for one in [one, *ended])):
+                if fine and (one.cost <= NEAR or one.cost > ALIKE * min(one.cost for one in [one, *ended])):
                     break
                 report("looking closer", at, len(fresh))
                 nearer = descend(problem, space, one.point, step=step, most=8, fine=fine)
@@ -476,7 +462,7 @@ def solve(
         ended = apart(space, ended, KEPT)
         was, best = best, min((one.cost for one in ended), default=math.inf)
         idle = idle + 1 if best > was * (1 - AGREED) else 0
-        if best <= near or (ended and noise(ended[0])) or idle >= (1 if best <= FAIR else 2):
+        if best <= NEAR or (ended and noise(ended[0])) or idle >= (1 if best <= FAIR else 2):
             return ended, True
         if time.monotonic() > until:
             break

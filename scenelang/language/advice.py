@@ -7,23 +7,12 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final, Literal
 
-from scenelang.language import foreign, library, scopes, tree
+from scenelang.language import foreign, library, scopes, tree, words
 from scenelang.language.builder import FileContext, Site
 from scenelang.language.diagnostics import Edit, Fix, Label, SourceFile, Span, did_you_mean, listing
 from scenelang.language.reporter import Advice, Reporter
 from scenelang.language.session import Scope, Session
 from scenelang.language.values import COMPONENTS, Problem
-from scenelang.language.words import (
-    ANIMATED,
-    CONSTANTS,
-    FUNCTIONS,
-    GEOMETRIES,
-    LEAVES,
-    MATERIALS,
-    SHADINGS,
-    STAGE,
-    TRANSFORMS,
-)
 
 _MESHES: Final = "learned from a mesh: scenelang learn part.obj -o zoo.safetensors"
 
@@ -77,17 +66,17 @@ def in_library(stmt: tree.Call, place: Site) -> str | None:
 
 def likely_dimensions(session: Session, source: SourceFile) -> tuple[int, ...]:
     """Dimension of what a text draws; both where nobody can tell."""
-    words = session.report.words(source)
-    likely = {d for d, leaves in LEAVES.items() if not words.isdisjoint(leaves)}
-    likely |= {3} if not words.isdisjoint(STAGE) else set()
-    likely |= ({2} if "shapes" in words else set()) | ({3} if "meshes" in words else set())
-    return (*likely,) if len(likely) == 1 else (*LEAVES,)
+    known = session.report.words(source)
+    likely = {d for d, leaves in words.LEAVES.items() if not known.isdisjoint(leaves)}
+    likely |= {3} if not known.isdisjoint(words.STAGE) else set()
+    likely |= ({2} if "shapes" in known else set()) | ({3} if "meshes" in known else set())
+    return (*likely,) if len(likely) == 1 else (*words.LEAVES,)
 
 
 def material_advice(place: Site, name: str, argument: str = "…") -> str:
     """Text of an operation on a colour, in the material of what a text draws if that is known."""
     dimensions = likely_dimensions(place.session, place.file.source)
-    material = next(iter(SHADINGS[dimensions[0]])) if len(dimensions) == 1 else None
+    material = next(iter(words.SHADINGS[dimensions[0]])) if len(dimensions) == 1 else None
     written = f"material {material or 'flat'} {{ {name}({argument}); }}"
     return written if material else f"{written}, in space material diffuse"
 
@@ -96,7 +85,7 @@ def unknown_material(name: tree.Name, place: Site, known: set[str]) -> Advice:
     """Likely meaning of a name in the place of a material."""
     span, lower = name.span, name.text.lower()
     likely = likely_dimensions(place.session, place.file.source)
-    there = known.difference(*(SHADINGS[d] for d in SHADINGS.keys() - likely))
+    there = known.difference(*(words.SHADINGS[d] for d in words.SHADINGS.keys() - likely))
     help, fix = did_you_mean(name.text, there, span)
     here = foreign.MATERIALS.get(lower)
     if help is None and here in there:
@@ -109,7 +98,7 @@ def unknown_material(name: tree.Name, place: Site, known: set[str]) -> Advice:
 def drawn(place: Site) -> str:
     """Shapes that can be drawn, in the plane or in space."""
     dimensions = likely_dimensions(place.session, place.file.source)
-    said = {n: listing(LEAVES[n]) for n in dimensions}
+    said = {n: listing(words.LEAVES[n]) for n in dimensions}
     if len(said) == 1:
         return f"there is {said[dimensions[0]]}" + (f", and what is {_MESHES}" if dimensions == (3,) else "")
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"
@@ -128,7 +117,7 @@ def report_unknown(
 def visible(place: Site, kinds: Sequence[str]) -> set[str]:
     """The names in sight of some kinds; none any more where looking through them has taken too long."""
     effort = place.report.effort
-    if effort.spent:
+    if effort.left <= 0:
         return set()
     seen = list(place.scope.visible())
     effort.left -= 2 * len(seen)
@@ -212,11 +201,11 @@ def _advice(name: tree.Name, place: Site, call: tree.CallExpr | None) -> Advice:
     dotted = source[span.end : span.end + 1] == "."
     if call and text in foreign.FUNCTIONS:
         return foreign.FUNCTIONS[text], None
-    if call and text in TRANSFORMS:
+    if call and text in words.TRANSFORMS:
         return f"transforms are statements of a block: square {{ {call.span.text}; }}", None
-    if text in MATERIALS:
+    if text in words.MATERIALS:
         return f"a material is written material {text}" + " { color(…); }" * bool(call), None
-    if text in GEOMETRIES:
+    if text in words.GEOMETRIES:
         moved = f"what moves it stands in its block: {text} {{ translate(0.5, 0); }}"
         return moved if dotted else f"objects are not values; write module part() {{ {text}; }}", None
     if text in foreign.LIBRARIES and dotted:
@@ -227,7 +216,7 @@ def _advice(name: tree.Name, place: Site, call: tree.CallExpr | None) -> Advice:
         return "a model is named by a string", Fix("put quotes around it", (Edit(span, f'"{text}"'),))
     if text in ("x", "y", "z") and before.replace(" ", "").endswith("axis="):
         return "the axes are X, Y and Z", Fix(f"write `{text.upper()}`", (Edit(span, text.upper()),))
-    own = {*FUNCTIONS} if call else {*CONSTANTS, *ANIMATED, "true", "false"}
+    own = {*words.FUNCTIONS} if call else {*words.CONSTANTS, *words.ANIMATED, "true", "false"}
     kinds = ("fn",) if call else (*scopes.VALUES, "import")
     if not call and lower in foreign.VALUES:
         return foreign.VALUES[lower], None
@@ -257,8 +246,8 @@ def report_problem(
     if problem.fix and not library.holds(place.source):
         help, fix = problem_advice(problem, operand)
     labels = [
-        Label(other.span, words)
-        for index, words in problem.notes.items()
+        Label(other.span, note)
+        for index, note in problem.notes.items()
         if index < len(operands) and (other := operands[index]) is not None
     ]
     report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))

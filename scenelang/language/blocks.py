@@ -101,13 +101,11 @@ def _unbind(scope: Scope) -> list[Action]:
     return [action] if slots else []
 
 
-def misplaced(
-    place: Site, span: Span, fact: str, name: str = "", help: str | None = None, fix: Fix | None = None
-) -> None:
+def misplaced(place: Site, span: Span, fact: str, name: str = "", help: str | None = None) -> None:
     """Report a statement in the wrong place by a ``fact`` with ``{}`` for its name, once in a block."""
     if place.kind != "unknown":
         key = ("E0330", span.source, span) if place.block is None else ("E0330", place.block, fact)
-        place.report.error_once(key, "E0330", fact.format(name), span, help=help, fix=fix)
+        place.report.error_once(key, "E0330", fact.format(name), span, help=help)
 
 
 def define(name: tree.Name, binding: Binding, place: Site) -> bool:

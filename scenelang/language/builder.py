@@ -102,6 +102,10 @@ class FileContext:
         self.scope = Scope(Slots(root=self.env))
         self.session.roots.append(self.env)
 
+    def value(self, name: str) -> Any:
+        """The value that a name of the file had in the last run."""
+        return self.env[self.scope.names[name].slot]
+
 
 class Site(NamedTuple):
     """Place of a statement or an expression: its scope, its file and its session."""

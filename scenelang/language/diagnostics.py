@@ -190,10 +190,6 @@ class Effort(Record, frozen=False):
 
     left: int = 500_000  # pairs of letters that may still be compared
 
-    @property
-    def spent(self) -> bool:
-        return self.left <= 0
-
 
 def ranked(
     name: str, known: Iterable[str], slips: int | None = None, effort: Effort | None = None
@@ -211,7 +207,7 @@ def ranked(
     effort = effort or Effort()
     candidates = []
     for candidate in sorted(set(known)):
-        if effort.spent:
+        if effort.left <= 0:
             break
         effort.left -= 8
         if abs(len(candidate) - len(name)) > limit + 2:  # an underscore and a final s make no slip

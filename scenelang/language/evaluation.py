@@ -185,8 +185,8 @@ class Evaluation:
         }
         scene = make(Scene, fields)
         scene = scene if self._size is None else scene.sized(self._size)
-        written = settings.given.get("model")
-        if written is not None:
+        session.spans.main = self.file.span.source
+        for written in settings.given.get("model", ())[:1]:
             session.spans.record(scene, Written(written, written))
         return scene, session.spans
 
@@ -243,10 +243,8 @@ def load(
         ValueError: ``size`` is not a canvas.
         OSError: the file cannot be opened.
     """
-    diagnostics = Diagnostics() if diagnostics is None else diagnostics
-    given = {**(params or {}), **values}
-    scene, _ = Source(path, params=given, model=model, root=root, size=size).scene(diagnostics, frame)
-    return _sound(scene, diagnostics)
+    source = Source(path, params={**(params or {}), **values}, model=model, root=root, size=size)
+    return _sound(source, diagnostics, frame)[0]
 
 
 def loads(
@@ -262,10 +260,9 @@ def loads(
     **values: Any,
 ) -> Scene:
     """Read scene text, called ``name`` in messages; as `load`, but imports are refused without ``root``."""
-    diagnostics = Diagnostics() if diagnostics is None else diagnostics
     given = {**(params or {}), **values}
     source = Source(text=SourceFile(name, text), params=given, model=model, root=root, size=size)
-    return _sound(source.scene(diagnostics, frame)[0], diagnostics)
+    return _sound(source, diagnostics, frame)[0]
 
 
 def opened(
@@ -276,14 +273,15 @@ def opened(
         return given if size is None else given.sized(size), None
     if not isinstance(given, str | os.PathLike):
         raise TypeError(f"{type(given).__name__} where a Scene or the path of one is needed")
-    scene, spans = Source(given, size=size).scene(diagnostics)
-    return _sound(scene, diagnostics), spans
+    return _sound(Source(given, size=size), diagnostics)
 
 
-def _sound(scene: Scene | None, diagnostics: Diagnostics) -> Scene:
+def _sound(source: Source, diagnostics: Diagnostics | None, frame: int = 0) -> tuple[Scene, SpanMap]:
+    result = Diagnostics() if diagnostics is None else diagnostics
+    scene, spans = source.scene(result, frame)
     if scene is None:
-        raise SceneError(diagnostics)
-    return scene
+        raise SceneError(result)
+    return scene, spans
 
 
 MOST_CHOICES: Final = 1000
@@ -335,7 +333,7 @@ def param_named(evaluation: Evaluation, name: str) -> nodes.Param:
 
 def knob_of(stmt: nodes.Param, file: FileContext) -> Knob:
     """Values that a param may be set to, after a run; raises `ParamError` where nothing gives them."""
-    name, value = stmt.name.text, file.env[file.scope.names[stmt.name.text].slot]
+    name, value = stmt.name.text, file.value(stmt.name.text)
     allowed: Any = None
     if stmt.range is not None:
         allowed = prepare(stmt.range, Site(file, file.scope, "file")).run(file.env)
@@ -438,7 +436,7 @@ def literals_of(evaluation: Evaluation, names: Iterable[str]) -> dict[str, str]:
     literals, file = {}, evaluation.context
     for name, stmt in params_of(evaluation).items():
         if name in names:
-            value = file.env[file.scope.names[name].slot]
+            value = file.value(name)
             literals[name] = written(Knob(stmt, value, (Axis(name, choices=(value,)),), False), value)
     return literals
 

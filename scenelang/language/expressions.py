@@ -560,14 +560,16 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Site) -> Code:
     name = expr.name
     word = words.FUNCTIONS.get(name.text)
     if word is None:
-        alias, dot, _ = name.text.partition(".")
+        alias, dot, rest = name.text.partition(".")
         outer = place.scope.find(alias) if dot else None
         if outer is None:
             unknown(name, place, expr)
         elif outer.kind == "import":
             unknown_member(name, place, outer.value)
-        else:
-            _method(expr, place)
+        else:  # `v.length()`: a value has no functions
+            last = tree.Name(Span(name.span.source, name.span.end - len(rest), expr.span.end), rest)
+            help = member_advice(last) or f"write {rest}(…) with the value as an argument"
+            place.report.error("E0128", "only a name can be called", name.span, help=help)
         return POISONED
     if word.variadic:
         if not given or any(arg.name for arg, _ in given):
@@ -586,14 +588,6 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Site) -> Code:
     place.file.weight += limits.FUNCTIONS.get(name.text, 4 * len(given) if word.variadic else 0)
     per_item = 0 if name.text == "len" else limits.FUNCTION_ITEM_STEPS
     return computed(place, meaning, expr.span, exprs, [code for _, code in given], per_item)
-
-
-def _method(expr: tree.CallExpr, place: Site) -> None:
-    """Report `v.length()`: a value has no functions."""
-    rest, source = expr.name.text.partition(".")[2], expr.name.span.source
-    last = tree.Name(Span(source, expr.name.span.end - len(rest), expr.span.end), rest)
-    help = member_advice(last) or f"write {rest}(…) with the value as an argument"
-    place.report.error("E0128", "only a name can be called", expr.name.span, help=help)
 
 
 def _doubted(hsv: Callable[..., Any], span: Span, place: Site) -> Callable[..., Any]:

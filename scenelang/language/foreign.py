@@ -5,23 +5,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
-
-def _read() -> dict[str, dict[str, str]]:
-    tables: dict[str, dict[str, str]] = {}
-    table: dict[str, str] = {}
-    for line in Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines():
-        words, colon, meaning = line.partition(": ")
-        if line.startswith("["):
-            table = tables[line.strip("[]")] = {}
-        elif colon and not line.startswith("#"):
-            table |= dict.fromkeys(words.split(), meaning)
-    return tables
+from scenelang.language.tables import sections
 
 
-_TABLES: Final = _read()
+def _table(body: str) -> dict[str, str]:
+    """Meanings by words, of a section's lines."""
+    lines = [line.partition(": ") for line in body.splitlines() if not line.startswith("#")]
+    return {word: meaning for words, colon, meaning in lines if colon for word in words.split()}
+
+
+_TABLES: Final = {title: _table(body) for title, body in sections("foreign").items()}
 FUNCTIONS: Final = _TABLES["functions"]
 MATERIALS: Final = _TABLES["materials"]
 VALUES: Final = _TABLES["values"]

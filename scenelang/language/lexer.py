@@ -24,7 +24,7 @@ from scenelang.language.diagnostics import (
     removal,
 )
 from scenelang.language.foreign import SIGNS, UNIT_NAMES
-from scenelang.language.tables import END, tables
+from scenelang.language.tables import END, rows, tables
 from scenelang.language.words import UNITS
 
 MAX_MISTAKES = 200
@@ -47,24 +47,7 @@ _SLIPS = {
     "name": r"[^\W\d]\w*+",
     "foreign": r"&(?!&)|\|(?!\|)|" + "|".join(re.escape(text) for text in SIGNS if text not in "&|"),
 }
-_SAID = {
-    "open_comment": ("", "E0115", "comment is never closed", "a comment ends with `*/`; the rest is skipped"),
-    "close_comment": ("", "E0115", "end of a comment that was never opened", None),
-    "open_string": ("STRING", "E0114", "string is never closed", 'a string ends with `"` on its line'),
-    "quotes": ("STRING", "E0123", "string in the wrong quotes", 'strings stand in `"`'),
-    "number": ("NUMBER", "E0116", "`{}` is not a number", None),
-    "variable": (
-        "NAME",
-        "E0113",
-        "illegal name `{}`",
-        "names have no `$`; in place of `$fn` write s.disc(0.3, sides = 64)",
-    ),
-    "hash": ("", "E0127", "`#` does not begin a comment", "comments begin with `//`"),
-    "colour": ("COLOR", "E0118", "`{}` is not a colour", "a colour is `#` and 3 or 6 hexadecimal digits"),
-    "name": ("NAME", "E0124", "`{}` is not a name", "names are made of ASCII letters, digits and `_`"),
-    "foreign": ("", "E0127", "`{}` is not used here", None),
-    "illegal": ("", "E0113", "illegal character `{}`", None),
-}
+_SAID = {name: columns for name, *columns in rows("lexer", "slips")}
 """What stands in the place of each slip, code, message, help."""
 _LENGTHS = ("px", "em", "rem", "pt", "mm", "cm", "in", "m", "vw", "vh")
 _AFTER_STRING = re.compile(r"[ \t]*+(?:[;)]|as\b|$)", re.MULTILINE)
@@ -246,7 +229,8 @@ def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
 
 def _read_slip(tokens: Tokens, report: Report, name: str, start: int, end: int) -> None:
     """Report a slip and stand something sound in its place."""
-    kind, code, message, help = _SAID[name]
+    kind, code, message, *advice = _SAID[name]
+    kind, help = kind.strip("-"), advice[0] if advice else None
     text = shown = tokens.source.text[start:end]
     fix: Fix | str | None = None
     stop = end

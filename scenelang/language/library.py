@@ -18,7 +18,6 @@ from scenelang.language.scopes import outwards
 
 SHAPES: Final = "std/shapes"
 SOLIDS: Final = "std/solids"
-MESHES: Final = "std/meshes"
 _FOLDER: Final = Path(__file__).resolve().parent / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
 _SUFFIXES: Final = (".nsg", ".safetensors")
@@ -88,19 +87,18 @@ class Calls(NamedTuple):
 class SpanMap(Record, frozen=False):
     """Spans of a Scene's nodes, transforms and materials, for the very objects that the evaluator made."""
 
-    # by `id`; each entry holds its node, so that no other can come by that `id`
-    _known: dict[int, tuple[object, Written, Calls | None]] = field(default_factory=dict)
+    # by `id`: each node, so that no other can come by that `id`, and the name or keyword that heads it
+    _known: dict[int, tuple[object, Span]] = field(default_factory=dict)
+    main: SourceFile | None = None  # the file of the scene, where it is text
 
     def record(self, node: object, written: Written, calls: Calls | None = None) -> None:
-        """Remember where ``node`` was written (what the library makes: where it is called) and its calls."""
-        if calls is not None and holds(written.name.source):
-            site = calls.outside() or written.name
-            written = Written(site, site)
-        self._known[id(node)] = node, written, calls
+        """Remember where ``node`` was written: of what the library makes, where it is called."""
+        outside = calls.outside() if calls is not None and holds(written.name.source) else None
+        self._known[id(node)] = node, outside or written.name
 
     def copy(self, old: object, new: object) -> None:
         """``new`` stands for ``old``, which an outer block has added to."""
-        self._known[id(new)] = new, *self._known[id(old)][1:]
+        self._known[id(new)] = new, self._known[id(old)][1]
 
     def add(self, other: SpanMap) -> None:
         """Take over all that ``other`` knows."""
@@ -109,17 +107,7 @@ class SpanMap(Record, frozen=False):
     def span(self, node: object) -> Span | None:
         """The name or keyword that heads the statement of ``node``: what a caret points at."""
         known = self._known.get(id(node))
-        return known[1].name if known else None
-
-    def statement(self, node: object) -> Span | None:
-        """The whole statement of ``node``."""
-        known = self._known.get(id(node))
-        return known[1].statement if known else None
-
-    def calls(self, node: object) -> tuple[Span, ...]:
-        """The calls that led to ``node``, innermost first; empty where it stands in no module."""
-        known = self._known.get(id(node))
-        return tuple(known[2].outwards()) if known and known[2] is not None else ()
+        return known[1] if known else None
 
     def __len__(self) -> int:
         return len(self._known)

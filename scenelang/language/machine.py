@@ -13,13 +13,10 @@ from typing import Any
 from scenelang.language.diagnostics import Diagnostic, Span
 from scenelang.language.reports import in_order, printable
 
-JSON_VERSION = 1
-_SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
-
 
 def render_json(diagnostics: Iterable[Diagnostic]) -> str:
     """``{"version": 1, "diagnostics": […]}``; places are null where a diagnostic has none."""
-    data = {"version": JSON_VERSION, "diagnostics": [_plain(d) for d in in_order(diagnostics)]}
+    data = {"version": 1, "diagnostics": [_plain(d) for d in in_order(diagnostics)]}
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -99,7 +96,7 @@ def render_sarif(diagnostics: Iterable[Diagnostic], version: str | None = None) 
         "results": [_result(d, used.index(d.code)) for d in ordered],
         "properties": {**counts, "fixable": sum(d.fix is not None for d in ordered)},
     }
-    log = {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
+    log = {"$schema": "https://json.schemastore.org/sarif-2.1.0.json", "version": "2.1.0", "runs": [run]}
     return json.dumps(log, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -15,7 +15,18 @@ from scenelang.language.diagnostics import Edit, Fix, Label, Span
 from scenelang.language.expressions import POISONED, Code, Given, bind
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import SAMPLES, Color, Frozen, Grayscale, Shear, Stop, singular
+from scenelang.language.nodes import (
+    LATER,
+    MOST,
+    SAMPLES,
+    Color,
+    Frozen,
+    Grayscale,
+    Shear,
+    Stop,
+    light_fault,
+    singular,
+)
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env, Session
@@ -109,6 +120,15 @@ def _rows(rows: Any, operand: int) -> tuple[tuple[float, ...], ...]:
     return values
 
 
+def _power(value: Any, operand: int) -> float:
+    power = number(value, operand)
+    if (fault := light_fault(power)) is not None:
+        raise Problem("E0339", fault, operand=operand)
+    if power > MOST:
+        raise Problem("E0311", f"`power` is not within {MOST:,.0f} of 0", operand=operand)
+    return power
+
+
 _LEAF_UNITS: Final = "{} is in units of the leaf, before any scale"
 _side = _within(
     lambda side: side.is_integer() and 1 <= side <= MAX_SIDE_PX,
@@ -139,6 +159,14 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "backdrop": lambda value, at: None if value is None else _opaque(value, at, "background"),
     "side": lambda value, at: int(_side(value, at)),
     "share": _within(lambda share: 0.0 <= share <= 1.0, "an opacity of {} is outside 0..1"),
+    "power": _power,
+    "extent": _within(lambda radius: radius >= 0.0, "a radius of {} is negative"),
+    "density": _within(
+        lambda s: 0.0 < s <= 100.0,
+        "a density of {} is not above 0 and at most 100",
+        "in mist of 3 a third of a unit lets 37 % of the light through",
+    ),
+    "roughness": _within(lambda r: 0.05 <= r <= 1.0, "a roughness of {} is outside 0.05..1"),
     "samples": lambda value, at: int(_samples(value, at)),
     "seconds": lambda value, at: _seconds(value.size if value.__class__ is Time else value, at),
     "fps": _within(lambda rate: rate > 0.0, "a frame rate of {} is not above 0"),
@@ -168,7 +196,7 @@ class Spec(Record):
     spread: bool  # whether one vector may stand for all arguments
     node: type[Frozen] | None  # None for a single value: of a material, or of the picture
     rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]  # field, reader, default, number
-    stated: bool  # whether it is a setting
+    stated: bool  # whether it is a setting, or a property of a material
 
     @staticmethod
     def of(word: words.Word) -> Spec:
@@ -178,7 +206,8 @@ class Spec(Record):
         defaults = [1.0 if field.is_required() else field.default for field in fields.values()]
         readers = [KINDS[kind] for kind in word.kinds]
         rows = tuple(zip(fields or word.params, readers, defaults or [None] * 2, range(6), strict=False))
-        spread, stated = word.name in ("translate", "scale", "canvas"), word.name in words.SETTINGS
+        spread = word.name in ("translate", "scale", "canvas")
+        stated = word.name in words.SETTINGS or word.name in words.PROPERTIES
         return Spec(word, _HELP.get(word.name), spread, node, rows, stated)
 
     def read(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -297,7 +326,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: S
         if POISON in values:
             return None
         try:
-            if spec.word.name in words.PROPERTIES:
+            if spec.node is None:  # a property that is a number
                 return spec.read(values)[spec.word.params[0]]
             node = _shear(spec, values) if spec.node is Shear else spec.build(values)
         except Problem as problem:
@@ -343,10 +372,9 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: S
     return action
 
 
-def given_twice(what: str, span: Span, first: Span, report: Reporter, more: str = "") -> None:
+def given_twice(what: str, span: Span, first: Span, report: Reporter) -> None:
     labels = (Label(first, "first given here"),)
-    help = f"leave one of them out{more}"
-    report.error("E0333", f"`{what}` is given twice", span, labels=labels, help=help)
+    report.error("E0333", f"`{what}` is given twice", span, labels=labels, help="leave one of them out")
 
 
 def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
@@ -390,6 +418,9 @@ def prepare_material(expr: tree.MaterialExpr, place: Site) -> Code:
     return POISONED if make_material is None else Code(lambda env: MaterialValue(make_material(env)))
 
 
+_UNSAID: Final = {name: LATER[name] for name in words.PROPERTIES}
+
+
 def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Callable[[Env], Material] | None:
     """Function that makes the material node; None where a name is unknown."""
     name, session = written.name, place.session
@@ -401,7 +432,8 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Call
 
     def run(env: Env) -> Material:
         ops, given = operations(env)
-        material = make(Material, {"name": called, "ops": ops, "shading": shading, "opacity": 1.0, **given})
+        fields = {"name": called, "ops": ops, "shading": shading, **_UNSAID, **given}
+        material = make(Material, fields)
         session.spans.record(material, where)
         _check_stops(material, where, session)
         return material

@@ -37,6 +37,8 @@ from scenelang.language.words import BLEND, RESERVED, Combine
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
 """The largest number of a stage: float32 holds what is computed of it."""
+LAMPS: Final = 8
+"""The most lights of a scene."""
 
 
 def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:
@@ -152,7 +154,7 @@ def _kind_is_required(schema: dict[str, Any]) -> None:
 
 
 _SEVERAL = frozenset(("children", "elements", "nodes", "ops", "transforms"))
-_COLOURS = frozenset(("background", "color", "rgb"))
+_COLOURS = frozenset(("background", "color", "horizon", "rgb", "zenith"))
 
 
 def _decoded(name: str, text: str) -> tuple[float, float, float]:
@@ -233,7 +235,10 @@ class Frozen(BaseModel):
             return f"{type(self).__name__}(…)"
 
 
-LATER: Final = {"opacity": 1.0, "samples": 4}
+LATER: Final = {
+    **{"opacity": 1.0, "glow": None, "density": None, "roughness": None},
+    **{"radius": 0.0, "sky": "default", "samples": 4},
+}
 """Fields that came later, and their usual values."""
 
 
@@ -469,18 +474,33 @@ class Camera(Frozen):
         return self
 
 
-class Light(Frozen):
-    """A point light; ``color`` is as written."""
+Power = Annotated[Finite, Field(ge=0, le=MOST)]
+
+
+class Light(Brief):
+    """A light, a point or a sphere of a ``radius``; ``color`` is as written."""
 
     position: Point = (2.5, 4.0, 3.0)
-    power: Annotated[
-        Finite, Field(ge=0, le=MOST, description="what a white surface at distance 1 receives")
-    ] = 28.0
+    power: Annotated[Power, Field(description="what a white surface at distance 1 receives")] = 28.0
     color: Opaque = (1.0, 1.0, 1.0)
+    radius: Annotated[Finite, Field(ge=0, le=MOST, description="0: a point")] = 0.0
 
     if TYPE_CHECKING:
 
-        def __init__(self, position: Triple = ..., power: float = ..., color: Triple | str = ...) -> None: ...
+        def __init__(
+            self, position: Triple = ..., power: float = ..., color: Triple | str = ..., radius: float = ...
+        ) -> None: ...
+
+
+Lights = Annotated[
+    Annotated[Light | None, STATED]
+    | Annotated[tuple[Light, ...], Field(max_length=LAMPS), Tag("several")]
+    | Unsaid,
+    Discriminator(
+        lambda value: {str: "unsaid", list: "several", tuple: "several"}.get(type(value), "stated")
+    ),
+    Field(description="3D; null: without one"),
+]
 
 
 class Ground(Frozen):
@@ -492,6 +512,31 @@ class Ground(Frozen):
     if TYPE_CHECKING:
 
         def __init__(self, y: float = ..., color: Triple | str = ...) -> None: ...
+
+
+class Sky(Frozen):
+    """The sky as a light: its colours, as written or the background's, times ``power``."""
+
+    power: Power = 1.0
+    horizon: Annotated[Annotated[Opaque, STATED] | Unsaid, EITHER] = "default"
+    zenith: Annotated[Annotated[Opaque, STATED] | Unsaid, EITHER] = "default"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, power: float = ..., horizon: Triple | str = ..., zenith: Triple | str = ...
+        ) -> None: ...
+
+
+class Glow(Frozen):
+    """Light that a material sends out: ``power`` times ``color``, which is as written."""
+
+    color: Opaque
+    power: Power = 1.0
+
+    if TYPE_CHECKING:
+
+        def __init__(self, color: Triple | str, power: float = ...) -> None: ...
 
 
 MAX_FRAMES = 1_000_000
@@ -510,20 +555,34 @@ class Material(Brief):
     """A material, with its texture and colour operations in order.
 
     One of the model that is a texture, a gradient, or an element's, is lit as its ``shading`` says.
-    ``opacity`` is of flat scenes.
+    ``opacity`` is of flat scenes, what follows it of solid ones.
     """
 
     name: Annotated[Dotted, Field(description="a material of the model, or an element's")]
     ops: Annotated[tuple[MaterialOp, ...], Field(description="in order, nearest the leaf first")] = ()
     shading: Annotated[
-        Word | None, Field(description="of a texture: flat, diffuse or volumetric; null: as usual")
+        Word | None, Field(description="of a texture: flat, diffuse, volumetric, …; null: as usual")
     ] = None
     opacity: Annotated[Share, Field(description="2D; 0 shows all that lies behind, 1 hides it")] = 1.0
+    glow: Annotated[Glow | None, Field(description="light that it sends out")] = None
+    density: Annotated[
+        Finite | None, Field(gt=0, le=100, description="of volumetric, per world unit; null: 3")
+    ] = None
+    roughness: Annotated[
+        Finite | None, Field(ge=0.05, le=1, description="of glossy and metal; null: 0.3")
+    ] = None
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, name: str, ops: Inks = (), shading: str | None = None, opacity: float = 1.0
+            self,
+            name: str,
+            ops: Inks = (),
+            shading: str | None = None,
+            opacity: float = 1.0,
+            glow: Glow | str | Triple | None = None,
+            density: float | None = None,
+            roughness: float | None = None,
         ) -> None: ...
 
     @classmethod
@@ -531,6 +590,8 @@ class Material(Brief):
         given = super()._arranged(args, data)
         if isinstance(given.get("ops"), str):
             given["ops"] = (Color(given["ops"]),)
+        if isinstance(given.get("glow"), str | tuple):
+            given["glow"] = Glow(given["glow"])
         return given
 
     @model_validator(mode="after")

@@ -32,7 +32,7 @@ from scenelang.language.lexer import (
     reach,
     statement_depth,
 )
-from scenelang.language.tables import END, tables
+from scenelang.language.tables import END, rows, tables
 from scenelang.language.words import TRANSFORMS, UNITS
 
 _BEHIND: Final = 4  # so many tokens after the line have to fit as well
@@ -155,9 +155,7 @@ def _best(tokens: Tokens, first: int, stop: int, missing: int) -> Repair:
     return best
 
 
-def _mends(
-    tokens: Tokens, stack: list[int], at: int, stop: int, limit: int, missing: int
-) -> Iterator[Repair]:
+def _mends(tokens: Tokens, stack: list[int], at: int, stop: int, most: int, missing: int) -> Iterator[Repair]:
     """Repairs of a missing brace at one place, each the cheaper the likelier it is."""
     (brace,), (end,) = _kinds("}"), _kinds(";")
     closes, name = missing == brace, tokens.name(at)
@@ -169,7 +167,7 @@ def _mends(
             yield Repair(at, 0, (*rest, end, missing) if closes else (*rest, missing), -0.6)
     elif at == stop and closes:
         yield Repair(at, 0, (missing, end), -0.25)
-    if at >= limit:
+    if at >= most:
         return
     if name == ("{" if closes else "}"):
         yield Repair(at, 1, (), -0.2 if closes else -0.5 - 0.05 * tokens.on_new_line(at))
@@ -184,31 +182,10 @@ FOLLOWED: Final = 80
 _WINDOW: Final = 8  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 
-# What may be missing, and what that costs; tokens that only make sense together count as one.
-_INSERTIONS: Final = {
-    **{";": 1.3, ",": 1.2, "=": 1.3, "in": 1.4, "as": 1.4, ":": 1.5, "..": 2.0, "*": 2.2},
-    **{"(": 1.6, "( )": 1.6, "{ }": 1.9, "BAD_EXPRESSION": 1.6, "NAME": 1.7, "STRING": 1.8},
-    **{"= BAD_EXPRESSION": 1.9, "in BAD_EXPRESSION": 1.9, "as NAME": 1.9, ": BAD_EXPRESSION": 1.9},
-    **{"let": 1.4, "param": 1.5, "fn": 1.5, "for": 1.5, "if": 1.5, "nsg": 1.6, "model": 1.7},
-    **{"import": 1.6, "material": 1.6},
-}
-_ONLY_BEFORE: Final = {
-    **dict.fromkeys(("let", "param", "fn", "material"), "NAME"),
-    **{"for": "(", "if": "(", "nsg": "NUMBER", "model": "STRING", "import": "STRING"},
-}
-_REPLACEMENTS: Final = {
-    "=": {"==": 1.0},
-    "==": {"=": 1.2},
-    ":": {"=": 1.2, ";": 1.2, "..": 1.4, ",": 1.4},
-    ";": {",": 1.2, ":": 1.5, "{ }": 1.8},
-    ",": {";": 1.2, "=": 1.6},
-    ".": {",": 1.5, ";": 1.5},
-    ")": {"]": 1.1},
-    "]": {")": 1.1},
-    "(": {"[": 1.3},
-    "[": {"(": 1.3},
-}
-"""Likely slips: what is written, what was meant and its cost; any other costs `_SUBSTITUTION` more."""
+_REPLACEMENTS: Final = [
+    (written, meant, float(cost)) for written, meant, cost in rows("recovery", "replacements")
+]
+_CODES: Final = dict[str, str](rows("recovery", "codes"))
 _DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
 _CLOSING = 1.1
@@ -225,11 +202,6 @@ _CLOSES: Final = {"(": ")", "[": "]"}
 _FIXED: Final = ("{", "}", "$END")  # braces were matched before
 _ENDS: Final = (";", "}", "$END")
 _NAMED: Final = {"BAD_EXPRESSION": "an expression", "NAME": "a name", "STRING": "a string"}
-_CODES: Final = {
-    **{")": "E0103", "]": "E0103", "}": "E0104", "{": "E0106", "BAD_EXPRESSION": "E0108"},
-    **{"NAME": "E0109", "(": "E0107", ";": "E0102", ",": "E0112", "*": "E0112"},
-}
-"""Codes of what is missing; anything else is E0126."""
 
 
 class Repair(Record):
@@ -249,7 +221,10 @@ def _kinds(names: str) -> tuple[int, ...]:
 @cache
 def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
     """Insertions to try: the tokens, the cost, and the token that has to follow if that matters."""
-    return [(_kinds(names), cost, _kinds(_ONLY_BEFORE.get(names, ""))) for names, cost in _INSERTIONS.items()]
+    return [
+        (_kinds(names), float(cost), _kinds("".join(needed)))
+        for names, cost, *needed in rows("recovery", "insertions")
+    ]
 
 
 class Recovery:
@@ -371,9 +346,10 @@ class Recovery:
             yield Repair(at, 2, (after, kind), _SWAP)
         if name in _FIXED:
             return
-        for meant, cost in _REPLACEMENTS.get(name, {}).items():
-            header = name == "=" and tokens.name(first) in ("fn", "module")
-            yield Repair(at, 1, _kinds(meant), cost + 0.5 * header)
+        for written, meant, cost in _REPLACEMENTS:
+            if written == name:
+                header = name == "=" and tokens.name(first) in ("fn", "module")
+                yield Repair(at, 1, _kinds(meant), cost + 0.5 * header)
         if name.islower():
             yield Repair(at, 1, _kinds("NAME"), _MISSPELT + 0.2)
         yield from self._misspelt(first, at)
@@ -544,7 +520,7 @@ def _report_replacement(tokens: Tokens, report: Report, repair: Repair, names: l
     elif new.isalpha() and new in (HEADS.get(text), *keywords_near(text)):
         code, message, fix = "E0132", f"unknown word `{text}`", None if text == "int" else new
         help = f"it is `{new}` here" if text in HEADS else f"did you mean `{new}`?"
-    elif new in _REPLACEMENTS.get(text, ()):
+    elif any((text, new) == (written, meant) for written, meant, _ in _REPLACEMENTS):
         fix = " =" if new == "=" and tokens.end_before(at) == start else new
     report.add(code, message, start, end, help=help, fix=fix)
 

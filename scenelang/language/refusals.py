@@ -7,7 +7,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-TAGS: Final = frozenset(("stated", "unsaid", "object", "group", "boolean", "chain"))
+TAGS: Final = frozenset(("stated", "several", "unsaid", "object", "group", "boolean", "chain"))
 """Parts of the place of a mistake in pydantic that text does not nest by."""
 _MOST: Final = 3  # mistakes that one exception tells
 _WIDTH: Final = 40  # characters of a value that are shown

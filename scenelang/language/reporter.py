@@ -6,7 +6,7 @@ import re
 from collections.abc import Hashable, Iterable
 from dataclasses import field, replace
 from itertools import islice
-from typing import Final
+from typing import Any, Final
 
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
@@ -24,6 +24,8 @@ _NAMES: Final = frozenset(("E0201", "E0203", "E0204", "E0206", "E0207", "E0208",
 _PLACES: Final = frozenset(("E0202", "E0330", "E0331", "E0332", "E0333", "E0334", "E0335"))
 _LOST: Final = frozenset(("E0104", "E0105", "E0106", "E0109", "E0129"))
 """Mistakes after which nobody knows what is defined where: of braces, and in the place of a name."""
+_ORPHANS: Final = frozenset(("E0335", "W0304"))
+"""Reports of what may be there under a misspelt name."""
 _CERTAIN: Final = frozenset(("E0116", "E0117", "E0123", "E0127", "E0132"))
 """Mistakes in one word, number or sign: those with a fix are read as fixed, and hide nothing."""
 
@@ -97,7 +99,9 @@ class Reporter(Record, frozen=False):
         return self.words_in[source]
 
     def follows(self, code: str, span: Span) -> bool:
-        """Test whether a diagnostic may follow from a syntax mistake, there or in a call that is running."""
+        """Test whether a diagnostic may follow from another mistake: of syntax, or an unknown node."""
+        if code in _ORPHANS and "E0204" in self.reported.values():
+            return True
         if not self.damaged:
             return False
         within = self.calls.outwards() if self.calls is not None else ()
@@ -140,21 +144,11 @@ class Reporter(Record, frozen=False):
         if not self.follows(code, span):
             self.diagnostics.add(code, message, span, help=help)
 
-    def error_once(
-        self,
-        key: Hashable,
-        code: str,
-        message: str,
-        span: Span,
-        *,
-        help: str | None = None,
-        fix: Fix | None = None,
-        labels: tuple[Label, ...] = (),
-    ) -> None:
-        """Report a mistake, or show its place at the report of the same one with the same key."""
+    def error_once(self, key: Hashable, code: str, message: str, span: Span, **more: Any) -> None:
+        """Report a mistake, as `error` does, or show its place at the report of the same one of this key."""
         index = self.shared.get(key)
         if index is None:
-            index = self.error(code, message, span, help=help, fix=fix, labels=labels)
+            index = self.error(code, message, span, **more)
             if index is not None:
                 self.shared[key] = index
             return

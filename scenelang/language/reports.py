@@ -231,12 +231,10 @@ def _block(diagnostic: Diagnostic, width: int, color: bool) -> str:
     lines = [head + paint("bold", f": {printable(diagnostic.message)}", color)]
     notes: list[Note] = [(diagnostic.span, "", severity)] if diagnostic.span is not None else []
     notes += [(label.span, label.message, "frame") for label in diagnostic.labels]
-    numbers = [1, *(span.locate()[1][0] for span, _, _ in notes)]
+    rows = [1, *(span.locate()[1][0] for span, _, _ in notes)]
     edits = fix.edits if fix else ()
-    numbers += [
-        e.span.locate()[0][0] + max(e.span.text.count("\n"), e.replacement.count("\n")) for e in edits
-    ]
-    gutter = len(str(max(numbers)))
+    rows += [e.span.locate()[0][0] + max(e.span.text.count("\n"), e.replacement.count("\n")) for e in edits]
+    gutter = len(str(max(rows)))
     room = max(width - gutter - 3, _LEAST_WIDTH)
     lines += _draw(notes, gutter, room, color)
     said = (("help", diagnostic.help), ("fix", fix.message if fix else None))
@@ -279,10 +277,8 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             row = _Row(new.removesuffix("\n"), marks[0][0], marks[-1][1], width)
             places = [(max(row.cell(a), 0), min(row.cell(b), row.size), "+", "added") for a, b in marks]
             under = _underlines([place for place in places if place[0] < place[1]], color)
-            rows += [
-                f"{paint('frame', f'{first:>{gutter}} |', color)} {row.text}",
-                f"{bare} {under}".rstrip(),
-            ]
+            head = paint("frame", f"{first:>{gutter}} |", color)
+            rows += [f"{head} {row.text}", f"{bare} {under}".rstrip()]
             continue
         for sign, text, style in (("-", old, "removed"), ("+", new, "added")):
             lines = text.removesuffix("\n").split("\n") if text.strip() or sign == "-" else []

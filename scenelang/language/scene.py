@@ -14,51 +14,26 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    Field,
+    PrivateAttr,
+    TypeAdapter,
+    ValidationError,
+    field_validator,
+)
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.assets import notebook
 from scenelang.assets.element import Element, Part
 from scenelang.assets.element_file import ElementFile, load_element_file
-from scenelang.assets.files import depth_of_json, no_number
+from scenelang.assets.files import depth_of_json, no_number, reason
 from scenelang.assets.records import Record, deep_stack
 from scenelang.assets.tensors import TensorError
 from scenelang.language import library, nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile, Span, listing, plural
 from scenelang.language.library import SpanMap, Written
-from scenelang.language.nodes import EITHER, STATED, Frozen, Opaque, Pixels, Unsaid, Version, Word
-from scenelang.language.nodes import MAX_FRAMES as MAX_FRAMES
-from scenelang.language.nodes import MAX_NODE_DEPTH as MAX_NODE_DEPTH
-from scenelang.language.nodes import Animation as Animation
-from scenelang.language.nodes import Bend as Bend
-from scenelang.language.nodes import Boolean as Boolean
-from scenelang.language.nodes import Camera as Camera
-from scenelang.language.nodes import Chain as Chain
-from scenelang.language.nodes import Color as Color
-from scenelang.language.nodes import Displace as Displace
-from scenelang.language.nodes import Flip as Flip
-from scenelang.language.nodes import Grayscale as Grayscale
-from scenelang.language.nodes import Ground as Ground
-from scenelang.language.nodes import Group as Group
-from scenelang.language.nodes import Grow as Grow
-from scenelang.language.nodes import Hue as Hue
-from scenelang.language.nodes import Light as Light
-from scenelang.language.nodes import Link as Link
-from scenelang.language.nodes import Material as Material
-from scenelang.language.nodes import MaterialOp as MaterialOp
-from scenelang.language.nodes import Matrix as Matrix
-from scenelang.language.nodes import Object as Object
-from scenelang.language.nodes import Rotate as Rotate
-from scenelang.language.nodes import SampleCount as SampleCount
-from scenelang.language.nodes import Scale as Scale
-from scenelang.language.nodes import SceneNode as SceneNode
-from scenelang.language.nodes import Shear as Shear
-from scenelang.language.nodes import Shell as Shell
-from scenelang.language.nodes import Stop as Stop
-from scenelang.language.nodes import Transform as Transform
-from scenelang.language.nodes import Translate as Translate
-from scenelang.language.nodes import Twirl as Twirl
-from scenelang.language.nodes import Twist as Twist
+from scenelang.language.nodes import *
 from scenelang.language.refusals import TAGS, said
 from scenelang.language.reports import SceneError
 from scenelang.language.scene_text import angle, node_lines, number, rgb, vector
@@ -146,8 +121,7 @@ class Elements(Frozen):
         except TensorError as error:
             return "E0217", f"`{self.path}` is not a file of elements: {error}"
         except (OSError, RuntimeError, ValueError) as error:
-            reason = (getattr(error, "strerror", None) or str(error)).lower()
-            return "E0214", f"cannot read `{self.path}`: {reason}"
+            return "E0214", f"cannot read `{self.path}`: {reason(error)}"
         if zoo.digest != self.digest and not library.owns(place):  # what ships is mended at times
             return "E0217", f"`{self.path}` is not the file that the scene was made with"
         self._zoo = zoo
@@ -206,9 +180,12 @@ class Scene(nodes.Brief):
     ] = "default"
     samples: SampleCount = 4
     camera: Annotated[Annotated[Camera, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
-    light: Annotated[Annotated[Light, STATED] | Unsaid, EITHER, Field(description="3D")] = "default"
+    light: Lights = "default"
     ground: Annotated[
         Annotated[Ground | None, STATED] | Unsaid, EITHER, Field(description="3D; null: without one")
+    ] = "default"
+    sky: Annotated[
+        Annotated[Sky, STATED] | Unsaid, EITHER, Field(description="3D; what lights all from everywhere")
     ] = "default"
     animation: Annotated[
         Animation | None, Field(description="the animation that this Scene is one frame of")
@@ -227,8 +204,9 @@ class Scene(nodes.Brief):
             background: tuple[float, float, float] | str | None = "default",
             samples: Literal[4, 16] = 4,
             camera: Camera | Unsaid = "default",
-            light: Light | Unsaid = "default",
+            light: Light | Iterable[Light] | Unsaid | None = "default",
             ground: Ground | Unsaid | None = "default",
+            sky: Sky | Unsaid = "default",
             animation: Animation | None = None,
             elements: Iterable[Elements] | Elements = (),
             nodes: Iterable[SceneNode] | SceneNode = (),
@@ -239,6 +217,14 @@ class Scene(nodes.Brief):
         if args:
             raise TypeError(f"Scene takes its arguments by name: {', '.join(cls._names())}")
         return super()._arranged(args, data)
+
+    @field_validator("light")
+    @classmethod
+    def _lamps(cls, light: Any) -> Any:
+        """One light is not a tuple, and none is None."""
+        if not isinstance(light, tuple) or len(light) > 1:
+            return light
+        return light[0] if light else None
 
     def sized(self, size: tuple[int, int]) -> Scene:
         """The same scene on a canvas of width and height in pixels; raises ValueError but for 1 to 8192."""
@@ -280,11 +266,13 @@ class Scene(nodes.Brief):
         if self.samples != 4:
             lines.append(f"samples({self.samples});")
         for word in STAGE:
-            if (value := getattr(self, word)) is None:
-                lines.append(f"{word}(none);")
-            elif value != "default":
-                given = (f"{name} = {_stated(name, item)}" for name, item in value.__repr_args__())
-                lines.append(f"{word}({', '.join(given)});")
+            stated = getattr(self, word)
+            for value in stated if isinstance(stated, tuple) else (stated,):
+                if value is None:
+                    lines.append(f"{word}(none);")
+                elif value != "default":
+                    given = (f"{name} = {_stated(name, item)}" for name, item in value.__repr_args__())
+                    lines.append(f"{word}({', '.join(given)});")
         if (clip := self.animation) is not None:
             loop = "" if clip.loop else ", loop = false"
             lines.append(f"animate({number(clip.seconds)}s, {number(clip.fps)}{loop});")
@@ -325,7 +313,7 @@ class Scene(nodes.Brief):
 
 
 def _stated(name: str | None, value: Any) -> str:
-    if name == "color":
+    if name in ("color", "horizon", "zenith"):
         return rgb(value)
     if isinstance(value, tuple):
         return vector(value)
@@ -593,8 +581,8 @@ def _no_json(error: ValueError, source: SourceFile) -> SceneError:
     if isinstance(error, json.JSONDecodeError):
         said = error.msg[:1].lower() + error.msg[1:]
         return _failure(f"not JSON: {said}", Span(source, error.pos, min(error.pos + 1, len(source.text))))
-    reason = str(error).partition(":")[0]
-    return _failure(f"not JSON: {reason[:1].lower()}{reason[1:]}")
+    said = str(error).partition(":")[0]
+    return _failure(f"not JSON: {said[:1].lower()}{said[1:]}")
 
 
 def _problems(error: ValidationError, source: SourceFile, path: tuple[Key, ...] = ()) -> list[Diagnostic]:

@@ -6,7 +6,19 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from scenelang.language.nodes import Boolean, Link, Material, MaterialOp, Object, Rgb, SceneNode, Transform
+from scenelang.language.nodes import (
+    LATER,
+    Boolean,
+    Glow,
+    Link,
+    Material,
+    MaterialOp,
+    Object,
+    Rgb,
+    SceneNode,
+    Transform,
+)
+from scenelang.language.words import PROPERTIES
 
 _Line = str | tuple[str, SceneNode, int]
 _INDENT: Final = "  "
@@ -91,8 +103,10 @@ def vector(values: Iterable[float]) -> str:
 def material(value: Material) -> str:
     """A material statement."""
     ops = " ".join(map(transform, value.ops))
-    if value.opacity != 1.0:
-        ops += f" opacity({number(value.opacity)});"
+    for name in PROPERTIES:
+        if (given := getattr(value, name)) != LATER[name]:
+            glow = isinstance(given, Glow)
+            ops += f" {name}({f'{rgb(given.color)}, {number(given.power)}' if glow else number(given)});"
     name = value.name if value.shading is None else f"{value.shading} {value.name}"
     return f"material {name} {{ {ops} }}" if ops else f"material {name};"
 

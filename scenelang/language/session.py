@@ -12,7 +12,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any, Final, Literal
 
 from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
-from scenelang.assets.files import read_regular
+from scenelang.assets.files import read_regular, reason
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
 from scenelang.language import library, scopes, tree
@@ -141,10 +141,10 @@ class Settings(Record, frozen=False):
     canvas: tuple[int, int] = (256, 256)  # width and height in pixels
     background: tuple[float, float, float] | Unsaid | None = "default"  # as written; None for transparency
     samples: int = 4  # of a pixel
-    stage: dict[str, Any] = field(default_factory=dict)  # camera, light and ground, where they are stated
+    stage: dict[str, Any] = field(default_factory=dict)  # of the words of `STAGE` what is stated
     animation: Animation | None = None
     model: str | None = None
-    given: dict[str, Span] = field(default_factory=dict)  # the place of each setting, by its word
+    given: dict[str, list[Span]] = field(default_factory=dict)  # the places of each setting, by its word
 
 
 class Session(Record, frozen=False):
@@ -314,7 +314,7 @@ class Loader(Record, frozen=False):
         try:
             path = (folder / text).resolve()
         except (OSError, RuntimeError, ValueError) as error:
-            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}") from None
+            raise Unreadable("E0214", f"cannot read `{text}`: {reason(error)}") from None
         if not path.is_relative_to(self.root):
             help = f"imports stay inside {self.root}; --root sets another folder"
             raise Unreadable("E0215", f"`{text}` lies outside the import root", help)
@@ -339,10 +339,5 @@ class Loader(Record, frozen=False):
             raise Unreadable(error.code, f"cannot read `{text}`: {error}") from None
         except OSError as error:
             meant = (None, None) if path.suffix == SUFFIX else library.meant(text, span)
-            raise Unreadable("E0214", f"cannot read `{text}`: {_reason(error)}", *meant) from None
+            raise Unreadable("E0214", f"cannot read `{text}`: {reason(error)}", *meant) from None
         self.parsed[path] = parse(source, session.report.diagnostics)
-
-
-def _reason(error: BaseException) -> str:
-    """Reason that the system gives, in lower case."""
-    return (getattr(error, "strerror", None) or str(error) or "unreadable").lower()

@@ -38,10 +38,10 @@ from scenelang.language.expressions import VARIES, bind, lookup, prepare, prepar
 from scenelang.language.library import Written
 from scenelang.language.limits import MAX_BYTES
 from scenelang.language.modifiers import LEFT_OUT, Spec, prepare_move, prepare_value_use, spread
-from scenelang.language.nodes import MOST, camera_fault, light_fault
+from scenelang.language.nodes import LAMPS, MOST, camera_fault
 from scenelang.language.parser import parse
 from scenelang.language.reporter import Advice, Reporter, find_damage
-from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements, Light
+from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements
 from scenelang.language.session import Binding, Defines, Env, Session
 from scenelang.language.values import POISON, UNITS, Angle, Problem, RangeValue, Time, Vec
 
@@ -55,12 +55,15 @@ def at_top_level(place: Site, span: Span, what: str, name: str = "") -> bool:
 
 
 def _once(session: Session, what: str, span: Span) -> bool:
-    """Test whether a setting is given for the first time, and report a second one."""
-    first = session.settings.given.setdefault(what, span)
-    if first is not span:
-        more = "; there is one light, and its power says how bright" if what == "light" else ""
-        modifiers.given_twice(what, span, first, session.report, more)
-    return first is span
+    """Test whether a setting may stand, the first of its word or up to eight lights, and report it if not."""
+    given = session.settings.given.setdefault(what, [])
+    given.append(span)
+    if what == "light" and len(given) > LAMPS:
+        help = "a radius makes one light as large as several"
+        session.report.error("E0391", f"more than {LAMPS} lights", span, help=help)
+    elif what != "light" and len(given) > 1:
+        modifiers.given_twice(what, span, given[0], session.report)
+    return len(given) <= (LAMPS if what == "light" else 1)
 
 
 def prepare_version(stmt: tree.Version, place: Site) -> Action | None:
@@ -129,13 +132,8 @@ _SETTINGS: Final = {name: Spec.of(word) for name, word in words.SETTINGS.items()
 def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> None:
     """Set what a statement states; raises Problem."""
     settings, name = session.settings, spec.word.name
-    if name == "ground" and values[0] is None:
-        if values[1] is not LEFT_OUT:
-            raise Problem("E0308", "`ground(none)` has no colour", operand=1)
-        settings.stage[name] = None
-    elif name in words.STAGE:
-        settings.stage[name] = node = _stage(spec, values)
-        session.spans.record(node, where)
+    if name in words.STAGE:
+        settings.stage[name] = _joined(_stage(spec, values), spec, session, where)
     elif name == "animate":
         _animate(spec.read(values), session)
     elif name == "samples":
@@ -146,8 +144,30 @@ def _apply(spec: Spec, values: list[Any], session: Session, where: Written) -> N
         settings.background = spec.read(values)["c"]
 
 
+def _joined(node: Any, spec: Spec, session: Session, where: Written) -> Any:
+    """A part of the stage, or all lights so far with one more; reports `light(none)` beside another."""
+    settings, name = session.settings, spec.word.name
+    if node is not None:
+        session.spans.record(node, where)
+    if name not in settings.stage:
+        return node
+    lights = settings.stage[name]
+    if node is not None and lights is not None:
+        return (*lights, node) if isinstance(lights, tuple) else (lights, node)
+    labels = (Label(settings.given[name][0], "the first light"),)
+    help = "leave one of them out: the first light that is written replaces the usual one"
+    session.report.error("E0390", "`light(none)` beside another light", where.name, labels=labels, help=help)
+    return lights
+
+
 def _stage(spec: Spec, values: list[Any]) -> Any:
-    """The camera, light or ground; raises Problem."""
+    """The camera, light, ground or sky, None for `none` in place of a light or ground; raises Problem."""
+    if values[0] is None and spec.word.name in ("ground", "light"):
+        for at, value in enumerate(values):
+            if at and value is not LEFT_OUT:
+                fact = f"`{spec.word.name}(none)` has no {spec.word.params[at]}"
+                raise Problem("E0308", fact.replace("color", "colour"), operand=at)
+        return None
     node = spec.build(values)
     for at, (name, *_) in enumerate(spec.rows):
         value = getattr(node, name)
@@ -157,8 +177,6 @@ def _stage(spec: Spec, values: list[Any]) -> Any:
     if isinstance(node, Camera) and (fault := camera_fault(node.eye, node.target, node.fov)):
         at = [*Camera.model_fields].index(fault[0])
         raise Problem("E0338", fault[1], operand=1 if values[at] is LEFT_OUT else at)
-    if isinstance(node, Light) and (dark := light_fault(node.power)):
-        raise Problem("E0339", dark, operand=1)
     return node
 
 

@@ -57,6 +57,18 @@ def decode(data: dict[str, Any]) -> Tables:
     )
 
 
+def sections(module: str) -> dict[str, str]:
+    """The parts of the text beside a module by their titles, each a line ``[title]`` above the part."""
+    text = Path(__file__).with_name(f"{module}.txt").read_text("utf-8")
+    parts = (part.partition("]\n") for part in f"\n{text}".split("\n[")[1:])
+    return {title: body for title, _, body in parts}
+
+
+def rows(module: str, title: str) -> list[list[str]]:
+    """The rows of a table in the text beside a module: columns between bars, below ``[title]``."""
+    return [row.split(" | ") for row in sections(module)[title].partition("\n\n")[0].splitlines()]
+
+
 def grammar_path() -> Path:
     """Path of the grammar: inside an installed package, next to it in a checkout."""
     inside = PACKAGE / "grammar" / "scenelang.lark"

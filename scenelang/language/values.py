@@ -421,10 +421,6 @@ def _to_angle(function: Callable[[float], float]) -> Callable[[Any], Any]:
     return lambda value: _each(Angle, inner(value))
 
 
-def _atan2(y: Any, x: Any) -> Angle:
-    return Angle(math.atan2(number(y, 0), number(x, 1)))
-
-
 def _scalar(value: Any, operand: int = 0) -> tuple[float, str]:
     if value.__class__ in UNITS:
         return unpack(value)
@@ -544,10 +540,6 @@ def rand(seed: Any) -> float:
     return (state >> 11) / (1 << 53)
 
 
-def _rgb(*components: Any) -> Vec:
-    return Vec(tuple([number(c, i) for i, c in enumerate(components)]))
-
-
 def _hsv(h: Any, s: Any, v: Any) -> Vec:
     turns = h.size / math.tau if h.__class__ is Angle else number(h, 0)
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
@@ -559,7 +551,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "tan": _of_angle(math.tan),
     "asin": _to_angle(math.asin),
     "acos": _to_angle(math.acos),
-    "atan2": _atan2,
+    "atan2": lambda y, x: Angle(math.atan2(number(y, 0), number(x, 1))),
     "abs": _abs,
     "min": _whole(_best(operator.le)),
     "max": _whole(_best(operator.ge)),
@@ -574,7 +566,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "smoothstep": _whole(_smoothstep),
     "len": _len,
     "rand": rand,
-    "rgb": _rgb,
+    "rgb": lambda *components: Vec(tuple([number(c, i) for i, c in enumerate(components)])),
     "hsv": _hsv,
 }
 """Implementation of each function; raises Problem."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final, Literal, get_args
 
 from scenelang.assets.records import Record
+from scenelang.language.tables import sections
 
 UNITS: Final = ("deg", "rad", "turn", "ms", "s")
 Combine = Literal["union", "smooth", "subtract", "intersect"]
@@ -67,20 +67,13 @@ def _word(written: str, text: str, *more: str) -> Word:
     return Word(name, "".join(heads) or head, text, names, required, tuple(about), snippet, variadic, kinds)
 
 
-def _read() -> dict[str, dict[str, Word]]:
-    tables: dict[str, dict[str, Word]] = {}
-    table: dict[str, Word] = {}
-    for entry in Path(__file__).with_suffix(".txt").read_text("utf-8").split("\n\n"):
-        lines = entry.splitlines()
-        if entry.startswith("["):
-            table = tables[entry.strip("[]")] = {}
-        elif not entry.startswith("# "):
-            word = _word(*lines)
-            table[word.name] = word
-    return tables
+def _table(body: str) -> dict[str, Word]:
+    """The words of a section, whose entries are apart by empty lines."""
+    entries = [entry for entry in body.strip("\n").split("\n\n") if not entry.startswith("# ")]
+    return {word.name: word for word in (_word(*entry.splitlines()) for entry in entries)}
 
 
-_TABLES: Final = _read()
+_TABLES: Final = {title: _table(body) for title, body in sections("words").items()}
 DECLARING: Final = _TABLES["declaring"]
 CONTROL: Final = _TABLES["control"]
 NODES: Final = _TABLES["nodes"]
@@ -97,8 +90,12 @@ SETTINGS: Final = PLAIN_SETTINGS | STAGE
 TRANSFORMS: Final = _TABLES["moves"] | _TABLES["transforms"]
 OPERATIONS: Final = _TABLES["moves"] | _TABLES["operations"]
 """Operations in a material's block."""
-PROPERTIES: Final = ("opacity",)
+PROPERTIES: Final = ("opacity", "glow", "density", "roughness")
 """Those that stand in no order with the others, each at most once."""
+REFLECTING: Final = ("glossy", "metal")
+"""Shadings of space that need a sky; of a network they are `diffuse`."""
+KINDS_WITH: Final = {"density": ("volumetric",), "roughness": REFLECTING}
+"""Shadings that have a property, where not all have it."""
 
 FUNCTIONS: Final = _TABLES["functions"]
 LETTERS: Final = _TABLES["letters"]
@@ -129,7 +126,7 @@ SOLID_TRANSFORMS: Final = "twist", "displace"
 """Transforms that leave the plane."""
 OWN_TRANSFORMS: Final = "grow", "shell", "displace"
 """Transforms of a leaf's own distance, which stand first in its block, each at most once."""
-NEWER: Final = frozenset(("grow", "shell", "stop", "samples", "opacity", *STAGE))
+NEWER: Final = frozenset(("grow", "shell", "stop", "samples", *PROPERTIES, *STAGE))
 """Words that head a statement unless a scene's own module has their name."""
 SCENES: Final = {2: "flat", 3: "solid"}
 """Names for scenes of a dimension."""

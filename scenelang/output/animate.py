@@ -5,21 +5,21 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import Any, Final, Unpack
 
 from PIL import features
 
 from scenelang.assets.files import output_place, write_whole
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
-from scenelang.drawing.image import output_file
+from scenelang.drawing.image import Image, output_file
 from scenelang.language.diagnostics import plural
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Scene
-from scenelang.output.encoders import find_codec, write_apng, write_gif, write_video, write_webp
+from scenelang.output.encoders import Palette, find_codec, write_apng, write_gif, write_video, write_webp
 from scenelang.output.frames import (
     Clip,
     Drawable,
@@ -31,11 +31,6 @@ from scenelang.output.frames import (
     put_frame,
 )
 from scenelang.output.painting import Cluster, Errand, Painter, Workers
-
-if TYPE_CHECKING:
-    from scenelang.drawing.image import Image
-    from scenelang.output.encoders import Palette
-
 
 WORTH_S: Final = 12.0  # least drawing left that repays starting other processes, each of which loads torch
 _FPS: Final = 1e-4, 1e6  # rates of films: beyond, formats cannot store the time of a frame
@@ -308,7 +303,7 @@ def render_frames(
         OSError: the file cannot be opened.
         ValueError: an argument is none of the above, or says something of a file where Scenes are given.
     """
-    clip = _opened(path, fps, size, params, model, root)
+    clip = _opened(path, Source(params=params, model=model, root=root, size=size, fps=fps))
     painter = Painter(clip, How(**how).checked())
     last: tuple[str, Image] | None = None
     for number in _numbers(clip, frames):
@@ -358,7 +353,7 @@ def animate(
     """
     stem = Path(path).stem if isinstance(path, str | os.PathLike) else "frame"
     target = find_target(os.fspath(out), stem)
-    clip = _opened(path, fps, size, params, model, root)
+    clip = _opened(path, Source(params=params, model=model, root=root, size=size, fps=fps))
     if target.kind != "sequence":
         _ = clip.animation  # raises before anything is drawn
     painter, numbers = Painter(clip, How(**how).checked()), _numbers(clip, frames)
@@ -366,25 +361,20 @@ def animate(
     return make(painter, target, numbers, jobs=jobs, cluster=cluster, **gif, progress=progress)
 
 
-def _opened(
-    path: Drawn,
-    fps: float | None,
-    size: tuple[int, int] | None,
-    params: Mapping[str, Any] | None,
-    model: str | None,
-    root: str | os.PathLike[str] | None,
-) -> Clip:
+def _opened(path: Drawn, source: Source) -> Clip:
+    """The frames of a file, or of Scenes, which take what ``source`` says of these."""
+    fps, size = source.fps, source.size
     if fps is not None and not 0 < fps < float("inf"):
         raise ValueError(f"{fps} frames a second, where a number above 0 is needed")
     if isinstance(path, str | os.PathLike):
-        return Clip(Source(path, params=params, model=model, root=root, size=size, fps=fps))
+        return Clip(replace(source, path=path))
     scenes = (path,) if isinstance(path, Scene) else tuple(path) if isinstance(path, Iterable) else ()
     if not scenes or not all(isinstance(scene, Scene) for scene in scenes):
         raise ValueError("neither a path nor Scenes to draw")
-    if params is not None or root is not None:
+    if source.params is not None or source.root is not None:
         raise ValueError("params and root are for files; Scenes have their values")
     scenes = scenes if size is None else tuple(scene.sized(size) for scene in scenes)
-    return Clip(tuple(scene.of_model(model) for scene in scenes), fps=fps)
+    return Clip(tuple(scene.of_model(source.model) for scene in scenes), fps=fps)
 
 
 def _numbers(clip: Clip, frames: Frames) -> range:

@@ -19,7 +19,7 @@ from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen, run
-from typing import BinaryIO, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,9 +27,10 @@ from PIL import GifImagePlugin, Image
 
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import SIGNATURE, chunk
-from scenelang.output.frames import VIDEOS, Box, Film, Pixels, changed, delays, runs
+from scenelang.output.frames import VIDEOS, Film, Pixels, changed, delays, runs
 
 Palette = Literal["auto", "global", "frame"]
+Progress = Callable[[float], None]
 Colours = npt.NDArray[np.uint8]
 """(K, 3)."""
 
@@ -42,12 +43,7 @@ _MOST_KNOWN = 1 << 20  # colours that are counted; more are thinned to the most 
 
 
 def write_gif(
-    film: Film,
-    part: Path,
-    progress: Callable[[float], None],
-    *,
-    palette: Palette = "auto",
-    dither: bool = False,
+    film: Film, part: Path, progress: Progress, *, palette: Palette = "auto", dither: bool = False
 ) -> None:
     """Encode a film; in transparent frames, pixels of less than half coverage are left out.
 
@@ -80,48 +76,27 @@ def write_gif(
                 one = Census(most)
                 one.add(pixels)
                 colours = one.choose()
-            index = mapped(pixels, colours, dither)
-            shown = _frame(out, film, pixels, shown, index, colours, length, own)
+            index, clear = mapped(pixels, colours, dither), len(colours)  # the index after the palette's own
+            now, box = colours[index], (0, 0, *film.size)
+            if film.alpha:
+                index[pixels[..., 3] < 128] = clear
+            elif shown is not None:
+                box = changed(shown, now)
+                index = np.where((now == shown).all(axis=2), np.uint8(clear), index)
+            (left, top, right, bottom), shown = box, now
+            options = {"disposal": _CLEAR if film.alpha else _KEEP, "transparency": clear}
+            options["include_color_table"] = own
+            part_of = index[top:bottom, left:right]
+            while length > 0:  # a longer time than the format holds is a second picture of nothing
+                image = Image.fromarray(np.ascontiguousarray(part_of))
+                image.putpalette(np.append(colours, [[0, 0, 0]], axis=0).astype(np.uint8).tobytes())
+                options["duration"] = 10 * min(length, _LONGEST)  # Pillow takes milliseconds
+                out.writelines(GifImagePlugin.getdata(image, (left, top), **options))
+                length -= _LONGEST
+                if not film.alpha:
+                    part_of = np.full((1, 1), clear, np.uint8)
             progress(0.4 + 0.6 * done / count)
         out.write(b";")
-
-
-def _frame(
-    out: BinaryIO,
-    film: Film,
-    pixels: npt.NDArray[np.uint8],
-    shown: npt.NDArray[np.uint8] | None,
-    index: npt.NDArray[np.uint8],
-    colours: Colours,
-    length: int,
-    own: bool,
-) -> npt.NDArray[np.uint8]:
-    """Write one picture; returns the colours that a viewer then shows."""
-    clear = len(colours)  # the index after the palette's own
-    now = colours[index]
-    box: Box = (0, 0, *film.size)
-    if film.alpha:
-        index[pixels[..., 3] < 128] = clear
-    elif shown is not None:
-        box = changed(shown, now)
-        index = np.where((now == shown).all(axis=2), np.uint8(clear), index)
-    left, top, right, bottom = box
-    part = index[top:bottom, left:right]
-    while True:  # a longer time than the format holds is a second picture of nothing
-        image = Image.fromarray(np.ascontiguousarray(part))
-        image.putpalette(np.append(colours, [[0, 0, 0]], axis=0).astype(np.uint8).tobytes())
-        options = {
-            "duration": 10 * min(length, _LONGEST),  # Pillow takes milliseconds
-            "disposal": _CLEAR if film.alpha else _KEEP,
-            "transparency": clear,
-            "include_color_table": own,
-        }
-        out.writelines(GifImagePlugin.getdata(image, (left, top), **options))
-        length -= _LONGEST
-        if length <= 0:
-            return now
-        if not film.alpha:
-            part = np.full((1, 1), clear, np.uint8)
 
 
 def packed(pixels: Pixels) -> npt.NDArray[np.uint32]:
@@ -198,7 +173,7 @@ def mapped(pixels: Pixels, colours: Colours, dither: bool) -> npt.NDArray[np.uin
     return np.asarray(np.minimum(index, len(colours) - 1), np.uint8)
 
 
-def write_apng(film: Film, part: Path, progress: Callable[[float], None]) -> None:
+def write_apng(film: Film, part: Path, progress: Progress) -> None:
     """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
     shown = [
         (file, piece)
@@ -259,7 +234,7 @@ WEBP_PER_SECOND = 1000
 class _Reel(Image.Image):
     """A film as Pillow's writer takes it: reads each frame when the writer seeks it, and holds one."""
 
-    def __init__(self, film: Film, files: list[Path], progress: Callable[[float], None]) -> None:
+    def __init__(self, film: Film, files: list[Path], progress: Progress) -> None:
         super().__init__()
         self._film, self._files, self._progress = film, files, progress
         self.n_frames = len(files)
@@ -275,21 +250,14 @@ class _Reel(Image.Image):
         return self._at
 
 
-def write_webp(film: Film, part: Path, progress: Callable[[float], None]) -> None:
+def write_webp(film: Film, part: Path, progress: Progress) -> None:
     """Encode a film, losslessly, with alpha where it has any; of equal pictures it becomes a still."""
     shown = runs(film.files, delays(len(film.files), film.fps, WEBP_PER_SECOND))
     reel = _Reel(film, [file for file, _ in shown], progress)
     with part.open("wb") as out:
-        reel.save(
-            out,
-            "WEBP",
-            save_all=True,
-            lossless=True,
-            quality=80,  # of the search, not of the picture
-            method=4,
-            duration=[length for _, length in shown],
-            loop=0 if film.loop else 1,
-        )
+        still = {"lossless": True, "quality": 80, "method": 4}  # of the search, not of the picture
+        times, loop = [length for _, length in shown], 0 if film.loop else 1
+        reel.save(out, "WEBP", save_all=True, duration=times, loop=loop, **still)
 
 
 _H264: Final = ("libx264", "-preset", "medium", "-crf", "16")
@@ -299,13 +267,9 @@ _SCALE: Final = "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+fu
 MISSING: Final = "video needs ffmpeg, which is not on the PATH: install it, or pip install 'scenelang[video]'"
 
 
-class NoFfmpeg(RenderError):
-    """There is no ffmpeg, or it cannot encode."""
-
-
 @lru_cache(maxsize=len(VIDEOS))
 def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
-    """An ffmpeg that can write files of a suffix, and its options for that; raises `NoFfmpeg` without.
+    """An ffmpeg that can write files of a suffix, and its options for that; raises `RenderError` without.
 
     It is the one on the PATH, or the one that imageio-ffmpeg brings.
     """
@@ -316,7 +280,7 @@ def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
 
             ffmpeg = str(imageio_ffmpeg.get_ffmpeg_exe())
         except (ImportError, RuntimeError, OSError):
-            raise NoFfmpeg(MISSING) from None
+            raise RenderError(MISSING) from None
     done = run([ffmpeg, "-hide_banner", "-encoders"], capture_output=True, check=False, stdin=DEVNULL)
     lines = done.stdout.decode(errors="replace").splitlines()
     known = [words[1] for line in lines if len(words := line.split()) > 1]
@@ -324,14 +288,14 @@ def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
     for codec in wanted:
         if codec[0] in known:
             return ffmpeg, codec
-    raise NoFfmpeg(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
+    raise RenderError(f"`{ffmpeg}` has no encoder {' or '.join(c[0] for c in wanted)}, which {suffix} needs")
 
 
-def write_video(film: Film, part: Path, progress: Callable[[float], None], *, suffix: str) -> None:
+def write_video(film: Film, part: Path, progress: Progress, *, suffix: str) -> None:
     """Encode a film as 4:2:0 video with BT.709 colours; only WebM keeps alpha, the others lie over white.
 
-    A side of odd length gets one more row or column, a copy of its neighbour. Raises `NoFfmpeg`, or
-    `RenderError` where it fails.
+    A side of odd length gets one more row or column, a copy of its neighbour. Raises `RenderError`
+    where there is none, or it fails.
     """
     ffmpeg, codec = find_codec(suffix)
     keeps = film.alpha and suffix == ".webm"

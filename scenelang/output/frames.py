@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, TypeVar
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from PIL import Image as pillow
 
 from scenelang.assets.files import lock, open_own, write_whole
 from scenelang.compiler.lower import Memory
+from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import image_format
 from scenelang.language.diagnostics import Diagnostics, plural
@@ -32,10 +33,6 @@ from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.library import SpanMap
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene, same_nodes
-
-if TYPE_CHECKING:
-    from scenelang.compiler.program import Program
-
 
 K = TypeVar("K")
 
@@ -160,9 +157,16 @@ def is_animation(out: str) -> bool:
     return is_pattern(out) or Path(out).suffix.lower() in FILM_FORMATS
 
 
-def find_target(out: str, stem: str = "frame", digits: int = 4) -> Target:
-    """Parse ``out``, one of `FILM_FORMATS`, a pattern, or a folder of ``stem``s, or raise `TargetError`."""
-    path = Path(out)
+def find_target(out: str, stem: str = "frame", digits: int = 4, *, film: bool = True) -> Target:
+    """Parse ``out``, one of `FILM_FORMATS` if it may be a ``film``, a pattern, or a folder of ``stem``s, or
+    raise `TargetError`.
+    """
+    path, folder = Path(out), out.endswith(("/", "\\"))
+    if not film and not is_pattern(out) and not folder:
+        if path.is_file() or (path.suffix and not path.is_dir()):
+            fact = f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png"
+            raise TargetError(fact)
+        folder = True
     if is_pattern(out):
         bare = path.name.replace("%%", "")
         if len(_NUMBER.findall(bare)) != 1 or "%" in _NUMBER.sub("", bare):
@@ -173,7 +177,7 @@ def find_target(out: str, stem: str = "frame", digits: int = 4) -> Target:
         except ValueError as error:
             raise TargetError(str(error)) from None
         target = Target("sequence", path.parent, path.name)
-    elif out.endswith(("/", "\\")) or path.is_dir():
+    elif folder or path.is_dir():
         if path.exists() and not path.is_dir():
             raise TargetError(f"`{out}` is a file")
         return Target("sequence", path, f"{stem.replace('%', '%%')}-%0{digits}d.png")
@@ -198,17 +202,13 @@ Pixels = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]  # left, top, right, bottom; the last two exclusive
 
 
-class Busy(RenderError):
-    """Another process draws the same animation."""
-
-
 def frame_key(*parts: object) -> str:
     """Digest, hex, of everything that determines a frame's pixels."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:40]
 
 
 class FrameStore:
-    """A folder of cached frames, locked while it is open; raises `Busy` where another process has it.
+    """A folder of cached frames, locked while it is open; raises `RenderError` where another process has it.
 
     The folder may be a stranger's: no link in it is followed, and only files named like our own are removed.
     """
@@ -223,7 +223,7 @@ class FrameStore:
         self._lock = os.fdopen(open_own(folder / _LOCK), "rb")
         if lock(self._lock.fileno(), folder / _LOCK) is False:
             self._lock.close()
-            raise Busy(f"another process is drawing into `{folder}`")
+            raise RenderError(f"another process is drawing into `{folder}`")
         for part in self._named(_PASSING):
             part.unlink()
 
@@ -415,11 +415,9 @@ class Clip:
 
         if self._last is not None and same_nodes(self._last[0].scene, shot.scene):
             return self._last[1]
-        program = compile_scene(
-            shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory
-        )
-        self._last = shot, program
-        return program
+        made = compile_scene(shot.scene, spans=shot.spans, diagnostics=self.diagnostics, memory=self._memory)
+        self._last = shot, made
+        return made
 
     def beside(self, frame: Drawable, store: FrameStore) -> Mapping[str, bytes]:
         """Files to write next to a frame's picture, by suffix; an exception ends the run."""

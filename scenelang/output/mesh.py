@@ -40,6 +40,8 @@ HALVINGS, STEPS = 14, 3  # that find a crossing, where a medium may begin and el
 TINY: Final = 1e-9  # world units: of nodes that are taken out of the solid
 FLAT: Final = 0.05  # of the largest: a smaller spread of normals says nothing of where their planes meet
 SKEW: Final = 1e-3  # of a cell: how far off a plane the corners of a quad may be that is cut either way
+JUMP: Final = 0.06  # between sRGB colours that no triangle runs between
+GAP: Final = 0.002  # of a triangle: between vertices on both sides of a jump
 PROBES: Final = 20_000  # cells that are searched for what is thinner than they
 
 _BITS: Final = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])  # of a cell's corners, x first
@@ -279,7 +281,7 @@ def surface_of(program: Program, resolution: int, exact: bool) -> tuple[Triangle
     met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), Wanted.ALL)
     if thin:
         said["W0552"] = f"parts about as thin as a cell of {side:.2g} may be missing or have holes"
-    return TriangleMesh(places, triangles, encoded(met.register[:3].T)), said
+    return _parted(sampler, TriangleMesh(places, triangles, encoded(met.register[:3].T)), side), said
 
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
@@ -333,6 +335,52 @@ def _cut(sampler: Sampler, quad: Index, places: Floats, side: float) -> Index:
     return np.concatenate([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]])
 
 
+def _parted(sampler: Sampler, mesh: TriangleMesh, side: float) -> TriangleMesh:
+    """Part a mesh where colours jump: each side of it has its own vertices, `GAP` of a cell apart.
+
+    Corners of triangles around a vertex that follow each other with about the same colour share one vertex.
+    The edges between are closed by slivers, and by a fan where three or more colours meet.
+    """
+    vertices, triangles, colours = mesh
+    middle, tints = vertices[triangles].mean(1), colours[triangles]
+    jumps = (np.ptp(tints, axis=1) > JUMP).any(1)
+    some = np.flatnonzero(np.isin(triangles, triangles[jumps]).any(1))
+    if not len(some):
+        return mesh
+    met = sampler.meet(middle[some], Wanted.DISTANCE, gradient=True)
+    inside = middle[some] - ((met.distance + 0.02 * side) * met.gradient).T
+    tint = encoded(sampler.meet(inside, Wanted.ALL).register[:3].T)[:, None]
+    tints[some] = np.where((abs(tints[some] - tint) > JUMP).any(2, keepdims=True), tint, tints[some])
+    # of each edge its first and last corner here, and those of the same vertices beyond
+    corner = np.arange(triangles.size).reshape(-1, 3)
+    a, b = corner.ravel(), np.roll(corner, -1, 1).ravel()
+    start, end, flat = triangles.ravel(), triangles.ravel()[b], tints.reshape(-1, 3)
+    beyond = np.empty_like(a)
+    beyond[np.lexsort((end, start))] = np.lexsort((start, end))
+    c, d = b[beyond], beyond  # beyond, the edge runs from ``d``, which is where ``b`` is, to ``c``
+    alike = (abs(flat[a] - flat[c]) <= JUMP).all(1)
+    run = a.copy()
+    while (apart := alike & (run[a] != run[c])).any():
+        least = np.minimum(run[a], run[c])
+        np.minimum.at(run, a[apart], least[apart])
+        np.minimum.at(run, c[apart], least[apart])
+    _, first, run, count = np.unique(run, return_index=True, return_inverse=True, return_counts=True)
+    toward = np.repeat(middle, 3, 0) - vertices[start]
+    means = [np.bincount(run, column) / count for column in (*flat.T, *toward.T)]
+    split = np.bincount(start[first], minlength=len(vertices))[start[first]] > 1
+    places = vertices[start[first]] + np.stack(means[3:], 1) * (GAP * split[:, None])
+    a, b, c, d = (run[one] for one in (a, b, c, d))
+    slivers = np.stack([b, a, c, b, c, d], 1)[start < end].reshape(-1, 3)
+    after = np.arange(len(first))
+    after[c[a != c]] = a[a != c]
+    root = np.full(len(vertices), len(first))
+    np.minimum.at(root, start[first], np.arange(len(first)))
+    fans = np.stack([root[start[first]], np.arange(len(first)), after], 1)
+    faces = np.concatenate([run.reshape(-1, 3), slivers, fans])
+    whole = (faces != np.roll(faces, 1, 1)).all(1)
+    return TriangleMesh(places, faces[whole], np.stack(means[:3], 1))
+
+
 def _thin(grid: Grid, cases: Index) -> bool:
     """True where something lies inside cells whose corners are all outside."""
     sampler, empty = grid.sampler, grid.cells[cases == 0]
@@ -382,9 +430,8 @@ def _glb(mesh: TriangleMesh) -> bytes:
     parts = [places, colours, mesh.triangles.astype("<u4").ravel()]
     starts = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
     views, accessors = list[dict[str, Any]](), list[dict[str, Any]]()
-    for part, start, (form, kind) in zip(
-        parts, starts, (*[("VEC3", 5126)] * 2, ("SCALAR", 5125)), strict=False
-    ):
+    kinds = ("VEC3", 5126), ("VEC3", 5126), ("SCALAR", 5125)
+    for part, start, (form, kind) in zip(parts, starts, kinds, strict=False):
         accessors.append({"bufferView": len(views), "componentType": kind, "type": form, "count": len(part)})
         views.append({"buffer": 0, "byteOffset": start, "byteLength": part.nbytes})
     accessors[0] |= {"min": places.min(0).tolist(), "max": places.max(0).tolist()}

@@ -21,18 +21,14 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
-from scenelang.drawing.image import enlarged, packed
+from scenelang.drawing.image import Image, Output, enlarged, packed
 from scenelang.drawing.neural.draw import TileCache
 from scenelang.output.frames import Clip, Drawable, Shot, frame_key, put_frame
 from scenelang.output.workers import Connection
-
-if TYPE_CHECKING:
-    from scenelang.drawing.image import Image, Output
-
 
 DRAFT = 4  # pixels across that one of a draft stands for
 Progress = Callable[[float], None]
@@ -76,8 +72,8 @@ class Painter:
         if single or program.stage is not None or how.backend == "exact":
             from scenelang.drawing.small import choose_drawer
 
-            drawer = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
-            if drawer.library == "numpy":
+            exact = how.backend == "exact"
+            if choose_drawer(program, how.device, how.care["samples"], exact=exact)[0] == "numpy":
                 return "numpy"
         started = time.perf_counter()
         from scenelang.drawing.torch_backend import choose_device

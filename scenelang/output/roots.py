@@ -1,4 +1,4 @@
-"""Zeros of a function between points where its signs differ.
+"""Zeros of a function between points where its signs differ, and the product that tells sides in the plane.
 
 Source: G. Dahlquist, Å. Björck, Numerical methods, 1974, section 6.3 (the Illinois method).
 """
@@ -13,14 +13,13 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 
+def crossed(a: Floats, b: Floats) -> Floats:
+    """Cross products (…) of vectors (…, 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def zeros(
-    at: Callable[[Floats], Floats],
-    a: Floats,
-    b: Floats,
-    f: Floats,
-    g: Floats,
-    steps: int,
-    halved: bool = False,
+    at: Callable[[Floats], Floats], a: Floats, b: Floats, f: Floats, g: Floats, steps: int, halved: bool
 ) -> tuple[Floats, Floats]:
     """Points (d, n) where a function is 0, and the ends outside of what is left to look in.
 

@@ -20,7 +20,7 @@ from scenelang.language.scene import Scene
 from scenelang.output.mesh import TriangleMesh, surface_of
 from scenelang.output.svg import svg_of
 
-RESOLUTION: Final = 128
+RESOLUTION: Final = 320
 FINEST: Final = 512
 UNSEEN: Final = ("drop_unseen",)  # passes that are left out where the camera has no say
 
@@ -114,9 +114,8 @@ def _program(
 ) -> Program:
     """What has outlines, if flat, or else a surface; raises as `to_svg` and `to_mesh`."""
     if backend == "reference":
-        raise RenderError(
-            "outlines and surfaces are those of the model's field; the reference has pictures alone"
-        )
+        fact = "outlines and surfaces are those of the model's field"
+        raise RenderError(f"{fact}; the reference has pictures alone")
     How(backend).checked()
     name = "" if isinstance(held, Program | Scene) else os.fspath(held)
     if isinstance(held, Program) or name.endswith(".safetensors"):

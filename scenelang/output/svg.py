@@ -12,7 +12,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
-from scenelang.output.roots import zeros
+from scenelang.output.roots import crossed, zeros
 
 Floats = npt.NDArray[np.float64]
 
@@ -79,9 +79,7 @@ class SvgLayer(NamedTuple):
     wins: tuple[tuple[list[Operand], list[Operand], bool], ...] = ()
 
 
-def layers_of(
-    fold: Sequence[Operand], looks: Sequence[object], cuts: Sequence[Operand] = ()
-) -> list[SvgLayer]:
+def layers_of(fold: Sequence[Operand], looks: Sequence[Any], cuts: Sequence[Operand] = ()) -> list[SvgLayer]:
     """Layers of a fold that is cut later, in the order of painting; equal looks (N,) need no borders."""
     last = max((at for at, operand in enumerate(fold) if at and operand.operator == SMOOTH), default=-1)
     result: list[SvgLayer] = []
@@ -223,7 +221,7 @@ class Region:
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
         a, b = (first[:, None] + node * step for node in (inside, outside))
         f, g = (grid[node[1], node[0]] for node in (inside, outside))
-        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS)
+        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS, False)
         off = 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
         around = self.at(points[:, None] + off)
         normals = np.stack([around[0] - around[1], around[2] - around[3]])
@@ -268,8 +266,8 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
 
     def meet(i: npt.NDArray[np.intp], j: npt.NDArray[np.intp]) -> Floats:
         """Where tangents meet (n, 2); the middle where that is far off."""
-        between, turn = p[j] - p[i], _crossed(along[i], along[j])
-        share = _crossed(between, along[j]) / np.where(turn, turn, 1e-9)
+        between, turn = p[j] - p[i], crossed(along[i], along[j])
+        share = crossed(between, along[j]) / np.where(turn, turn, 1e-9)
         middle, result = (p[i] + p[j]) / 2, p[i] + share[:, None] * along[i]
         return np.where(np.hypot(*(result - middle).T)[:, None] < most, result, middle)
 
@@ -290,10 +288,6 @@ def _pieces(points: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
     return result
 
 
-def _crossed(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
 def fitted(p: Floats, along: Floats) -> list[Floats]:
     """Lines (1, 2) and cubics (3, 2), each by the points behind its first, along points (n, 2).
 
@@ -301,14 +295,14 @@ def fitted(p: Floats, along: Floats) -> list[Floats]:
     """
     chord, step = p[-1] - p[0], np.hypot(*np.diff(p, axis=0).T)
     length = float(np.hypot(*chord))
-    if len(p) == 2 or (length > 0 and abs(_crossed(chord, p - p[0])).max() < NEAR * length):
+    if len(p) == 2 or (length > 0 and abs(crossed(chord, p - p[0])).max() < NEAR * length):
         return [p[-1:]]
     u = np.concatenate([[0.0], step.cumsum()]) / step.sum()
     ends, error = p[[0, 0, -1, -1]], np.full(len(p), np.inf)
     for _ in range(FITS):
         b = np.stack([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3], 1)
-        ways = b[:, 1] * _crossed(along, along[0]), -b[:, 2] * _crossed(along, along[-1])
-        sizes = np.linalg.lstsq(np.stack(ways, 1), _crossed(along, p - b @ ends), rcond=None)[0]
+        ways = b[:, 1] * crossed(along, along[0]), -b[:, 2] * crossed(along, along[-1])
+        sizes = np.linalg.lstsq(np.stack(ways, 1), crossed(along, p - b @ ends), rcond=None)[0]
         if not (sizes.min() > 1e-3 * length and sizes.max() < 3 * step.sum()):
             sizes[:] = step.sum() / 3
         q = ends + np.stack([0 * chord, sizes[0] * along[0], -sizes[1] * along[-1], 0 * chord])
@@ -338,7 +332,7 @@ def path_of(points: Floats, normals: Floats) -> str:
     x, y, rest = np.linalg.lstsq(a, ((p - middle) ** 2).sum(1), rcond=None)[0]
     r = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
     if abs(np.hypot(*(p - middle - [x, y]).T) - r).max() < ROUND * NEAR:
-        way = int(_crossed(p, np.roll(p, 1, 0)).sum() < 0)
+        way = int(crossed(p, np.roll(p, 1, 0)).sum() < 0)
         first = _said(middle[0] + x - r, middle[1] + y)
         return f"M{first}a{_said(r, r, 0, 1, way, 2 * r, 0)}a{_said(r, r, 0, 1, way, -2 * r, 0)}z"
     parts = [curve for piece in _pieces(points, normals) for curve in fitted(*piece)]

@@ -48,16 +48,7 @@ from scenelang.language.scene_text import number
 from scenelang.language.statements import literal
 from scenelang.language.values import UNITS, RangeValue, Vec, pack, unpack
 from scenelang.output.animate import Progress, RenderResult, make
-from scenelang.output.frames import (
-    Clip,
-    Drawable,
-    FrameStore,
-    Shot,
-    Target,
-    TargetError,
-    find_target,
-    is_pattern,
-)
+from scenelang.output.frames import Clip, Drawable, FrameStore, Shot, Target, find_target
 from scenelang.output.painting import Painter
 
 MOST_ROWS: Final = 1_000_000
@@ -89,7 +80,13 @@ def rows_of(
     for name in drawn:
         if name in cells:
             raise ParamError(f"param `{name}` both in the grid and drawn at random")
-    knobs = [_narrowed(evaluation, param_named(evaluation, name), text) for name, text in drawn.items()]
+    knobs = []
+    for name, text in drawn.items():
+        stmt, match = param_named(evaluation, name), _RANGE.fullmatch(text)
+        if text and (match is None or match[2] or match[4] or match[5]):
+            raise ParamError(f"`{text}` is not a range such as 0..1")
+        ends = _ends(evaluation, stmt, match[1], match[3])[0] if text and match is not None else None
+        knobs.append(ends or knob_of(stmt, evaluation.context))
     whole = math.prod(map(len, cells.values()))
     if not cells and not knobs:
         raise ParamError("no param to change")
@@ -124,12 +121,11 @@ def values_of(evaluation: Evaluation, stmt: tree.Param, text: str) -> Iterator[s
     and ``a..b`` are ranges of the language. Missing ends are those of the param's range. Empty text means
     every choice, or step, of the param.
     """
-    words = _default(evaluation, stmt).__class__ is str
+    words = evaluation.context.value(stmt.name.text).__class__ is str
     for place, item in enumerate(_items(text)):
         if place == MOST_LISTED:
-            raise ParamError(
-                f"more than {MOST_LISTED:,} values or ranges of `{stmt.name.text}` between commas"
-            )
+            fact = f"more than {MOST_LISTED:,} values or ranges of `{stmt.name.text}`"
+            raise ParamError(f"{fact} between commas")
         match = None if words else _RANGE.fullmatch(item)
         if match is None and item:
             yield item
@@ -161,19 +157,9 @@ def _spread(evaluation: Evaluation, stmt: tree.Param, match: re.Match[str]) -> I
     return (written(knob, pack(value, unit), _DIGITS) for value in values)
 
 
-def _narrowed(evaluation: Evaluation, stmt: tree.Param, text: str) -> Knob:
-    """A param with random values from its own range or from one in ``text``."""
-    if not text:
-        return knob_of(stmt, evaluation.context)
-    match = _RANGE.fullmatch(text)
-    if match is None or match[2] or match[4] or match[5]:
-        raise ParamError(f"`{text}` is not a range such as 0..1")
-    return _ends(evaluation, stmt, match[1], match[3])[0]
-
-
 def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tuple[Knob, float, float, str]:
     """A param with values in a range, and both its ends in base units, with their kind."""
-    like = _default(evaluation, stmt)
+    like = evaluation.context.value(stmt.name.text)
     if like.__class__ not in UNITS:
         raise ParamError(f"a range for `{stmt.name.text}`, which is not a number")
     ends = [unpack(_number(evaluation, stmt, text))[0] if text else None for text in (first, last)]
@@ -191,18 +177,14 @@ def _ends(evaluation: Evaluation, stmt: tree.Param, first: str, last: str) -> tu
 
 
 def _number(evaluation: Evaluation, stmt: tree.Param, text: str) -> Any:
-    value, like = literal(text.strip(), evaluation.context), _default(evaluation, stmt)
+    file = evaluation.context
+    value, like = literal(text.strip(), file), file.value(stmt.name.text)
     if value.__class__ is float and (value == 0.0 or unpack(like)[1] == "time"):
         value = pack(value, unpack(like)[1])
     if value.__class__ is not like.__class__:
         raise ParamError(f"`{text.strip()}` is not a value of `{stmt.name.text}`, whose default is "
                          f"{stmt.default.span.text}")  # fmt: skip
     return value
-
-
-def _default(evaluation: Evaluation, stmt: tree.Param) -> Any:
-    file = evaluation.context
-    return file.env[file.scope.names[stmt.name.text].slot]
 
 
 def _text(knob: Knob, value: Any) -> str:
@@ -546,7 +528,7 @@ def render_many(
         fact = f"{type(path).__name__} where the path of a scene is needed, whose text has the params"
         raise TypeError(f"{fact}; several Scenes are drawn by `animate` and `render_frames`")
     stem = Path(path).stem
-    target = _target(os.fspath(out), stem)
+    target = find_target(os.fspath(out), stem, 6, film=False)
     if table is not None:
         kind, folder = Path(table).suffix.lower(), Path(table).parent
         if kind not in (".csv", PARQUET):
@@ -587,10 +569,3 @@ def render_many(
     if sheet is not None:
         write_sheet(Path(sheet), target.path, clip.names, clip.lines, across)
     return Sweep(clip.file, clip.names, clip.lines, clip.told, clip.diagnostics.items, run)
-
-
-def _target(out: str, stem: str) -> Target:
-    path, pattern, folder = Path(out), is_pattern(out), out.endswith(("/", "\\"))
-    if not pattern and (path.is_file() or (path.suffix and not path.is_dir() and not folder)):
-        raise TargetError(f"`{out}` is one file; many pictures go to a folder, or to files such as %05d.png")
-    return find_target(out if pattern or folder else f"{out}/", stem, 6)

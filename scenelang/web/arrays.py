@@ -36,7 +36,7 @@ MODULES: Final = (
     *("store", "gl", "grids", "groups", "ways", "plane"),
     *("values", "functions", "maps", "looks", "chain", "graph", "stage"),
     *("eye", "letters", "expressions", "evaluate"),
-    *("elements", "balls", "solid"),
+    *("elements", "balls", "around", "solid"),
     *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
 )
 """Files of ``viewer/``, each behind those that it imports."""
@@ -56,14 +56,7 @@ def web(name: str) -> str:
     return files("scenelang").joinpath("web/viewer", name).read_text("utf-8")
 
 
-KINDS: Final = {
-    "float32": "f32",
-    "int8": "i8",
-    "uint8": "u8",
-    "int16": "i16",
-    "uint16": "u16",
-    "int32": "i32",
-}
+KINDS = {"float32": "f32", "int8": "i8", "uint8": "u8", "int16": "i16", "uint16": "u16", "int32": "i32"}
 
 
 class ArrayStore:
@@ -205,11 +198,13 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "object": program.numbers[i],
         }
         if skins is not None:
-            if form >= 0 and skins.at(i).reach > 0:
-                raise ProgramError(f"`{program.objects[i]}` grows, and no page draws elements that do")
             row["skin"] = [float(number) for number in skins.at(i)]
         if layout.dimension == 3:
             row["amount"], row["frequency"] = parts.bulge[i].tolist()
+            if parts.density[i] > 0:
+                row["density"] = float(parts.density[i])
+            if parts.glow[i].any():
+                row["glow"] = parts.glow[i].tolist()
         if worn >= 0:
             element, steps = program.palette[worn]
             if isinstance(element, Gradient):

@@ -25,6 +25,7 @@ from scenelang.assets.element import Element, credit_of
 from scenelang.assets.files import write_output
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
+from scenelang.compiler.lifting import LAYOUTS
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError, load_program
 from scenelang.compiler.spaces import encoded, stage_data
@@ -33,13 +34,14 @@ from scenelang.drawing.neural.network import FramedArrays
 from scenelang.drawing.render import render
 from scenelang.drawing.solid.network import SolidArrays
 from scenelang.language import library
-from scenelang.language.diagnostics import Diagnostics
+from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Evaluation, Source
 from scenelang.language.reports import SceneError
 from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
 from scenelang.web.arrays import ArrayStore, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
+from scenelang.web.volume import volume
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -138,6 +140,16 @@ class PagePayload:
         return json.dumps({**self.data, "blob": packed(self.blob)}, separators=(",", ":"), allow_nan=False)
 
 
+def beyond_pages(program: Program) -> bool:
+    """Whether something in it reflects, which no page draws."""
+    return program.stage is not None and bool(LAYOUTS[3].unpack(program.vectors).roughness.any())
+
+
+def has_sky(program: Program) -> bool:
+    """Whether light comes from everywhere, which takes seconds to make for a page."""
+    return program.stage is not None and program.stage.sky is not None
+
+
 def view_of(
     program: Program,
     *,
@@ -149,13 +161,16 @@ def view_of(
     """The view of a Program of a shipped model, with names and texts of its files and the form of its scene.
 
     Without a form its numbers never change. Raises `ProgramError` for other weights, or where no page can
-    draw the model.
+    draw the model, `SceneError` for materials that none draws.
     """
     manifest, store = load_manifest(program.model), ArrayStore()
     if manifest.renderer not in ("framed", "solid"):
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
     if not manifest.framed:
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
+    if beyond_pages(program):
+        fact, help = "`glossy` or `metal`, which no page draws", "draw a picture or a video of it"
+        raise SceneError([Diagnostic("E0560", fact, None, help=help)])
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
     elements = (*form.shapes, *form.paints) if form else worn_of(program)
@@ -202,6 +217,8 @@ def view_of(
         data |= plane.shader(network, store)
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
+        if has_sky(program):
+            data["around"] = volume(program, network, store)
     data["alt"] = alternative(data)
     return PagePayload(data, store.bytes())
 
@@ -210,6 +227,10 @@ MOST_TITLE: Final = 200
 _POLICY: Final = (
     "default-src 'none'; script-src '{loader}' '{code}'; style-src '{style}'; img-src data: blob:; "
     "base-uri 'none'; form-action 'none'"
+)
+_LIGHT: Final = (
+    '<p class="hint">The light that comes from everywhere is that of the moment when this page was made: '
+    "it does not follow what moves or changes.</p>"
 )
 _SLOT: Final = re.compile(r"\[\[(\w+)\]\]")
 _COMMENT: Final = re.compile(r"^ *(?:/\*\*.*?\*/|//[^\n]*)\n", re.MULTILINE | re.DOTALL)
@@ -243,6 +264,7 @@ def page(view: PagePayload, *, still: bytes = b"", embedded: bool = False) -> st
         "height": str(height),
         "alt": alt,
         "model": about_model(data["model"]),
+        "light": _LIGHT * ("around" in data),
         "view": packed(view.message().encode()),
         "code": packed(code.encode()),
         "loader": loader,
@@ -315,7 +337,7 @@ def export(
         title: of the page; by default the name of the file.
 
     Raises:
-        SceneError: the scene has errors.
+        SceneError: the scene has errors, or materials that no page draws.
         ProgramError: the file is not a Program, or no page can draw its model.
         RenderError: the model has no weights here.
         ValueError: an argument says something of a file where there is none, or of a scene where there is a
@@ -343,12 +365,9 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[PagePayload, P
     """The view of a scene or a Program, and the Program that it shows first; raises as `export`."""
     if isinstance(source, Program):
         return scene_view(source, None, None, title=title), source
-    evaluation = None
-    if isinstance(source, Scene):
-        scene: Scene | None = source
-    else:
-        result = Diagnostics()
-        evaluation = source.evaluation(result)
+    evaluation, scene = None, source if isinstance(source, Scene) else None
+    if isinstance(source, Source):
+        evaluation = source.evaluation(result := Diagnostics())
         scene = evaluation.run(0)[0]
         if scene is None or result.errors:
             raise SceneError(result)
@@ -386,12 +405,14 @@ def still(program: Program) -> bytes:
 def frame(value: Scene | Program, picture: Image) -> str:
     """The viewer of a Scene or a Program as HTML for a notebook, in a frame that may run scripts alone.
 
-    Empty where no page can draw its model. Browsers that cannot draw it show ``picture``.
+    Empty where no page can draw it, or not at once. Browsers that cannot draw it show ``picture``.
     """
     program, scene = (value, None) if isinstance(value, Program) else (compile_scene(value), value)
+    if has_sky(program):
+        return ""
     try:
         view = scene_view(program, scene, None)
-    except ProgramError:
+    except (ProgramError, SceneError):
         return ""
     small = picture.to_pil().reduce(-(-max(program.canvas) // STILL_SIDE[2]))
     text = escape(page(view, still=_packed(small), embedded=True))

@@ -16,7 +16,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
 
-from scenelang.assets.files import read_json, read_regular, write_whole
+from scenelang.assets.files import read_json, read_regular, reason, write_whole
 from scenelang.assets.records import Record
 from scenelang.language.limits import MAX_BYTES
 from scenelang.language.session import Unreadable, decode_source
@@ -101,7 +101,7 @@ class Folder:
         except Unreadable as error:
             raise Denied(f"cannot read `{name}`: {error}") from None
         except OSError as error:
-            raise Denied(f"cannot read `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot read `{name}`: {reason(error)}") from None
         return text.replace("\r\n", "\n").replace("\r", "\n"), _digest(data)
 
     def write(self, name: str, text: str, base: str | None) -> str:
@@ -125,7 +125,7 @@ class Folder:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, data)
         except OSError as error:
-            raise Denied(f"cannot write `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot write `{name}`: {reason(error)}") from None
         return _digest(data)
 
     def rename(self, name: str, to: str) -> None:
@@ -140,7 +140,7 @@ class Folder:
         except FileExistsError:
             raise Denied(f"there is a file `{to}` already") from None
         except OSError as error:
-            raise Denied(f"cannot rename `{name}`: {_reason(error)}") from None
+            raise Denied(f"cannot rename `{name}`: {reason(error)}") from None
 
     def holds(self, path: str) -> bool:
         """True where an absolute path leads to a place in the folder."""
@@ -177,10 +177,6 @@ def fits(name: str) -> bool:
 
 def _digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:32]
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error) or "unreadable").lower()
 
 
 MOST_DAYS: Final = 30

@@ -21,7 +21,7 @@ from scenelang.assets.font import name_of
 from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.spaces import Stage, stage_data
+from scenelang.compiler.spaces import Sky, Stage, stage_data
 from scenelang.language import scene, words
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Site
@@ -34,7 +34,8 @@ from scenelang.language.statements import BROUGHT
 from scenelang.language.values import COMPONENTS, CONSTANTS, Angle, RangeValue, Time, Vec, unpack
 
 Json = Any
-T = TypeVar("T", Element, Element | Gradient)
+Worn = Element | Gradient
+T = TypeVar("T", Element, Worn)
 
 
 @dataclass(slots=True, eq=False)
@@ -76,13 +77,8 @@ class Bound:
     number: float | None = None  # the value of a size from one
 
 
-@dataclass(slots=True)
-class FormLine:
-    """A statement of a file, the name that it defines, and the names of files that it uses."""
-
-    form: Json
-    bound: Bound | None
-    uses: list[Bound]
+Line = tuple[Json, Bound | None, list[Bound]]
+"""A statement of a file, the name that it defines, and the names of files that it uses."""
 
 
 def bind(params: Sequence[str], args: Sequence[nodes.Argument] | None) -> list[nodes.Expr | None]:
@@ -100,9 +96,7 @@ class Lacking(Exception):
 class Writer:
     """Writes statements of a scene's files as forms; ``elements`` come first in `shapes` and `paints`."""
 
-    def __init__(
-        self, context: FileContext, manifest: Manifest, elements: Iterable[Element | Gradient]
-    ) -> None:
+    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Worn]) -> None:
         self.slots = 0  # of all files
         self.calls: list[Json] = []  # forms of the fns and modules that are called
         self.uses: list[Bound] = []
@@ -115,7 +109,7 @@ class Writer:
         self.brought = Brought.of(tuple(context.session.elements.values()))
         self.textures = load_textures()
         self.shapes = [e for e in listed if isinstance(e, Element) and not e.material]
-        self.paints: list[Element | Gradient] = [element for element in listed if element.material]
+        self.paints: list[Worn] = [element for element in listed if element.material]
         self.fonts: list[str] = []  # files whose letters are set
         self.written = {chr(int(e.name[1:], 16)) for e in self.shapes if e.form == "outline"}
         """Characters of all strings."""
@@ -130,13 +124,11 @@ class Writer:
             self.uses += bound.uses
         return [form for form in forms if form is not None]
 
-    def file(
-        self, context: FileContext, tree: nodes.File, scope: PageScope, imported: bool
-    ) -> list[FormLine]:
+    def file(self, context: FileContext, tree: nodes.File, scope: PageScope, imported: bool) -> list[Line]:
         """The statements of a file; of an imported one the exported definitions."""
         statements = [s for s in tree.statements if not imported or isinstance(s, BROUGHT)]
         self._declare(statements, scope)
-        lines: list[FormLine] = []
+        lines: list[Line] = []
         for stmt in statements:
             self.uses = []
             if isinstance(stmt, nodes.Import):
@@ -156,13 +148,13 @@ class Writer:
                 form = self.statement(stmt, scope, "file")
                 bound = scope.names[stmt.name.text]
                 bound.uses = self.uses
-                lines.append(FormLine(form, bound, self.uses))
+                lines.append((form, bound, self.uses))
                 if isinstance(stmt, nodes.Param):
                     full = context.prefix + stmt.name.text
                     form[2] = full
                     self.params.append((full, stmt, context, bound))
             elif form := self.statement(stmt, scope, "file"):
-                lines.append(FormLine(form, None, self.uses))
+                lines.append((form, None, self.uses))
             if isinstance(stmt, nodes.Call) and stmt.name.text in self.lengths:
                 self.lengths[stmt.name.text] += self.uses
         return lines
@@ -211,14 +203,6 @@ class Writer:
             bound.at = len(self.calls)
             self.calls.append(None)
         return bound.at
-
-    def slot(self, scope: PageScope) -> int:
-        """A new slot."""
-        if scope.frame is None:
-            self.slots += 1
-            return self.slots - 1
-        scope.frame.size += 1
-        return scope.frame.size - 1
 
     def hops(self, scope: PageScope, to: PageScope) -> int:
         """Number of calls between a scope and the slots of another; -1 for those of files."""
@@ -312,7 +296,7 @@ class Writer:
         """``["material", index of its shading, index of its paint or -1, block]``."""
         name, shading = written.name.text, written.shading
         alias, dot, rest = name.partition(".")
-        element: Element | Gradient | None = self.textures.get(name)
+        element: Worn | None = self.textures.get(name)
         if name in words.GRADIENTS:
             element = Gradient(name)  # whose stops are among the operations
         if dot and (file := scope.find(alias)) is not None and file.file is not None:
@@ -324,12 +308,12 @@ class Writer:
         ops = [] if written.body is None else self.block(written.body, scope, "material")
         return ["material", *look, ops]
 
-    def _look(
-        self, name: str, element: Element | Gradient | None, shading: str | None = None
-    ) -> tuple[int, int]:
+    def _look(self, name: str, element: Worn | None, shading: str | None = None) -> tuple[int, int]:
         """Indices of a material's shading and of its paint, -1 for none."""
         lit = name if element is None else shading or self.manifest.materials[0]
         paint = -1 if element is None else self._element(element, self.paints, name)
+        if lit in words.REFLECTING:
+            raise Lacking(f"pages do not draw `{lit}`")
         if lit not in self.manifest.materials:
             raise Lacking(f"model `{self.manifest.name}` has no material `{lit}`")
         return self.manifest.materials.index(lit), paint
@@ -374,9 +358,12 @@ class Writer:
 
     def _define(self, name: nodes.Name, kind: str, scope: PageScope) -> list[Json]:
         """Give a name a new slot: ``["g", slot]`` of files, or ``["v", slot]`` of a call."""
-        slot = self.slot(scope)
+        if scope.frame is None:
+            word, slot, self.slots = "g", self.slots, self.slots + 1
+        else:
+            word, slot, scope.frame.size = "v", scope.frame.size, scope.frame.size + 1
         scope.names[name.text] = Bound(kind, scope, slot)
-        return ["g" if scope.frame is None else "v", slot]
+        return [word, slot]
 
     def _width(self, stmt: nodes.Node | nodes.Combined, scope: PageScope) -> Json:
         return self.given(bind(("k",), stmt.args), scope)[0]
@@ -385,6 +372,8 @@ class Writer:
         name = stmt.name.text
         bound = None if name in words.LANGUAGE else scope.find(name)
         head = head_of(stmt, bound, kind)
+        if head == "move" and name == "roughness":
+            return ["no", f"pages do not draw `{name}`"]
         if head == "setting":
             args = self.given(bind(words.SETTINGS[name].params, stmt.args), scope)
             if name in words.STAGE and self.manifest.dimension == 2:
@@ -500,12 +489,10 @@ class PageProgram(Record):
     params: list[Json]  # that matter to the picture: their values, in radians and seconds, and ranges
     fixed: list[Json]  # names of those that no page can change, and why
     shapes: tuple[Element, ...]  # that rows name by index, behind the model's geometries
-    paints: tuple[Element | Gradient, ...]
+    paints: tuple[Worn, ...]
 
 
-def form_of(
-    evaluation: Evaluation, manifest: Manifest, elements: Iterable[Element | Gradient] = ()
-) -> PageProgram:
+def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Worn] = ()) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
     The Program's elements come first among shapes and paints, in their order.
@@ -513,7 +500,7 @@ def form_of(
     writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
     with deep_stack():
         lines = writer.file(evaluation.context, evaluation.file, PageScope(), imported=False)
-        needed = writer.reached(bound for line in lines if line.bound is None for bound in line.uses)
+        needed = writer.reached(one for _, bound, uses in lines if bound is None for one in uses)
         for word, uses in writer.lengths.items():
             reached = writer.reached(uses)
             reasons |= {name: _WHY[word] for name, _, _, bound in writer.params if id(bound) in reached}
@@ -523,7 +510,7 @@ def form_of(
     data = {
         "model": manifest.name,
         "dimension": manifest.dimension,
-        "body": [line.form for line in lines if line.bound is None or id(line.bound) in needed],
+        "body": [form for form, bound, _ in lines if bound is None or id(bound) in needed],
         "animates": evaluation.animates,
         "slots": writer.slots,
         "calls": writer.calls,
@@ -550,7 +537,8 @@ def form_of(
 @cache
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
-    usual, fields = stage_data(Stage()), {}
+    usual, fields = {**stage_data(Stage()), "sky": stage_data(Sky())}, {}
+    usual["light"]["radius"] = 0.0
     for name, word in words.STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
@@ -561,7 +549,7 @@ def _stage() -> Json:
 
 def param_data(name: str, stmt: nodes.Param, file: FileContext) -> dict[str, Any]:
     """The data of a param for its control on a page."""
-    value = file.env[file.scope.names[stmt.name.text].slot]
+    value = file.value(stmt.name.text)
     colour = "color" if is_colour(stmt.default) else "vector"
     kind = colour if isinstance(value, Vec) else _KINDS[value.__class__]
     data: dict[str, Any] = {"name": name, "kind": kind, "value": _json(value)}

@@ -33,7 +33,7 @@ from scenelang.language.reports import SceneError
 from scenelang.output.animate import Progress, make
 from scenelang.output.frames import Clip, Drawable, Shot, find_target, frame_key
 from scenelang.output.painting import Painter
-from scenelang.web.export import PagePayload, page, scene_view, still
+from scenelang.web.export import PagePayload, has_sky, page, scene_view, still
 from scenelang.web.folder import Answer, JobFailed
 
 MOST_PIXELS: Final = 1 << 24
@@ -79,8 +79,8 @@ def _view(job: Job, tell: Tell) -> Answer:
     evaluation = _source(job).evaluation(result)
     try:
         shown = _viewed(job, evaluation, result)[0]
-    except SceneError:
-        pass  # `result` has its diagnostics
+    except SceneError as error:  # `result` has its diagnostics, but for those of pages
+        result.items += [d for d in error.diagnostics if d not in result.items]
     except (ProgramError, FileNotFoundError) as error:
         problem = {"code": "", "severity": "warning", "message": str(error), "line": 1, "column": 1}
         lacking.append(problem)
@@ -103,6 +103,8 @@ def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple
     program = compile_scene(scene, spans=spans, diagnostics=diagnostics)
     if len(program) > MOST_ROWS:
         raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
+    if job["do"] == "view" and has_sky(program):
+        raise ProgramError("light from everywhere, which the machine draws")
     return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
 
 

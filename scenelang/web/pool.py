@@ -97,10 +97,8 @@ class Pool:
                 raise JobFailed(f"a process to draw in does not start: {error}") from None
             finally:
                 self._busy.discard(started)
-                unasked = doing.cancel()  # where no thread has taken it up
-                if unasked or (
-                    doing.done() and not started.exception() and started.result().process.is_alive()
-                ):
+                idle = doing.cancel()  # where no thread has taken it up
+                if idle or (doing.done() and not started.exception() and started.result().process.is_alive()):
                     self._idle.append(started)
                 else:
                     started.add_done_callback(_kill)

@@ -226,12 +226,6 @@ def make_app(play: Play) -> Starlette:
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}
         return Response(data, media_type=kind, headers=headers)
 
-    async def live(socket: WebSocket) -> None:
-        await Live(play, socket).run()
-
-    async def language(socket: WebSocket) -> None:
-        await serve_language(socket, play.folder)
-
     @contextlib.asynccontextmanager
     async def running(_: Starlette) -> AsyncIterator[None]:
         stop = asyncio.Event()
@@ -249,8 +243,8 @@ def make_app(play: Play) -> Starlette:
         Route("/", page),
         Route("/static/{name:path}", _static),
         Route("/download", download),
-        WebSocketRoute("/live", _few(live)),
-        WebSocketRoute("/lsp", _few(language)),
+        WebSocketRoute("/live", _few(lambda socket: Live(play, socket).run())),
+        WebSocketRoute("/lsp", _few(lambda socket: serve_language(socket, play.folder))),
     ]
     return Starlette(routes=routes, lifespan=running)
 

@@ -21,7 +21,7 @@ from scenelang.drawing.solid.norms import Norms
 from scenelang.drawing.solid.passes import LOOSE, SLACK
 from scenelang.web.arrays import ArrayStore, web
 
-FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "light.glsl")
+FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "lamps.glsl", "light.glsl")
 """Files of ``viewer/``, in order."""
 _CONSTANTS: Final = {
     "EMPTY": EMPTY,
@@ -40,6 +40,7 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     """The parts ``shader`` and ``network`` of a view."""
     config, decoders = network.config, [network.decoder(code) for code in network.codes]
     paint, kind = config.paint_lines, config.kind_lines
+    products = [d.products if isinstance(d, Norms) else sum(w.size for w, _ in d) for d in decoders]
     kinds = [*(network.cell(token, BLEND) for token in range(TOKENS))]
     kinds += [network.cut(token, BLEND) for token in (SUBTRACT, INTERSECT)]
     cells = np.concatenate([_cell(each[-1]) for each in kinds])
@@ -47,7 +48,9 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     sizes = {"CELL": 2 + paint + kind, "GEOMETRIES": len(decoders)}
     parts = [web("angles.glsl"), *(f"const float {name} = {value!r};" for name, value in _CONSTANTS.items())]
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
-    parts += [_struct("Stage", stage_data(Stage()))]
+    usual = stage_data(Stage())
+    usual["lights"] = [{**usual.pop("light"), "radius": 0.0}]
+    parts += ["#ifndef LAMPS\n#define LAMPS 1\n#endif", _struct("Stage", usual)]
     parts += [
         f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
     ]
@@ -61,27 +64,25 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
             ),
             "geometries": len(decoders),
             "blend": BLEND,
+            "extinction": EXTINCTION,
             "slack": SLACK,
             "loose": LOOSE,
             "far": RADIUS,
-            "products": max(map(_products, decoders)) + 2 * (1 + paint + kind),
+            "products": max(products) + 2 * (1 + paint + kind),
         },
     }
 
 
 def _struct(name: str, part: dict[str, Any]) -> str:
-    """GLSL of the type of a part of the stage, behind those of its own parts."""
+    """GLSL of the type of a part of the stage, behind those of its own parts; lists are of lamps."""
     inner = [_struct(field.title(), value) for field, value in part.items() if isinstance(value, dict)]
-    types = {tuple: "vec3", float: "float", bool: "bool"}
-    lines = [f"{types.get(type(value), field.title())} {field};" for field, value in part.items()]
+    inner += [_struct("Light", each) for value in part.values() if isinstance(value, list) for each in value]
+    types = {tuple: "vec3", float: "float", bool: "bool", list: "Light"}
+    lines = [
+        f"{types.get(type(value), field.title())} {field}{'[LAMPS]' * isinstance(value, list)};"
+        for field, value in part.items()
+    ]
     return "\n".join([*inner, f"struct {name} {{ {' '.join(lines)} bool on; }};"])
-
-
-def _products(layers: Smooth | Norms) -> int:
-    """How many products an answer takes."""
-    if isinstance(layers, Norms):
-        return layers.products
-    return sum(w.size for w, _ in layers)
 
 
 def _cell(cell: SolidCell) -> np.ndarray:
@@ -117,29 +118,16 @@ def _decoders(decoders: Sequence[Smooth | Norms], sloped: bool) -> str:
 
 
 def _decoder(layers: Smooth, sloped: bool) -> list[str]:
-    """Statements that return a decoder's answer, its units four by four."""
-    lines, inputs = [], ["q.x", "q.y", "q.z"]
-    quads = -(-len(layers[0][1]) // 4)
-    padded = [_padded(w, b, 4 * quads) for w, b in layers]
-    for (w, b), name in zip(padded[:-1], "ab", strict=True):
-        for k in range(quads):
-            four = slice(4 * k, 4 * k + 4)
-            terms = [f"{x} * {_four(w[four, i])}" for i, x in enumerate(inputs)]
-            x, s = f"{name}{k}", f"{name}{k}s"
-            lines.append(f"vec4 {x} = {' + '.join([_four(b[four]), *terms])};")
-            lines.append(f"vec4 {s} = 1.0 / (1.0 + exp(-{x}));")
-            if sloped:  # the derivative of x s
-                lines.append(f"vec4 {x}d = {s} * (1.0 + {x} * (1.0 - {s}));")
-            lines.append(f"{x} *= {s};")
-        inputs = [f"{name}{k}.{axis}" for k in range(quads) for axis in "xyzw"]
-    (w1, _), (w2, _), (w3, b3) = padded
-    if sloped:
-        lines += [f"b{k}d *= {_four(w3[0, 4 * k : 4 * k + 4])};" for k in range(quads)]
-        back = [", ".join(_back(w2[:, 4 * k + j], "b") for j in range(4)) for k in range(quads)]
-        lines += [f"a{k}d *= vec4({four});" for k, four in enumerate(back)]
-        lines.append(f"g = vec3({', '.join(_back(w1[:, j], 'a') for j in range(3))});")
-    last = [f"dot(b{k}, {_four(w3[0, 4 * k : 4 * k + 4])})" for k in range(quads)]
-    return [*lines, f"return {' + '.join([repr(float(b3[0])), *last])};"]
+    """Statements that return an answer; units go with their gradients, which may be left unused."""
+    lines, inputs = ["vec4 x = vec4(q.x, 1, 0, 0), y = vec4(q.y, 0, 1, 0), z = vec4(q.z, 0, 0, 1);"], [*"xyz"]
+    for (w, b), name in zip(layers, "abc", strict=True):
+        for k, (row, bias) in enumerate(zip(w.tolist(), b.tolist(), strict=True)):
+            terms = [f"{x} * {v!r}" for x, v in zip(inputs, row, strict=True)]
+            lines.append(f"vec4 {name}{k} = vec4({bias!r}, 0, 0, 0) + {' + '.join(terms)};")
+            if name != "c":
+                lines.append(f"{name}{k} = swish({name}{k});")
+        inputs = [f"{name}{k}" for k in range(len(b))]
+    return [*lines, *(["g = c0.yzw;"] if sloped else []), "return c0.x;"]
 
 
 def _norms(layers: Norms, sloped: bool) -> list[str]:
@@ -185,21 +173,3 @@ def _norms(layers: Norms, sloped: bool) -> list[str]:
 
 def _highest(names: Sequence[str]) -> str:
     return reduce(lambda a, b: f"max({a}, {b})", names)
-
-
-def _padded(w: np.ndarray, b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (width, inputs or width) and biases (width,) with zeros for units that a layer lacks."""
-    inputs = 3 if w.shape[1] == 3 else width
-    full, bias = np.zeros((width, inputs)), np.zeros(width)
-    full[: len(w), : w.shape[1]], bias[: len(b)] = w, b
-    return full, bias
-
-
-def _back(column: np.ndarray, name: str) -> str:
-    """GLSL of an input's gradient from a layer's gradients; ``column`` has its weights in that layer."""
-    fours = column.reshape(-1, 4)
-    return " + ".join(f"dot({_four(four)}, {name}{k}d)" for k, four in enumerate(fours))
-
-
-def _four(numbers: np.ndarray) -> str:
-    return f"vec4({', '.join(f'{number:.9g}' for number in numbers)})"

@@ -44,7 +44,7 @@ def shipped(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> Folder:
     path = folder.path / "shipped.json"
     path.write_text(ladder().to_json(), "utf-8")
     monkeypatch.setattr(frontier_file, "frontier_path", lambda model: path)
-    monkeypatch.setattr("scenelang.cli.choosing.yardstick", lambda: 1.0)
+    monkeypatch.setattr("scenelang.output.frontier.yardstick", lambda: 1.0)
     return folder
 
 

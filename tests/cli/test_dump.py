@@ -13,7 +13,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.compiler.passes import PASSES
-from scenelang.editors.dumps import Box, Diagram, changes, to_dot, to_mermaid
+from scenelang.editors.dumps import Box, changes, to_dot, to_mermaid
 from tests.cli.conftest import Folder
 
 TEXT = """param k = 0.5;
@@ -112,7 +112,7 @@ def test_mermaid(folder: Folder) -> None:
     (star,) = (number for number, name in boxes.items() if name == "star")
     assert f"style {star} fill:#dd3333" in said
     assert not re.search(r"[{}]", re.sub(r"#\d+;", "", said)), "what means something to Mermaid is escaped"
-    drawn = Diagram([Box(('a"b\\c]<d>;{e}|#35;',))])
+    drawn = [Box(('a"b\\c]<d>;{e}|#35;',))]
     assert '["a#34;b#92;c]#60;d#62;#59;#123;e#125;#124;#35;35#59;"]' in to_mermaid(drawn)
     assert 'label="a\\"b\\\\c]<d>;{e}|#35;"' in to_dot(drawn)
 

@@ -208,7 +208,7 @@ def test_faults() -> None:
         (Light(power=0.0), None),
         (Light(power=-2.0), "a power of -2 is negative"),
     ):
-        part = {"camera": value} if isinstance(value, Camera) else {"light": value}
+        part = {"camera": value} if isinstance(value, Camera) else {"lights": (value,)}
         assert Stage(**part).fault() == fault
 
 
@@ -221,7 +221,7 @@ def test_colours_are_decoded_from_srgb() -> None:
 def test_constants_are_those_of_the_language() -> None:
     """Other tests draw with whatever they are."""
     camera, light = Camera((0, 1.2, 6), (0, 0, 0), math.radians(36.8699)), Light((2.5, 4, 3), 28, (1, 1, 1))
-    written = Stage(camera, light, Ground(-1, (0.50, 0.48, 0.45)), (0.80, 0.86, 0.92), (0.30, 0.50, 0.85))
+    written = Stage(camera, (light,), Ground(-1, (0.50, 0.48, 0.45)), (0.80, 0.86, 0.92), (0.30, 0.50, 0.85))
     assert Stage() == replace(written, camera=replace(camera, fov_rad=Camera().fov_rad))
     assert Camera().fov_rad == pytest.approx(camera.fov_rad, abs=1e-6)
     assert (spaces.AMBIENT, spaces.EXTINCTION, spaces.FADE) == ((0.12, 0.06), 3, 64)

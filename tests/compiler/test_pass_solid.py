@@ -151,7 +151,7 @@ def test_what_is_left_out_is_seen_nowhere() -> None:
             return rng.uniform(-size, size), rng.uniform(-size, size), rng.uniform(-size, size)
 
         ground = Ground(rng.uniform(-1, 0.6)) if rng.random() < 0.8 else None
-        stage = Stage(Camera(place(4), place(0.3)), Light(place(3)), ground)
+        stage = Stage(Camera(place(4), place(0.3)), (Light(place(3)),), ground)
         nodes = [random_leaf(rng, 1.2) for _ in range(5)] + [random_node(rng, 1)]
         graph = replace(lower(schema.Scene(nodes=nodes), SOLIDS, None, Diagnostics()), stage=stage)
         context = Context(SOLIDS, Diagnostics())

@@ -176,7 +176,7 @@ def test_paints_that_are_none() -> None:
             painted(paint, worn=[0, -1], elements=listed)
 
 
-STAGE = Stage(Camera((1.0, 2.0, 5.0)), Light(power=3.0), None, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), True)
+STAGE = Stage(Camera((1.0, 2.0, 5.0)), (Light(power=3.0),), None, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), True)
 SOLIDS, CODES = load_manifest("solids3d"), load_codes("solids3d")
 
 
@@ -252,7 +252,7 @@ def test_damaged_stages() -> None:
 
 def test_stages_that_draw_nothing_are_refused() -> None:
     with pytest.raises(ProgramError, match="negative"):
-        program(graph(MIXED), Stage(light=Light(power=-1.0)))
+        program(graph(MIXED), Stage(lights=(Light(power=-1.0),)))
 
 
 def test_chains_that_do_not_fit_are_refused() -> None:

@@ -179,7 +179,7 @@ class Scene:
 
     def visible(self, p: V, step: float = STEP) -> float:
         """Transmittance from a point to the light."""
-        way = plus(self.stage.light.position, p, -1.0)
+        way = plus(self.stage.lights[0].position, p, -1.0)
         r = math.sqrt(dot(way, way))
         inside = 0.0
         for kind, begin, end in self.stretches(p, unit(way), r, step):
@@ -189,7 +189,7 @@ class Scene:
         return math.exp(-SIGMA * inside)
 
     def received(self, p: V, n: V) -> V:
-        light = self.stage.light
+        light = self.stage.lights[0]
         way = plus(light.position, p, -1.0)
         r = max(1e-3, math.sqrt(dot(way, way)))
         direct = light.power * max(0.0, dot(n, way) / r) / r**2
@@ -237,7 +237,7 @@ class Scene:
 
     def scattered(self, d: V, begin: float, end: float, steps: int) -> V:
         total, dt = (0.0, 0.0, 0.0), (end - begin) / steps
-        light = self.stage.light
+        light = self.stage.lights[0]
         for i in range(steps):
             t = begin + (i + 0.5) * dt
             p = plus(self.stage.camera.eye, d, t)

@@ -210,7 +210,7 @@ ASIDE = fold(
 """Other solids; `FROM_ASIDE` sees them from aside with a wide view, by a light close to a surface."""
 FROM_ASIDE = Stage(
     Camera((2.2, 2.6, -1.7), (0.3, -0.2, 0.1), radians(80)),
-    Light((0.75, 0.7, -0.4), 0.4, (1.0, 0.7, 0.4)),
+    (Light((0.75, 0.7, -0.4), 0.4, (1.0, 0.7, 0.4)),),
     Ground(-1.1, (0.3, 0.5, 0.6)),
     (0.4, 0.1, 0.2),
     (0.4, 0.1, 0.2),

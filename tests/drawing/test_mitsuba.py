@@ -26,7 +26,7 @@ GOLD, BLUE = (0.8, 0.53, 0.12), (0.2, 0.4, 0.9)
 BLACK = (0.0, 0.0, 0.0)
 STAGE = Stage(
     camera=Camera(eye=(-1.5, 1.6, 4.5), target=(0.1, -0.1, 0.0), fov_rad=0.7),
-    light=Light((1.5, 3.0, 2.0), 16.0),
+    lights=(Light((1.5, 3.0, 2.0), 16.0),),
     ground=Ground(-0.8, (0.5, 0.6, 0.4)),
     horizon=BLACK,
     zenith=BLACK,

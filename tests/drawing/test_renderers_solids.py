@@ -12,7 +12,7 @@ from scenelang.assets.picture import painted
 from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.program import Paint
-from scenelang.compiler.spaces import Camera, Light, Stage
+from scenelang.compiler.spaces import EXTINCTION, Camera, Light, Stage
 from scenelang.compiler.steps import Affine, Displace, Step, Twist
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.exact.field import combine, leaf_distance
@@ -118,7 +118,7 @@ def test_pictures_are_those_of_the_reference(first: str, last: str) -> None:
         "torus", (scaled(0.5, 0.4, 0.5), turned(0.7), moved(0.4, 0.2, 0.4)), "volumetric", token=last
     )
     objects = [MIXED[0]._replace(material=first), MIXED[1], small, Object("sphere", (scaled(0.3),))]
-    stage = Stage(light=Light((1.0, 2.5, 2.0), 12.0, (1.0, 0.9, 0.8)))
+    stage = Stage(lights=(Light((1.0, 2.5, 2.0), 12.0, (1.0, 0.9, 0.8)),))
     exact = solid_image(graph(objects), stage, (48, 40))
     assert psnr_db(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
 
@@ -171,7 +171,7 @@ def test_objects_meet_in_the_cell_alone() -> None:
 
 def test_what_a_sphere_takes() -> None:
     """A ray is near where it meets the ball; one object is met once a step, and once more for its normal."""
-    stage = Stage(camera=Camera((0.0, 0.0, 6.0)), light=Light((0.0, 0.0, 9.0)), ground=None)
+    stage = Stage(camera=Camera((0.0, 0.0, 6.0)), lights=(Light((0.0, 0.0, 9.0)),), ground=None)
     square = ((np.arange(60) - 29.5) / 60) ** 2 + ((np.arange(40)[:, None] - 19.5) / 60) ** 2
     sine = np.sqrt(square / (1 + square))  # of the angle between a ray and the axis
     image, work = draw_solids(field([Object("sphere")]), stage, (60, 40), samples="one")
@@ -251,7 +251,7 @@ def test_a_medium_glows_where_the_light_is_behind_it(radius: float, away: float,
     """Along the axis: the deeper a point lies, the more light arrives and the less of it gets out."""
     camera, dark = Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0)
     light = Light((0.0, 0.0, -away), power)
-    stage = Stage(camera=camera, light=light, ground=None, horizon=dark, zenith=dark)
+    stage = Stage(camera=camera, lights=(light,), ground=None, horizon=dark, zenith=dark)
     step = scaled(radius)
     image, *_ = draw_solids(
         field([Object("sphere", (step,), "volumetric", (1.0, 1.0, 1.0))]), stage, (65, 65)
@@ -333,7 +333,7 @@ def lengths(solids: SolidField) -> np.ndarray:
     way, limit = (solids.xp.array(a, solids.network.codes) for a in rays(2000))
     with solids.xp.inference():
         lamp = solids.xp.array(LAMP, solids.network.codes)
-        return np.asarray(march(solids, lamp, way, limit, whole=True).length)
+        return np.asarray(march(solids, lamp, way, limit, whole=True).depth) / EXTINCTION
 
 
 @pytest.mark.parametrize(("leaf", "near", "far"), [("sphere", 0.006, 0.025), ("torus", 0.015, 0.06)])
@@ -388,7 +388,7 @@ def test_random_weights_draw_other_light_and_none_march() -> None:
     wrong.segment_w = [
         np.random.default_rng(1).normal(size=w.shape).astype(np.float32) for w in wrong.segment_w
     ]
-    stage = Stage(light=Light(tuple(LAMP.tolist())))
+    stage = Stage(lights=(Light(tuple(LAMP.tolist())),))
     mine, noise, none, theirs = (
         draw_solids(field([MIST, FAR], net), stage, (64, 64))[0]
         for net in (network(), wrong, marching(), torch_network())
@@ -508,7 +508,11 @@ def test_light_in_a_medium_of_two_colours_is_the_sum_of_both_ways() -> None:
     """Seen along the axis on which they change: near and far half have closed forms of their own."""
     dark = (0.0, 0.0, 0.0)
     stage = Stage(
-        camera=Camera((0.0, 0.0, 6.0), dark), light=Light(power=0.0), ground=None, horizon=dark, zenith=dark
+        camera=Camera((0.0, 0.0, 6.0), dark),
+        lights=(Light(power=0.0),),
+        ground=None,
+        horizon=dark,
+        zenith=dark,
     )
     halves = np.zeros((2, 1, 3), np.uint8)
     halves[0, 0, 0] = halves[1, 0, 1] = 255  # red over green, along the leaf's y

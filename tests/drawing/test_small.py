@@ -38,13 +38,14 @@ def program(text: str, **changes: object) -> Program:
 def assert_same(p: Program, **options: str) -> None:
     """The two libraries' pictures, as they go into files too.
 
-    Of solids a pixel in 2,000 may just be sampled four times by one library and not by the other.
+    Of solids a pixel in 2,000 may just be sampled four times by one library and not by the other; under a sky
+    one in 40 may take its light from other points.
     """
     by_torch = draw_program(p, open_model(p.model), threads=1, **options).image  # type: ignore[arg-type]
     by_numpy = draw_small(p, **options).image  # type: ignore[arg-type]
     assert by_numpy.dtype == by_torch.dtype
     assert by_numpy.shape == by_torch.shape
-    steps, apart = (1, 0.0) if p.stage is None else (2, 1 / 2000)
+    steps, apart = (1, 0.0) if p.stage is None else (2, 1 / 2000 if p.stage.sky is None else 1 / 40)
     assert (np.abs(by_numpy - by_torch).max(2) > steps * STEP).mean() <= apart
     levels = np.abs(by_numpy.to_uint8().astype(int) - by_torch.to_uint8())
     assert (levels.max(2) > steps).mean() <= apart
@@ -81,8 +82,8 @@ def test_odd_scenes_look_the_same() -> None:
 
 def test_small_work_is_numpy_s() -> None:
     small, wide, many = program(STAR), program(STAR, canvas=(8000, 6000)), program(CLOUD)
-    assert choose_drawer(small).library == "numpy"
-    assert choose_drawer(wide).library == choose_drawer(many).library == "torch"
+    assert choose_drawer(small)[0] == "numpy"
+    assert choose_drawer(wide)[0] == choose_drawer(many)[0] == "torch"
     assert work_ms(small) < MOST_MS < min(work_ms(wide), work_ms(many))
     assert work_ms(small, "one") < work_ms(small) < work_ms(program(STAR, canvas=(512, 512)))
     assert work_ms(wide, "four") > work_ms(wide)
@@ -93,7 +94,7 @@ def test_small_work_is_numpy_s() -> None:
 def test_a_named_device_is_torch_s() -> None:
     small = program(STAR)
     assert choose_drawer(small, "cpu") == ("torch", "asked for by device cpu")
-    assert choose_drawer(small, "cuda").library == "torch"
+    assert choose_drawer(small, "cuda")[0] == "torch"
     assert np.array_equal(
         nsg.render(small, device="cpu", threads=1),
         draw_program(small, open_model("shapes2d"), threads=1).image,
@@ -102,7 +103,7 @@ def test_a_named_device_is_torch_s() -> None:
 
 def test_networks_of_whole_pictures_are_torch_s() -> None:
     scene = nsg.loads("canvas(64, 64); star;")
-    assert choose_drawer(compile_scene(scene, model="shapes2d-streaming")).library == "torch"
+    assert choose_drawer(compile_scene(scene, model="shapes2d-streaming"))[0] == "torch"
     with pytest.raises(RenderError, match="unknown model `none`"):
         choose_drawer(replace(program(STAR), model="none"))
 

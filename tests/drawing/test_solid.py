@@ -59,7 +59,7 @@ POVRAY: dict[str, tuple[Fold, Stage, tuple[int, int], float]] = {
             ),
             leaf("sphere", "diffuse", RED, scaled(0.2), moved(0.7, -0.6, 0.6)),
         ),
-        Stage(Camera((-2, 2, 3.5), (0.1, -0.2, 0), 0.7), Light((0.2, 2.5, 1.6), 12.0), Ground(-0.7)),
+        Stage(Camera((-2, 2, 3.5), (0.1, -0.2, 0), 0.7), (Light((0.2, 2.5, 1.6), 12.0),), Ground(-0.7)),
         (150, 100),
         48,
     ),
@@ -71,7 +71,7 @@ POVRAY: dict[str, tuple[Fold, Stage, tuple[int, int], float]] = {
             leaf("sphere", "diffuse", GOLD, scaled(0.35), moved(0.6, -0.4, -1.2)),
             leaf("torus", "diffuse", GOLD, scaled(0.3), moved(0.9, 1.1, 0.8)),
         ),
-        Stage(light=Light(position=(1.0, 3.0, 2.0), power=12.0, rgb=(1.0, 0.8, 0.5))),
+        Stage(lights=(Light(position=(1.0, 3.0, 2.0), power=12.0, rgb=(1.0, 0.8, 0.5)),)),
         (60, 40),
         55,
     ),
@@ -140,14 +140,14 @@ SCENES: dict[str, tuple[Fold, Stage]] = {
             leaf("sphere", "volumetric", SKY, scaled(0.8), moved(0.3, 0, 0)),
             leaf("torus", "diffuse", GOLD, turned(0.7, 0, 0, 1), moved(-0.3, 0.2, -0.4)),
         ),
-        Stage(transparent=True, ground=None, light=Light(position=(0.0, -3.0, 2.0))),
+        Stage(transparent=True, ground=None, lights=(Light(position=(0.0, -3.0, 2.0)),)),
     ),
     "inside": (
         fold(
             leaf("sphere", "volumetric", SKY, scaled(1.7)),
             leaf("sphere", "diffuse", GOLD, scaled(0.5), moved(0.4, 0.3, 0)),
         ),
-        Stage(camera=Camera(eye=(0.3, 0.5, 1.4)), transparent=True, light=Light((-1.0, 1.0, 1.0), 4.0)),
+        Stage(camera=Camera(eye=(0.3, 0.5, 1.4)), transparent=True, lights=(Light((-1.0, 1.0, 1.0), 4.0),)),
     ),
 }
 
@@ -269,7 +269,7 @@ def test_a_light_inside_a_solid_lights_nothing_outside() -> None:
         leaf("sphere", "diffuse", GOLD, scaled(0.3), moved(0.5, 0.4, 0)),
         leaf("torus", "volumetric", SKY, moved(-0.4, 0, 0)),
     )
-    inside, dark = Stage(light=Light((0.5, 0.4, 0.1))), Stage(light=Light(power=0.0))
+    inside, dark = Stage(lights=(Light((0.5, 0.4, 0.1)),)), Stage(lights=(Light(power=0.0),))
     np.testing.assert_allclose(
         solid_image(root, inside, (24, 24)), solid_image(root, dark, (24, 24)), atol=1e-7
     )
@@ -278,7 +278,10 @@ def test_a_light_inside_a_solid_lights_nothing_outside() -> None:
 def test_the_ground_is_not_drawn_from_below_and_casts_no_shadow() -> None:
     below = Camera(eye=(0.0, -3.0, 4.0))
     root = fold(leaf("sphere", "diffuse", GOLD, scaled(0.6)))
-    with_ground, without = Stage(below, Light((0.0, -3.0, 3.0))), Stage(below, Light((0.0, -3.0, 3.0)), None)
+    with_ground, without = (
+        Stage(below, (Light((0.0, -3.0, 3.0)),)),
+        Stage(below, (Light((0.0, -3.0, 3.0)),), None),
+    )
     np.testing.assert_array_equal(
         solid_image(root, with_ground, (24, 24)), solid_image(root, without, (24, 24))
     )

@@ -28,7 +28,7 @@ from tests.drawing.solids import (
 )
 from tests.pictures import psnr_db
 
-STAGE = Stage(light=Light((1.5, 3.0, 2.5), 16.0))
+STAGE = Stage(lights=(Light((1.5, 3.0, 2.5), 16.0),))
 LEAST = 2e-3  # world units from a surface where sides are told apart
 EYE = np.array([0.5, 1.2, 6.0], np.float32)
 BALL, RING = Object("sphere", (scaled(0.7),)), Object("torus", (turned(0.5), moved(0.3, 0, 0)))

@@ -107,7 +107,7 @@ def test_completion_goes_by_the_block(client: Client, uri: str) -> None:
         ("group {\n  ", "square star ring lib translate let for", ""),
         ("\nsquare { ", "translate rotate twirl grow shell material", "square canvas color"),
         ("subtract ", "square ring group", "canvas"),
-        ("flat { ", "color hue grayscale flip opacity", "twirl square samples"),
+        ("flat { ", "color hue grayscale flip opacity glow density roughness", "twirl square samples"),
         ("\nmod", "module canvas animate samples square", "translate opacity"),
     ):
         found = set(labels(client, client.at(uri, before, len(before))))
@@ -147,8 +147,10 @@ def test_completion_knows_scopes_and_inserts_snippets(client: Client, uri: str) 
 
 def test_completion_of_the_stage_and_the_width_of_a_blend(client: Client, uri: str) -> None:
     text = "smooth() { star; }\nchain { square; smooth(k = 0.3)  }\nsmooth(0.2) {  }\nlight(color = );\n"
-    client.replace(uri, text + "ground();\ncamera();\n\n")
-    assert {"camera", "light", "ground"} <= set(labels(client, client.at(uri, "();\n\n", 4)))
+    client.replace(uri, text + "sky(zenith = );\nlight();\nground();\ncamera();\n\n")
+    assert labels(client, client.at(uri, "zenith = )", 9))[0] == "#d33"
+    assert "none" in labels(client, client.at(uri, "light();", 6))
+    assert {"camera", "light", "ground", "sky"} <= set(labels(client, client.at(uri, "();\n\n", 4)))
     assert labels(client, client.at(uri, "camera(", 7))[:3] == ["eye =", "fov =", "target ="]
     assert labels(client, client.at(uri, "color = )", 8))[0] == "#d33"
     assert "none" in labels(client, client.at(uri, "ground(", 7))[:3]
@@ -191,10 +193,13 @@ def test_hover_tells_words_models_and_the_stage_unless_a_module_hides_it(client:
     rows = [
         ("shapes2d", 2, ["2D", "triangle"]),
         *[("sin", 1, ["sine"]), ("TAU", 1, ["2π"]), ("model", 1, ["usual one"])],
-        *[("light", 1, ["point light"]), ("power", 1, ["power"])],
+        *[("light", 1, ["up to eight"]), ("power", 1, ["power"])],
         *[("smooth", 1, ["blend"]), ("k = 0.2", 0, ["width"])],
     ]
     says(client, uri, rows)
+    client.replace(uri, "sky(2);\nsphere { material metal { roughness(0.5); } }\n")
+    rows = [("sky", 1, ["from surface to surface"]), ("metal", 1, ["needs a `sky`"])]
+    says(client, uri, [*rows, ("roughness", 1, ["how far reflections spread"])])
     client.replace(uri, "samples(16);\nsquare { material flat { opacity(0.5); } }\n")
     says(client, uri, [("samples", 1, ["4 or 16"]), ("opacity", 1, ["behind an object"])])
     client.replace(uri, "module opacity(a) { square { scale(a); } }\nopacity(0.5);\n")

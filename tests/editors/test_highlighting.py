@@ -18,7 +18,6 @@ from pygments.lexers import get_lexer_by_name, get_lexer_for_filename
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace
 
 from scenelang.cli.main import COMMANDS
-from scenelang.editors import highlighting
 from scenelang.editors.highlighting import NsgLexer
 from scenelang.editors.workspace import ClientSettings
 from scenelang.language import words
@@ -101,7 +100,8 @@ def test_the_lexer_classes_names_and_marks_errors() -> None:
 
 def test_every_keyword_and_terminal_is_matched() -> None:
     """By an expression of the right class, read with Python's engine."""
-    repository = highlighting.textmate()["repository"]
+    grammar = (ROOT / "grammar/scenelang.tmLanguage.json").read_text("utf-8")
+    repository = json.loads(grammar)["repository"]
 
     def matched(group: str, text: str) -> bool:
         return any(re.fullmatch(p["match"], text) for p in repository[group]["patterns"] if "match" in p)

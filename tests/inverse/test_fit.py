@@ -379,7 +379,7 @@ def box_of(text: str = PARAMS, names: tuple[str, ...] = ()) -> SearchBox:
 
 
 def test_params_with_a_range_are_searched_unless_named() -> None:
-    assert box_of().names == ("k", "a", "turn", "n", "word", "soft", "open")
+    assert tuple(knob.name for knob in box_of().knobs) == ("k", "a", "turn", "n", "word", "soft", "open")
     assert [axis.wraps for axis in box_of(names=("turn", "a")).axes] == [True, False]
     assert [axis.label for axis in box_of(names=("ink",)).axes] == ["ink.1", "ink.2", "ink.3"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import math
 from pathlib import Path
@@ -97,7 +98,7 @@ def box(p: np.ndarray, low: float, high: float, bottom: float, top: float) -> np
 
 @pytest.mark.parametrize("cubic", [False, True])
 def test_letters_have_the_distances_of_what_their_contours_cover(cubic: bool) -> None:
-    font = read_font(made(cubic), {}).font
+    font = read_font(made(cubic), {})[0]
     p = np.random.default_rng(3).uniform(-0.5, 1.5, (4000, 2))
     union = np.minimum(box(p, 0.1, 0.5, 0, 0.4), box(p, 0.3, 0.7, 0.2, 0.6))
     outside = union > 0  # inside, the least of both is no distance where they overlap
@@ -112,7 +113,7 @@ def test_letters_have_the_distances_of_what_their_contours_cover(cubic: bool) ->
 
 
 def test_advances_and_kerning_are_those_of_the_font() -> None:
-    font = read_font(made(True, kern=-80), {}).font
+    font = read_font(made(True, kern=-80), {})[0]
     line, width = font.line("AB A")
     assert width == pytest.approx((700 - 80 + 640 + 250 + 700) / 1000, abs=1e-6)
     assert [round(letter.x - font.metrics[font.letters["A"]].x, 4) for letter in line][::2] == [0.0, 1.51]
@@ -167,12 +168,12 @@ def test_composites_that_hold_themselves_end() -> None:
     file = io.BytesIO()
     font.recalcBBoxes = False
     font.save(file)
-    result = read_font(file.getvalue(), {})
-    assert len(result.font.letters) >= 1
+    font, _ = read_font(file.getvalue(), {})
+    assert len(font.letters) >= 1
 
 
 def test_files_of_fonts_are_read_as_a_strangers() -> None:
-    font = read_font(made(True), {"license": "OFL"}).font
+    font = read_font(made(True), {"license": "OFL"})[0]
     data = element_file_bytes([], font=font)
     assert read_zoo(data).font is not None
     random = np.random.default_rng(2)
@@ -193,7 +194,7 @@ def test_files_of_fonts_are_read_as_a_strangers() -> None:
 
 @pytest.mark.parametrize("name", ["text", "width", "u0043"])
 def test_names_of_a_font_are_its_own(name: str) -> None:
-    font = read_font(made(True), {}).font
+    font = read_font(made(True), {})[0]
     with pytest.raises(TensorError, match="beside a font"):
         read_zoo(element_file_bytes([element(ball, name, d=2, levels=2)], font=font))
 
@@ -204,7 +205,7 @@ def test_texts_of_drawings_are_set_in_the_font_that_ships() -> None:
         font-family="Arial, sans-serif" transform="translate(5 0)">il</text>
         <text font-family="Times">x</text><text>\u6f22</text></svg>"""
     layers, notes = drawn(text.encode())
-    assert notes[1] == "text left out: `times` is not at hand"
+    assert notes[1] == "text left out: `times` is not at hand, --font brings it"
     assert notes[2] == "text left out: the font has no `\u6f22` (U+6F22)"
     low, high = layers[0].box()
     font = load_element_file(library.find("std/letters") or "").font
@@ -213,3 +214,38 @@ def test_texts_of_drawings_are_set_in_the_font_that_ships() -> None:
     assert 55 - width / 2 < low[0] < 55 < high[0] < 55 + width / 2
     assert low[1] == pytest.approx(-20, abs=0.1)  # y up: the baseline
     assert high[1] == pytest.approx(-20 + 7.4, abs=0.4)
+
+
+def test_texts_of_drawings_are_set_in_a_font_that_is_given(tmp_path: Path) -> None:
+    pytest.importorskip("svgelements")
+    drawing, font, zoo = tmp_path / "sign.svg", tmp_path / "mine.ttf", tmp_path / "zoo.safetensors"
+    drawing.write_text(
+        """<svg xmlns="http://www.w3.org/2000/svg"><text x="30" y="20" font-size="10" text-anchor="end"
+        font-family="Times">A&#x41;</text><text>\u6f22</text></svg>"""
+    )
+    said = list[str]()
+
+    def learn(name: str) -> None:
+        nsg.learn(drawing, zoo, font=tmp_path / name, steps=1, parts=False, say=said.append)
+
+    font.write_bytes(made(False))
+    learn("mine.ttf")
+    assert "text left out: the font has no `\u6f22` (U+6F22)" in said[0]
+    # two letters that advance by 700 of 1,000 and reach from 100, 0 to 700, 600; kerning is of A and B alone
+    assert "(23.5, -17)" in said[1]
+    sign = load_element_file(zoo).elements[0]
+    assert sign.about["font"] == hashlib.sha256(font.read_bytes()).hexdigest()
+    assert float(sign.about["size"]) == pytest.approx(math.hypot(13, 6) / 2, rel=1e-3)
+    del said[:]
+    learn("mine.ttf")
+    assert said == ["sign: made before of this file"]
+    (tmp_path / "other.ttf").write_bytes(made(True))
+    learn("other.ttf")
+    assert "sign: made before of this file" not in said[1:]
+    (tmp_path / "none.ttf").write_bytes(b"no font")
+    with pytest.raises(FitError, match=r"sign.svg: the font `.*none.ttf`: damaged or not a TrueType"):
+        learn("none.ttf")
+    with pytest.raises(FitError, match=r"lost.ttf: no such file"):
+        learn("lost.ttf")
+    with pytest.raises(nsg.RenderError, match="its texts are in a font of their own"):
+        nsg.render(nsg.loads(f'import "{zoo.name}" as z; z.sign();', root=tmp_path), backend="reference")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -11,11 +12,23 @@ import scenelang as nsg
 from scenelang.compiler.compile import scene_dimension
 from scenelang.compiler.lower import lower
 from scenelang.compiler.manifest import load_manifest
-from scenelang.compiler.spaces import Camera, Ground, Light, Stage, decoded, stage_of
+from scenelang.compiler.spaces import (
+    HORIZON,
+    Camera,
+    Ground,
+    Light,
+    Sky,
+    Stage,
+    decoded,
+    read_stage,
+    stage_data,
+    stage_of,
+)
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import same_nodes
 from tests.language.cases import run_text
 
+WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 SOLIDS = load_manifest("solids3d")
 
 
@@ -27,17 +40,32 @@ def test_what_is_stated_stands_over_the_defaults() -> None:
             "camera(fov = 0.25turn, eye = 2 * X);",
             Stage(Camera(eye=(2.0, 0.0, 0.0), fov_rad=math.pi / 2)),
         ),
-        ("light([1, 2, 3], 4, rgb(0, 0.5, 1));", Stage(light=Light((1, 2, 3), 4, decoded((0, 0.5, 1))))),
+        ("light([1, 2, 3], 4, rgb(0, 0.5, 1));", Stage(lights=(Light((1, 2, 3), 4, decoded((0, 0.5, 1))),))),
         ("light(color = #fff);", Stage()),
         ("ground(-2);", Stage(ground=Ground(-2.0))),
         ("ground(color = #fff);", Stage(ground=Ground(rgb=(1.0, 1.0, 1.0)))),
         ("ground(none);", Stage(ground=None)),
         ("background(none);", Stage(transparent=True)),
-        ("background(#fff);", Stage(horizon=(1.0, 1.0, 1.0), zenith=(1.0, 1.0, 1.0))),
+        ("background(#fff);", Stage(horizon=WHITE, zenith=WHITE)),
+        ("light(none);", Stage(lights=())),
+        ("light([0, 9, 0], radius = 0.5);", Stage(lights=(Light((0, 9, 0), radius=0.5),))),
+        (
+            "light(); light(power = 2); light(radius = 1);",
+            Stage(lights=(Light(), Light(power=2), Light(radius=1))),
+        ),
+        ("sky();", Stage(sky=Sky())),
+        ("sky(2, zenith = #fff);", Stage(zenith=WHITE, sky=Sky(2, HORIZON, WHITE))),
+        ("sky(); background(#fff);", Stage(horizon=WHITE, zenith=WHITE, sky=Sky(1, WHITE, WHITE))),
+        (
+            "background(#fff); sky(horizon = #000);",
+            Stage(horizon=WHITE, zenith=WHITE, sky=Sky(1, BLACK, WHITE)),
+        ),
+        ("background(none); sky(0);", Stage(transparent=True, sky=Sky(0))),
     ):
         scene = run_text(text + "sphere;").good()
         for way in (scene, run_text(scene.to_nsg()).good(), nsg.Scene.from_json(scene.to_json())):
             assert stage_of(way) == stage, text
+        assert read_stage(json.loads(json.dumps(stage_data(stage)))) == stage
 
 
 def test_the_stage_moves() -> None:
@@ -57,12 +85,15 @@ def test_the_stage_moves() -> None:
 def test_own_names_hide_the_words() -> None:
     for text in (
         "module light(p) { sphere; } light(3);",
+        "module sky() { sphere; } sky();",
+        "module glow(p) { sphere; } glow(3);",
+        "module density() { sphere; } group { density(); }",
         "module ground() { sphere; } ground;",
         "module camera() { sphere; } group { camera(); }",
         "let light = material diffuse; sphere { light; }",
     ):
         scene = run_text(text).good()
-        assert (scene.camera, scene.light, scene.ground) == ("default",) * 3, text
+        assert (scene.camera, scene.light, scene.ground, scene.sky) == ("default",) * 4, text
         assert len(scene.nodes) == 1
     assert run_text("let light = 3; light(power = light); sphere;").good().light == nsg.Light(power=3)
 
@@ -84,6 +115,7 @@ def test_the_first_geometry_and_then_the_stage_say_the_dimension() -> None:
         ("ground(none);", 3),
         ("background(#000);", 2),
         ("light(); square;", 2),
+        ("sky();", 3),
         ("smooth(k = 0.3) { sphere; torus; }", 3),
         ("group { group {} chain { square; smooth(k = 0.3) star; } } torus;", 2),
         ("torus; square;", 3),

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from scenelang.drawing.how import RenderError
 from scenelang.output.encoders import (
     Census,
-    NoFfmpeg,
     Palette,
     find_codec,
     mapped,
@@ -211,7 +211,7 @@ def test_frames_are_read_one_at_a_time(tmp_path: Path, monkeypatch: pytest.Monke
 def ffmpeg() -> str:
     try:
         return find_codec(".mp4")[0]
-    except NoFfmpeg as error:
+    except RenderError as error:
         pytest.skip(str(error))
 
 
@@ -251,7 +251,7 @@ def test_video_over_white_and_with_alpha(tmp_path: Path, ffmpeg: str) -> None:
     assert frames_of(ffmpeg, tmp_path / "a.mp4", (64, 48))[0].min() >= 250
     try:
         write_video(made, tmp_path / "a.webm", quiet, suffix=".webm")
-    except NoFfmpeg as error:
+    except RenderError as error:
         pytest.skip(str(error))
     shown = frames_of(ffmpeg, tmp_path / "a.webm", (64, 48), 4)
     assert shown[0][..., 3].max() <= 5

@@ -96,6 +96,28 @@ def test_colours_and_files(tmp_path: Path) -> None:
         mesh.save(tmp_path / "a.fbx")
 
 
+def test_colours_that_jump_do_so_at_the_edge() -> None:
+    """No triangle of some size runs between two colours, also where three meet; the surface stays closed."""
+    balls = (
+        "sphere { scale(0.6); material diffuse { color(#f00); } }",
+        "sphere { scale(0.6); translate(0.5, 0, 0); material diffuse { color(#0f0); } }",
+        "sphere { scale(0.6); translate(0.2, 0.5, 0); material diffuse { color(#00f); } }",
+    )
+    mesh, _ = meshed("\n".join(balls))
+    plain, _ = meshed("\n".join(ball[: ball.index("material")] + "}" for ball in balls))
+    assert len(mesh.vertices) > len(plain.vertices)
+    assert volume(mesh) == pytest.approx(volume(plain), rel=1e-4)
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    mixed = np.ptp(mesh.colours[mesh.triangles], axis=1).max(1) > 0.06
+    assert mixed.any()  # the slivers
+    assert area[mixed].max() < 0.01 * np.median(area)
+    third = (a + b + c)[~mixed] / 3
+    exact = np.array([[0, 0, 0], [0.5, 0, 0], [0.2, 0.5, 0]])
+    nearest = np.linalg.norm(third[:, None] - exact, axis=2).argmin(1)
+    assert (mesh.colours[mesh.triangles[~mixed, 0]].argmax(1) == nearest).mean() > 0.99
+
+
 def test_media_end_where_solids_begin() -> None:
     text = "chain { sphere {} union sphere { scale(0.5); translate(1, 0, 0); material volumetric; } }"
     mesh, codes = meshed(text)

@@ -16,7 +16,7 @@ import scenelang as nsg
 from scenelang.drawing.how import How
 from scenelang.language.evaluation import Source
 from scenelang.output.animate import Progress
-from scenelang.output.frames import Busy, Clip, FrameStore, find_target
+from scenelang.output.frames import Clip, FrameStore, find_target
 from scenelang.output.painting import Painter
 from tests.output.scenes import DARK, HEAD, tricky
 
@@ -161,7 +161,7 @@ def test_a_damaged_frame_is_drawn_again(tmp_path: Path) -> None:
 def test_two_runs_at_once(tmp_path: Path) -> None:
     path, out = write(tmp_path), tmp_path / "a.gif"
     with FrameStore(find_target(str(out)).work) as store:
-        with pytest.raises(Busy, match="another process"):
+        with pytest.raises(nsg.RenderError, match="another process"):
             nsg.animate(path, out, size=SMALL, backend="reference")
         assert left(tmp_path) == [store.folder.name]
         store.remove()

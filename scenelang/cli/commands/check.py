@@ -205,10 +205,8 @@ class Scenes(Record, frozen=False):
             self.unseen += check_evaluated(*facts, frames=self.frames)
             parts.append(result.diagnostics.items)
         every = merged([*parts, unused_defines(request)])
-        wanted = ("E", *(self.select or "W"))
-        every.items[:] = [
-            d for d in every if d.code.startswith(wanted) and not d.code.startswith(self.ignore)
-        ]
+        kept = ("E", *(self.select or "W"))
+        every.items[:] = [d for d in every if d.code.startswith(kept) and not d.code.startswith(self.ignore)]
         return every
 
     def owner(self, diagnostic: Diagnostic) -> str | None:

@@ -151,7 +151,7 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
     else:
         assert job.scene is not None
         drawing = dumps.draw_scene(job.scene, most)
-    return dumps.to_mermaid(drawing) if kind == "mmd" else dumps.to_dot(drawing)
+    return (dumps.to_mermaid if kind == "mmd" else dumps.to_dot)(drawing, stage == "program")
 
 
 def _picture(kind: str, text: str) -> bytes:

@@ -39,6 +39,7 @@ def command(
     """
     from scenelang.cli.inputs import prepare_all
     from scenelang.compiler.program import ProgramError
+    from scenelang.language.reports import SceneError
     from scenelang.web.export import page, scene_view, still
 
     if title is not None and len(files) > 1:
@@ -52,7 +53,7 @@ def command(
         try:
             with clock("view"):
                 view = scene_view(job.program, job.scene, job.evaluation, title=title or stem_of(job.name))
-        except ProgramError as error:
+        except (ProgramError, SceneError) as error:
             say_trouble(f"{job.name}: {error}")
             code = 2
             continue

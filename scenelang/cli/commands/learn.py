@@ -57,6 +57,7 @@ from scenelang.cli.say import Bar
     high=1,
 )
 @click.option("--letters", metavar="RANGES", help="Letters to take of a font, U+20-7E,U+3B1; by default all.")
+@click.option("--font", metavar="FONT.ttf", help="Font for texts of drawings; else std/letters.")
 @options.positive("--budget", "SECONDS", "Time after which nothing new is begun, for each file.")
 @options.count("--steps", help="Largest number of forms to try, whatever the time.")
 @click.option("--license", metavar="TEXT", help="License of the originals, kept in the file.")

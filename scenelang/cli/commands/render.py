@@ -60,7 +60,7 @@ _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backe
     "--max-flip", "E", "Choose the fastest way to draw whose promised FLIP error is at most E.",
     type=options.Real(0, 1),
 )  # fmt: skip
-@options.count("--resolution", low=8, high=512, default=128, help="Cells of a mesh along its longest side.")
+@options.count("--resolution", low=8, high=512, default=320, help="Cells of a mesh along its longest side.")
 @options.originals
 @options.strict
 @options.verbose
@@ -361,7 +361,8 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
         with clock("draw"):
             scene = how.sampled(job.scene)
             image = draw_exact(scene, spans=job.spans, progress=progress)
-        job.notes.append(f"drew the exact picture, {scene.samples} samples a pixel")
+        chance = f", standard error {image.noise:.2g}" if image.noise else ""
+        job.notes.append(f"drew the exact picture, {scene.samples} samples a pixel{chance}")
         return image
     assert program is not None
     from scenelang.drawing.small import choose_drawer

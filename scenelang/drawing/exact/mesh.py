@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Final, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -145,37 +145,18 @@ class FitError(ValueError):
     """A file cannot be made an element, or a scene cannot be fitted to a picture."""
 
 
-class Shape(Protocol):
-    """A shape to make an element of, in the unit ball or disc."""
-
-    @property
-    def dimension(self) -> int:
-        """2 or 3."""
-
-    @property
-    def centre(self) -> tuple[float, ...]:
-        """Centre of the ball, in the file's own coordinates."""
-
-    @property
-    def size(self) -> float:
-        """Radius of the ball there."""
-
-    def distances(self, p: Points) -> Points:
-        """Signed distances (M,) of points (M, d), negative inside."""
-
-    def surface(self, count: int) -> tuple[Points, Points, float]:
-        """At most ``count`` points (K, d) all over, outward normals, and the share with no inside."""
-
-
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1."""
+    """A solid in the unit ball: the midpoint of its bounding box is the origin, its farthest point at 1.
+
+    A drawing has the like in the plane, `scenelang.drawing.exact.outline.Outline`.
+    """
 
     vertices: Points  # (V, 3)
     triangles: npt.NDArray[np.int64]  # (F, 3) indices
     closed: bool  # tell inside by the nearest surface's normal, otherwise by winding numbers
     centre: tuple[float, float, float]  # of the ball in the file's own coordinates
-    size: float
+    size: float  # radius of the ball there
     notes: tuple[str, ...] = ()  # what was found and mended
     look: Tints | None = None  # the colours of its triangles, where they have any
     dimension: ClassVar[int] = 3
@@ -239,7 +220,9 @@ class Mesh:
         return triangle, share / share.sum(1, keepdims=True)
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """As `Shape.surface`; raises `FitError` where most of the surface has no inside."""
+        """At most ``count`` points (K, d) all over, outward normals, and the share with no inside; raises
+        `FitError` where that is most of it.
+        """
         at, share = self.spread(count, 1)
         a, b, c = self.vertices[self.triangles[at]].swapaxes(0, 1)
         normals = np.cross(b - a, c - a)
@@ -261,7 +244,7 @@ class Mesh:
 def outer(
     distances: Callable[[Points], Points], points: Points, normals: Points, beside: float
 ) -> tuple[Points, Points, float]:
-    """`Shape.surface` of points and normals to either side (M, d), whose sides are asked at ``beside``."""
+    """`Mesh.surface` of points and normals to either side (M, d), whose sides are asked at ``beside``."""
     sides = [distances(points + way * beside * normals) < 0 for way in (1, -1)]
     chosen = sides[0] != sides[1]
     turned = np.where(sides[0], -1.0, 1.0)[:, None]

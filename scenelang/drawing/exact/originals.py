@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
 from functools import lru_cache
 from itertools import chain, count
 from pathlib import Path
@@ -20,11 +19,12 @@ from scenelang.assets.files import read_regular
 from scenelang.compiler.graph import Graph, leaves
 from scenelang.drawing.exact import mesh as meshes
 from scenelang.drawing.exact import outline
-from scenelang.drawing.exact.mesh import FitError, Mesh, NamedMesh, Points, Shape, Sign, Tints
+from scenelang.drawing.exact.mesh import FitError, Mesh, NamedMesh, Points, Sign, Tints
 from scenelang.drawing.exact.outline import Outline
 from scenelang.language import library
 from scenelang.language.scene import Scene
 
+Shape = Mesh | Outline
 MOST_OF: Final = {**meshes.MOST_OF_MESH, **outline.MOST_OF_DRAWING, **outline.MOST_OF_PICTURE}
 """Bytes of a file, by the suffixes that are read."""
 _ALIKE: Final = 1e-4  # of a part's size: how far its points may lie off those of a copy
@@ -37,19 +37,6 @@ class OriginalShapes(NamedTuple):
     numbers: dict[str, int]  # of the parts in the file, from 1, by the names of their elements
     group: Group  # the parts, none where nothing is known of them but their shape
     notes: tuple[str, ...]  # what there is to say of the file
-
-
-def brought(
-    data: bytes, suffix: str, name: str, files: Mapping[str, bytes], sign: Sign, apart: bool | None
-) -> OriginalShapes:
-    """Read shapes from the bytes of a file with a suffix of `MOST_OF`; ``files`` are those that it names.
-    ``apart`` says whether its parts are elements of their own, by default those of drawings.
-    """
-    if suffix in outline.MOST_OF_DRAWING:
-        return drawn_parts(outline.read_outline(data, suffix), name, apart)
-    result, notes = meshes.read_solids(data, suffix, files)
-    shapes = solid_parts(result, name, sign, bool(apart))
-    return shapes._replace(notes=(*shapes.notes, *notes))
 
 
 def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
@@ -177,6 +164,8 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     file, digest = str(element.about.get("original", "")), str(element.about.get("sha256", ""))
     if not file or not digest or folder is None:
         raise FitError(f"the exact shape of `{name}` is not known: it does not say what it was made from")
+    if "font" in element.about:
+        raise FitError(f"the exact shape of `{name}` is not known: its texts are in a font of their own")
     path = Path(folder, file)
     origin = f"`{name}` was made from `{file}`"
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():

@@ -23,9 +23,9 @@ import numpy.typing as npt
 from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
 
 from scenelang.assets.curves import curves_of
-from scenelang.assets.element import TEXELS, Element, Painted
+from scenelang.assets.element import TEXELS, Element, Facts, Painted
 from scenelang.assets.element_file import load_element_file
-from scenelang.assets.font import FontError
+from scenelang.assets.font import Font, FontError
 from scenelang.assets.picture import frame_of, painted, texels
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
 from scenelang.language import library
@@ -125,7 +125,7 @@ def fit_picture(
     max_error: float | None = None,
     budget_s: float = np.inf,
     steps: int | None = None,
-    about: dict[str, str | float] | None = None,
+    about: Facts | None = None,
     report: Callable[[Coded], None] = lambda coded: None,
 ) -> tuple[Element, list[Coded]]:
     """The smallest texture whose root mean square error, of channels in [0, 1], is at most ``max_error``.
@@ -231,8 +231,8 @@ class Outline:
         notes: tuple[str, ...] = (),
         disc: tuple[tuple[float, float], float] | None = None,
     ) -> None:
-        from scipy.spatial import cKDTree
-
+        with needed("scipy"):
+            from scipy.spatial import cKDTree
         self.notes, self._source = notes, layers
         if not layers or sum(len(layer.edges) for layer in layers) == 0:
             raise FitError("it draws nothing")
@@ -290,7 +290,7 @@ class Outline:
         return result
 
     def surface(self, count: int) -> tuple[Points, Points, float]:
-        """As `Shape.surface`; raises `FitError` where nothing is thick enough to have an outline."""
+        """As `Mesh.surface`; raises `FitError` where nothing is thick enough to have an outline."""
         random, points, normals = np.random.default_rng(1), [], []
         for layer, pieces, _ in self._layers:
             way = _normals(pieces)
@@ -361,6 +361,7 @@ def traced(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
 
 
 MOST_OF_DRAWING: Final = dict.fromkeys((".svg", ".png", ".jpg", ".jpeg"), 10 << 20)  # bytes of a file
+Face = Callable[[str], Font]  # the font of all texts, asked for some letters
 _CURVE: Final = 48  # edges of a curve
 _PAINT: Final = re.compile(r"""url\(\s*['"]?#([^)'"\s]+)['"]?\s*\)[^;"}]*""")  # and what is meant without it
 _OPACITY: Final = re.compile(r"(?<![-\w])opacity\s*:\s*([^;]*)")
@@ -370,12 +371,12 @@ _MOST_SAID: Final = 1_000_000  # letters of its paths, transforms and styles
 _UNSEEN: Final = {"mask": "masks", "marker": "markers", "filter": "filters", "clipPath": "clip paths"}
 
 
-def read_outline(data: bytes, suffix: str) -> Outline:
+def read_outline(data: bytes, suffix: str, face: Face | None = None) -> Outline:
     """A drawing (.svg), or the dark or opaque part of a picture, in the bytes of a file."""
-    return Outline(*(drawn(data) if suffix == ".svg" else traced(data)))
+    return Outline(*(drawn(data, face) if suffix == ".svg" else traced(data)))
 
 
-def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
+def drawn(data: bytes, face: Face | None = None) -> tuple[list[Layer], tuple[str, ...]]:
     """The layers of a drawing in the order of painting, y up, and what there is to say of it."""
     with needed("svgelements"):
         import svgelements
@@ -386,11 +387,14 @@ def drawn(data: bytes) -> tuple[list[Layer], tuple[str, ...]]:
         parsed = [*svgelements.SVG.parse(simple, reify=True).elements()]
         others = {type(e).__name__.lower() for e in parsed} & {"image"}
         layers, left_out, edges = list[Layer](), dict[str, None](), 0
+        texts = [element.text or "" for element in parsed if isinstance(element, svgelements.Text)]
+        letters = "".join(sorted({*" ".join(["", *texts])}))
+        font = None if not texts else face(letters) if face else load_element_file(_LETTERS).font
         for element in parsed:
             if isinstance(element, svgelements.Shape):
                 layers += _layers(element, svgelements)
             elif isinstance(element, svgelements.Text):
-                own = [*_written(element, left_out)]
+                own = [*_written(element, font, face is None, left_out)]
                 edges += sum(len(layer.edges) for layer in own)
                 if edges > MOST_EDGES:
                     raise FitError(f"texts of more than {MOST_EDGES:,} edges")
@@ -535,19 +539,20 @@ def _layers(shape: Any, svg: Any) -> Iterator[Layer]:
 
 
 _SANS: Final = frozenset(("sans-serif", "system-ui", "ui-sans-serif", "inter", "arial", "helvetica"))
+_LETTERS: Final = library.find("std/letters") or ""
 _MOST_WRITTEN: Final = 300  # letters of a text
 _OF_LETTERS: Final = 16  # edges of a curve of a letter
 
 
-def _written(text: Any, left_out: dict[str, None]) -> Iterator[Layer]:
-    """The layer of a text of a drawing, in the font that ships; why there is none goes into ``left_out``."""
+def _written(text: Any, font: Any, sans: bool, left_out: dict[str, None]) -> Iterator[Layer]:
+    """The layer of a text of a drawing, if ``sans`` in a family of these; if none, ``left_out`` says why."""
     words = " ".join((text.text or "").split())
     color = _seen(text.fill, text)
     if not words or color is None or text.values.get("visibility") in ("hidden", "collapse"):
         return
     families = [name.strip(" '\"").lower() for name in (text.font_family or "sans-serif").split(",")]
-    if not _SANS & {*families}:
-        left_out[f"`{families[0][:40]}` is not at hand"] = None
+    if sans and not _SANS & {*families}:
+        left_out[f"`{families[0][:40]}` is not at hand, --font brings it"] = None
         return
     if len(words) > _MOST_WRITTEN:
         left_out[f"more than {_MOST_WRITTEN:,} letters"] = None
@@ -555,9 +560,6 @@ def _written(text: Any, left_out: dict[str, None]) -> Iterator[Layer]:
     if text.values.get("tag") == "tspan" and "x" not in text.values.get("attributes", text.values):
         left_out["a tspan without a place"] = None
         return
-    place = library.find("std/letters")
-    font = load_element_file(place).font if place else None
-    assert font is not None
     try:
         line, width = font.line(words)
     except FontError as error:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isqrt
+from typing import Any
 
 import numpy as np
 
 from scenelang.compiler.graph import Graph, Node, leaves
-from scenelang.compiler.spaces import EXTINCTION, Stage
+from scenelang.compiler.spaces import Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
+from scenelang.drawing.exact.light import sky_light
 from scenelang.drawing.exact.outline import of_curves
 from scenelang.drawing.exact.solid import OPAQUE, TILE, ExactField, facing, seen_along, solid_image, ways
 from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
@@ -35,10 +37,9 @@ def reference_image(
     """
     brought = true_shapes(graph, brought)
     per_side = per_side or isqrt(graph.samples)
-    if graph.stage is not None:
-        return solid_image(
-            graph.root, graph.stage, graph.canvas, per_side=per_side, brought=brought, progress=progress
-        )
+    if (stage := graph.stage) is not None:
+        how: Any = {"per_side": per_side, "brought": brought, "light": sky_light if stage.sky else None}
+        return solid_image(graph.root, stage, graph.canvas, progress=progress, **how)
     width, height = graph.canvas
     colour = np.empty((height, width, 3))
     alpha = np.empty((height, width))
@@ -111,27 +112,21 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
 
 def _covered(field: ExactField, stage: Stage, d: Array) -> Array:
     """Share of the background (M,) that objects hide along unit directions d (3, M)."""
-    _, end, changes = seen_along(field, stage, d)
-    hit = changes.after == OPAQUE
-    end[changes.ray[hit]] = changes.t[hit]
-    covered = (changes.last == OPAQUE).astype(float)
-    ray, enter, leave = changes.media(end)
-    depth = np.bincount(ray, leave - enter, len(end))
-    return 1.0 - (1.0 - covered) * np.exp(-EXTINCTION * depth)
+    view = seen_along(field, stage, d)[1]
+    return 1.0 - (view.last != OPAQUE) * np.exp(-view.total)
 
 
 def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
     """Depth, normal and object (5, M) along unit directions d (3, M)."""
-    o, end, changes = seen_along(field, stage, d)
+    o, view = seen_along(field, stage, d)
+    end = view.end
     forward = np.asarray(stage.camera.axes()[0])
     out = np.zeros((5, len(end)))
     out[2, end < np.inf] = 1.0
-    hit = changes.after == OPAQUE
-    ray = changes.ray[hit]
-    end[ray] = changes.t[hit]
-    inside, enter, leave = changes.media(end)
-    inside, first = np.unique(inside, return_index=True)
-    t = np.minimum((enter[first] + leave[first]) / 2.0, enter[first] + DEEP)
+    ray = np.nonzero(view.last == OPAQUE)[0]
+    inside, first = np.unique(view.ray, return_index=True)
+    enter, leave = view.enter[first], view.leave[first]
+    t = np.minimum((enter + leave) / 2.0, enter + DEEP)
     out[4, inside] = field.at(o[:, inside] + t * d[:, inside]).owner
     p = o[:, ray] + end[ray] * d[:, ray]
     state, out[1:4, ray] = facing(field, p, d[:, ray])

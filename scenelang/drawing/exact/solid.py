@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy.typing as npt
 
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Sky, Stage
 from scenelang.compiler.steps import Affine, Displace, Own, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.exact.field import (
     Array,
@@ -35,6 +36,8 @@ from scenelang.drawing.exact.field import (
 from scenelang.drawing.image import Image, from_light
 from scenelang.language.words import TOKENS
 
+Ints = npt.NDArray[np.int64]
+Kinds = npt.NDArray[np.int32]
 _REACH = 0.15
 _TINY = 1e-300  # added to lengths that something is divided by
 
@@ -140,7 +143,9 @@ class ExactBody:
     ) -> None:
         self.geometry, self.brought = leaf.geometry, brought or {}
         self.look, self.rgb = leaf.look, np.reshape(leaf.look.colour(), (3, 1))
-        self.medium = leaf.look.material == "volumetric"
+        self.sigma = (leaf.look.density or EXTINCTION) if leaf.look.material == "volumetric" else 0.0
+        self.glow = np.reshape(leaf.look.glow, (3, 1))
+        self.medium = 0  # number of its medium in a field
         self.own = [step for step in steps if isinstance(step, Own) and not step.idle]
         self.first, *self.back = way_back(steps)
         self.scale = distance_scale(steps, 3)
@@ -215,7 +220,7 @@ class ExactBody:
 
 
 FAR = 1e9  # distance to what is not there
-OUT, MEDIUM, OPAQUE = range(3)
+OPAQUE, OUT, MEDIUM = range(-1, 2)  # media of other extinctions come after MEDIUM
 
 _MARGIN = 2e-2
 """Balls are this much larger than what they hold, in world units: more than the least step of a ray."""
@@ -226,19 +231,21 @@ class ExactState:
     """State of a fold, and optional values."""
 
     d: Any  # distance (M,)
-    medium: Any  # whether the material is one: a bool, or an array (M,)
+    medium: Any  # number of the medium that the material is, 0 for an opaque one: an int, or an array (M,)
     near: Any = None  # no nearer than this does the kind of material change inside
     rgb: Any = None  # linear colour, (3, 1) or (3, M)
     slope: Any = None  # gradient of d, (3, M)
     owner: Any = None  # number of the object whose material holds, from 1
+    glow: Any = None  # light that it sends of itself, (3, 1) or (3, M)
 
-    def kind(self) -> npt.NDArray[np.int8]:
-        """`OUT`, `MEDIUM` or `OPAQUE`, (M,)."""
-        kind = np.where(self.d < 0.0, np.where(self.medium, MEDIUM, OPAQUE), OUT)
-        return np.asarray(kind, np.int8)
+    def kind(self) -> Kinds:
+        """`OUT`, `OPAQUE` or the number of a medium, (M,)."""
+        kind = np.where(self.d < 0.0, np.where(self.medium, self.medium, OPAQUE), OUT)
+        return np.asarray(kind, np.int32)
 
 
-NOTHING = ExactState(np.float64(FAR), np.False_, np.float64(FAR), np.zeros((3, 1)), np.zeros((3, 1)), 0)
+_ZERO = np.zeros((3, 1))
+NOTHING = ExactState(np.float64(FAR), np.int32(0), np.float64(FAR), _ZERO, _ZERO, 0, _ZERO)
 
 
 def join(op: str, k: float, a: ExactState, b: ExactState) -> ExactState:
@@ -250,11 +257,12 @@ def join(op: str, k: float, a: ExactState, b: ExactState) -> ExactState:
     side = -1.0 if op == "subtract" else 1.0
     slope = None if a.slope is None or b.slope is None else a.slope + (side * b.slope - a.slope) * turn
     if paint is None:
-        return ExactState(d, a.medium, near, a.rgb, slope, a.owner)
+        return ExactState(d, a.medium, near, a.rgb, slope, a.owner, a.glow)
     medium = np.where(paint > 0.5, b.medium, a.medium)
     rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
     owner = None if a.owner is None or b.owner is None else np.where(paint > 0.5, b.owner, a.owner)
-    return ExactState(d, medium, near, rgb, slope, owner)
+    glow = None if a.glow is None or b.glow is None else a.glow + (b.glow - a.glow) * paint
+    return ExactState(d, medium, near, rgb, slope, owner, glow)
 
 
 class ExactField:
@@ -271,12 +279,17 @@ class ExactField:
             ExactBody(leaf, steps, _MARGIN + blends + (deep if blends and taken else 0.0), brought)
             for leaf, steps, taken in result
         ]
-        kinds = {body.medium for body in self.bodies}
-        self.mixed = len(kinds) > 1
-        self.media = True in kinds
+        sigmas = sorted({body.sigma for body in self.bodies})
+        self.mixed = len(sigmas) > 1
+        self.sigma = np.array([0.0, *(sigma for sigma in sigmas if sigma)])  # of media, by number
+        self.media = len(self.sigma) > 1
+        for body in self.bodies:
+            body.medium = int(np.searchsorted(self.sigma, body.sigma))
+        self.rough = np.array([0.0, *(body.look.roughness for body in self.bodies)])  # of owners
+        self.glows = any(body.glow.any() for body in self.bodies)
 
-    def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, npt.NDArray[np.int8], Array]:
-        """Distance, kind (`OUT`, `MEDIUM`, `OPAQUE`) and how far the kind stays the same, (M,) each, at world
+    def probe(self, p: Array, met: Array, speed: Array) -> tuple[Array, Kinds, Array]:
+        """Distance, kind as of `ExactState` and how far the kind stays the same, (M,) each, at world
         points (3, M); ``met`` (N, M) says in which objects' balls they lie, ``speed`` is as `ExactBody.span`
         tells.
         """
@@ -294,7 +307,7 @@ class ExactField:
 
         def known() -> ExactState:
             body, row = next(rows)
-            return ExactState(row, np.bool_(body.medium), abs(row) if self.mixed else None)
+            return ExactState(row, np.int32(body.medium), abs(row) if self.mixed else None)
 
         state = _fold(self.root, known)
         way = abs(state.d)
@@ -309,7 +322,9 @@ class ExactField:
         def known() -> ExactState:
             number, body = next(bodies)
             slope = body.gradient(p) if gradient else None
-            return ExactState(body.distance(p)[0], np.bool_(body.medium), None, body.colour(p), slope, number)
+            glow = body.glow if self.glows else None
+            d, medium = body.distance(p)[0], np.int32(body.medium)
+            return ExactState(d, medium, None, body.colour(p), slope, number, glow)
 
         return _fold(self.root, known)
 
@@ -338,9 +353,6 @@ def _blends(fold: Fold) -> Iterator[float]:
 STEP = 2e-3
 STEPS = 5_000  # of a ray at most
 
-Ints = npt.NDArray[np.int64]
-Kinds = npt.NDArray[np.int8]
-
 
 class Changes(NamedTuple):
     """Changes of material along M rays, up to their end or the first opaque surface."""
@@ -352,17 +364,17 @@ class Changes(NamedTuple):
     before: Kinds
     after: Kinds
 
-    def media(self, end: Array) -> tuple[Ints, Array, Array]:
-        """Stretches in media of rays with ends (M,): ray, entry and exit, in order along each ray."""
+    def media(self, end: Array) -> tuple[Ints, Array, Array, Kinds]:
+        """Stretches in media of rays with ends (M,): ray, entry, exit and kind, in order along each ray."""
 
-        def sorted_(edge: Kinds, kinds: Kinds, at: Array) -> tuple[Ints, Array]:
-            whole, part = np.nonzero(edge == MEDIUM)[0], kinds == MEDIUM
+        def sorted_(edge: Kinds, kinds: Kinds, at: Array) -> tuple[Ints, Array, Kinds]:
+            whole, part = np.nonzero(edge >= MEDIUM)[0], kinds >= MEDIUM
             ray, t = np.concatenate([self.ray[part], whole]), np.concatenate([self.t[part], at[whole]])
             order = np.lexsort((t, ray))
-            return ray[order], t[order]
+            return ray[order], t[order], np.concatenate([kinds[part], edge[whole]])[order]
 
-        ray, enter = sorted_(self.first, self.after, np.zeros_like(end))
-        return ray, enter, sorted_(self.last, self.before, end)[1]
+        ray, enter, kind = sorted_(self.first, self.after, np.zeros_like(end))
+        return ray, enter, sorted_(self.last, self.before, end)[1], kind
 
 
 def march(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = False) -> Changes:
@@ -372,7 +384,7 @@ def march(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = Fa
         spans[:, index] = body.span(o, d)
     leave = np.minimum(leave, end)
     enter = np.where(leave > np.maximum(enter, 0.0), enter, np.inf)
-    first, last = np.full(o.shape[1], OUT, np.int8), np.full(o.shape[1], OUT, np.int8)
+    first, last = np.full((2, o.shape[1]), OUT, np.int32)
     ray = np.nonzero((enter < np.inf).any(0))[0]
     enter, leave = enter[:, ray], np.where(enter < np.inf, leave, -np.inf)[:, ray]
     stop, t = leave.max(0, initial=-np.inf), np.maximum(enter.min(0, initial=np.inf), 0.0)
@@ -422,9 +434,12 @@ TILE = 1 << 15  # samples at a time
 TOLERANCE = 2e-4  # A part of a ray in a medium is halved until its scattered light changes by less
 
 HALVINGS = 9
+SPOTS = 64  # places on a lamp of a radius that a sample of a surface is lit from
+SPOTS_IN_MEDIA = 16
 
 _INSIDE = 1e-7  # how far behind a surface its colour is asked for
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])
+_GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 
 def solid_image(
@@ -435,52 +450,58 @@ def solid_image(
     per_side: int = 2,
     brought: Brought | None = None,
     progress: Callable[[float], None] = lambda _: None,
+    light: Callable[[ExactField, Stage, Array], Array] | None = None,
 ) -> Image:
-    """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too."""
+    """Draw the exact picture of solids, as `reference_image`; `ValueError` for a faulty stage, too.
+
+    ``light`` is `radiance` unless given, or finds light twice by chance: ``noise`` is half the difference.
+    """
     if fault := stage.fault():
         raise ValueError(fault)
     field = ExactField(root, brought)
     width, height = canvas
     step = max(1, TILE // (width * per_side * per_side))
-    picture = np.empty((4, height, width))
+    parts = []
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
-        samples = radiance(field, stage, ways(stage, canvas, rows, per_side))
-        picture[:, top : rows.stop] = samples.reshape(4, len(rows), per_side, width, per_side).mean((2, 4))
+        samples = (light or radiance)(field, stage, ways(stage, canvas, rows, per_side))
+        parts.append(samples.reshape(-1, 4, len(rows), per_side, width, per_side).mean((3, 5)))
         progress(rows.stop / height)
-    return from_light(picture, stage.transparent)
+    found = np.concatenate(parts, 2)
+    image = from_light(found.mean(0), stage.transparent)
+    if len(found) == 2:
+        one, other = (np.asarray(from_light(half, stage.transparent), np.float64) for half in found)
+        image.noise = float(np.sqrt(np.mean((one - other) ** 2))) / 2.0
+    return image
 
 
 def radiance(field: ExactField, stage: Stage, d: Array) -> Array:
-    """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M)."""
+    """Linear light, premultiplied, and alpha (4, M), that comes to the eye along unit directions d (3, M),
+    without what the sky sends.
+    """
     behind = np.zeros((4, d.shape[1]))
     if not stage.transparent:
-        horizon, zenith = np.reshape(stage.horizon, (3, 1)), np.reshape(stage.zenith, (3, 1))
-        behind[:3] = horizon + (zenith - horizon) * np.clip(d[1] / 0.5, 0.0, 1.0)
-        behind[3] = 1.0
-    o, end, changes = seen_along(field, stage, d)
+        behind[:3], behind[3] = heaven(stage, d), 1.0
+    o, view = seen_along(field, stage, d)
     if stage.ground:
-        seen = np.nonzero((end < np.inf) & (changes.last != OPAQUE))[0]
-        p = o[:, seen] + end[seen] * d[:, seen]
+        seen = np.nonzero((view.end < np.inf) & (view.last != OPAQUE))[0]
+        p = o[:, seen] + view.end[seen] * d[:, seen]
         upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
-        shade = np.reshape(stage.ground.rgb, (3, 1)) * _received(field, stage.light, p, upright)
+        shade = np.reshape(stage.ground.rgb, (3, 1)) * _received(field, stage, p, upright)
         clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
         behind[:3, seen] = clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
         behind[3, seen] = 1.0
-    hit = changes.after == OPAQUE
-    seen, end[changes.ray[hit]] = changes.ray[hit], changes.t[hit]
-    p = o[:, seen] + end[seen] * d[:, seen]
+    seen = np.nonzero(view.last == OPAQUE)[0]
+    p = o[:, seen] + view.end[seen] * d[:, seen]
     state, normal = facing(field, p, d[:, seen])
-    behind[:3, seen] = state.rgb * _received(field, stage.light, p, normal)
+    behind[:3, seen] = state.rgb * _received(field, stage, p, normal)
+    if field.glows:
+        behind[:3, seen] += state.glow
     behind[3, seen] = 1.0
     if not field.media:
         return behind
-    ray, enter, leave = changes.media(end)
-    depth = EXTINCTION * (leave - enter)
-    before = np.cumsum(depth) - depth
-    before -= before[np.searchsorted(ray, ray)]  # of the ray's own
-    light = _scattered(field, stage.light, o[:, ray], d[:, ray], enter, depth, np.exp(-before))
-    through = np.exp(-np.bincount(ray, depth, d.shape[1]))
+    ray, through = view.ray, np.exp(-view.total)
+    light = _scattered(field, stage, o[:, ray], d[:, ray], view)
     out = behind * through
     for row, values in zip(out, light, strict=False):
         row += np.bincount(ray, values, d.shape[1])
@@ -488,17 +509,64 @@ def radiance(field: ExactField, stage: Stage, d: Array) -> Array:
     return out
 
 
-def seen_along(field: ExactField, stage: Stage, d: Array) -> tuple[Array, Array, Changes]:
-    """Origins (3, M) of rays along d (3, M), distances to the ground (M,), and materials on the way."""
-    o = np.broadcast_to(np.reshape(stage.camera.eye, (3, 1)), d.shape)
+def heaven(stage: Stage | Sky, d: Array) -> Array:
+    """Colours (3, M) of a sky along unit directions d (3, M), as it is written."""
+    horizon, zenith = np.reshape(stage.horizon, (3, 1)), np.reshape(stage.zenith, (3, 1))
+    return horizon + (zenith - horizon) * np.clip(d[1] / 0.5, 0.0, 1.0)
+
+
+class Sight(NamedTuple):
+    """All that M rays meet up to their first opaque surface or the ground; see `Changes`."""
+
+    end: Array  # how far each ray goes (M,), inf where it escapes, 0 where it starts in something opaque
+    first: Kinds
+    last: Kinds  # `OPAQUE` where it ends at something opaque
+    ray: Ints  # of each stretch in a medium (K,), in order along each ray
+    enter: Array
+    leave: Array
+    sigma: Array  # extinction
+    depth: Array  # optical depth
+    before: Array  # that of the ray before it
+
+    @property
+    def total(self) -> Array:
+        """Optical depths (M,)."""
+        return np.bincount(self.ray, self.depth, len(self.end))
+
+    def flown(self, depth: Array) -> Array:
+        """Places t (M,) where rays have an optical depth (M,) behind them, inf for none."""
+        t, own = np.full(len(depth), np.inf), depth[self.ray] - self.before
+        ends = (own >= 0.0) & (own < self.depth)
+        t[self.ray[ends]] = self.enter[ends] + own[ends] / self.sigma[ends]
+        return t
+
+
+def sight(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = False) -> Sight:
+    """Follow rays as `march`; their ends are changed to where they meet something opaque."""
+    changes = march(field, o, d, end, exact=exact)
+    hit = changes.after == OPAQUE
+    end[changes.ray[hit]] = changes.t[hit]
+    end[changes.first == OPAQUE] = 0.0
+    ray, enter, leave, kind = changes.media(end)
+    sigma = field.sigma[kind]
+    depth = sigma * (leave - enter)
+    before = np.cumsum(depth) - depth
+    before -= before[np.searchsorted(ray, ray)]  # of the ray's own
+    return Sight(end, changes.first, changes.last, ray, enter, leave, sigma, depth, before)
+
+
+def seen_along(field: ExactField, stage: Stage, d: Array, o: Array | None = None) -> tuple[Array, Sight]:
+    """Origins (3, M) of rays along d, the eye's unless given, and what they meet, the ground from above."""
+    eyes = o is None
+    o = np.repeat(np.reshape(stage.camera.eye, (3, 1)), d.shape[1], 1) if o is None else o
     end = np.full(d.shape[1], np.inf)
-    if stage.ground and stage.camera.eye[1] > stage.ground.y:
-        down = np.nonzero(d[1] < 0.0)[0]
-        end[down] = (stage.ground.y - stage.camera.eye[1]) / d[1, down]
-    changes = march(field, o, d, end, exact=True)
-    if (changes.first == OPAQUE).any():
+    if stage.ground:
+        down = np.nonzero((d[1] < 0.0) & (o[1] > stage.ground.y))[0]
+        end[down] = (stage.ground.y - o[1, down]) / d[1, down]
+    view = sight(field, o, d, end, exact=eyes)
+    if eyes and (view.first == OPAQUE).any():
         raise ValueError("the eye is inside an opaque object")
-    return o, end, changes
+    return o, view
 
 
 def ways(stage: Stage, canvas: tuple[int, int], rows: range, per_side: int) -> Array:
@@ -516,48 +584,97 @@ def facing(field: ExactField, p: Array, d: Array) -> tuple[ExactState, Array]:
     return state, np.where((normal * d).sum(0) > 0.0, -normal, normal)
 
 
-def _received(field: ExactField, light: Light, p: Array, normal: Array) -> Array:
+def sideways(axis: Array) -> tuple[Array, Array]:
+    """Two unit vectors (3, M) square to unit vectors and to each other."""
+    side = np.cross(axis, np.where(abs(axis[0]) < 0.6, [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]), axis=0)
+    side /= length(side)
+    return side, np.cross(axis, side, axis=0)
+
+
+def aimed(light: Light, p: Array, share: Any, turn: Any) -> tuple[Array, Array, Array]:
+    """Places (3, M) on a lamp that points p (3, M) see, unit ways there, and by what its power is divided,
+    (M,): r² for a point, inf within the lamp. Ways are even over the solid angle: ``share`` of it lies nearer
+    the middle, ``turn`` is about that. A surface receives the mean of ``power cos / divisor``.
+    """
+    centre = np.reshape(light.position, (3, 1))
+    way = centre - p
+    away = length(way)
+    r = np.maximum(away, NEAREST)
+    axis = way / r
+    if not light.radius:
+        return np.broadcast_to(centre, p.shape), axis, r**2
+    square = np.minimum(light.radius / r, 1.0) ** 2
+    least = np.sqrt(1.0 - square)
+    short = share * square / (1.0 + least)  # 1 - cosine
+    sine2 = short * (2.0 - short)
+    side, up = sideways(axis)
+    across = np.cos(2.0 * np.pi * turn) * side + np.sin(2.0 * np.pi * turn) * up
+    unit = (1.0 - short) * axis + np.sqrt(sine2) * across
+    reach = r * (1.0 - short) - np.sqrt(np.maximum(light.radius**2 - r**2 * sine2, 0.0))
+    return p + reach * unit, unit, np.where(away > light.radius, r**2 * (1.0 + least) / 2.0, np.inf)
+
+
+def _received(field: ExactField, stage: Stage, p: Array, normal: Array) -> Array:
     """Light (3, M) that surfaces of a normal receive, ambient and direct."""
-    way = np.reshape(light.position, (3, 1)) - p
-    r = np.maximum(length(way), NEAREST)
-    direct = light.power * np.maximum((normal * way).sum(0) / r, 0.0) / r**2
-    lit = np.nonzero(direct > 0.0)[0]
-    direct[lit] *= _visible(field, light, p[:, lit] + LIFT * normal[:, lit])
-    return np.reshape(light.rgb, (3, 1)) * direct + AMBIENT[0] + AMBIENT[1] * normal[1]
+    turned = np.arange(p.shape[1]) * _GOLDEN  # so that neighbours err differently
+
+    def cosine(way: Array) -> Array:
+        return np.maximum((normal * way).sum(0), 0.0)
+
+    direct = _direct(field, stage, p, LIFT * normal, cosine, SPOTS, turned)
+    return direct + AMBIENT[0] + AMBIENT[1] * normal[1]
 
 
-def _visible(field: ExactField, light: Light, p: Array) -> Array:
-    """Transmittance (M,) from points to the light."""
-    way = np.reshape(light.position, (3, 1)) - p
-    r = length(way)
-    changes = march(field, p, way / np.maximum(r, 1e-300), r)
-    clear = (changes.last != OPAQUE).astype(np.float64)
-    if not field.media:
-        return clear
-    ray, enter, leave = changes.media(r)
-    return clear * np.exp(-EXTINCTION * np.bincount(ray, leave - enter, len(r)))
-
-
-def _scattered(
-    field: ExactField, light: Light, o: Array, d: Array, enter: Array, depth: Array, weight: Array
+def _direct(
+    field: ExactField, stage: Stage, p: Array, lift: Any, weigh: Any, count: int, turned: Array
 ) -> Array:
-    """Light (3, K) that parts of rays in media from ``enter`` on, of a ``weight`` to the eye, scatter."""
-    opaque = -np.expm1(-depth)
+    """Light (3, M) of all lamps at points p, seen from p + lift, unit ways weighed by ``weigh``.
+
+    Ways to a sphere are ``count``, in pairs across its middle, which is their mean, ``turned`` about it.
+    """
+    total: Any = 0.0
+    for light in stage.lights:
+        spots, sides = (count // 2, (0.0, 0.5)) if light.radius else (1, (0.0,))
+        direct = np.zeros(p.shape[1])
+        for at, side in product(range(spots), sides):
+            to, way, divisor = aimed(light, p, (at + 0.5) / spots, at * _GOLDEN + side + turned)
+            part = light.power * weigh(way) / divisor
+            lit = np.nonzero(part > 0.0)[0]
+            part[lit] *= visible(field, (p + lift)[:, lit], to[:, lit])
+            direct += part / (spots * len(sides))
+        total = total + np.reshape(light.rgb, (3, 1)) * direct
+    return total
+
+
+def visible(field: ExactField, p: Array, to: Array) -> Array:
+    """Transmittance (M,) between points (3, M)."""
+    way = to - p
+    r = length(way)
+    view = sight(field, p, way / np.maximum(r, 1e-300), r)
+    return (view.last != OPAQUE) * np.exp(-view.total)
+
+
+def _scattered(field: ExactField, stage: Stage, o: Array, d: Array, view: Sight) -> Array:
+    """Light (3, K) that stretches of rays in media, o + t d, send and scatter to the eye."""
+    opaque, weight = -np.expm1(-view.depth), np.exp(-view.before)
 
     def part(at: Ints, low: Array, high: Array) -> Array:
         """Gauss-Legendre quadrature over what shares ``low`` to ``high`` of a part's opacity."""
         share = low + (high - low) / 2.0 * _NODES[:, None]
-        t = (enter[at] - np.log1p(-share * opaque[at]) / EXTINCTION).ravel()
+        t = (view.enter[at] - np.log1p(-share * opaque[at]) / view.sigma[at]).ravel()
         p = np.tile(o[:, at], len(_NODES)) + t * np.tile(d[:, at], len(_NODES))
-        r = np.maximum(length(np.reshape(light.position, (3, 1)) - p), NEAREST)
-        direct = light.power / (4.0 * r**2) * _visible(field, light, p)
-        source = field.at(p).rgb * (np.reshape(light.rgb, (3, 1)) * direct + AMBIENT[0])
+        turned = np.tile(at, len(_NODES)) * _GOLDEN
+        arrives = _direct(field, stage, p, 0.0, lambda _: 0.25, SPOTS_IN_MEDIA, turned)
+        state = field.at(p)
+        source = state.rgb * (arrives + AMBIENT[0])
+        if field.glows:
+            source = source + state.glow
         mean = np.einsum("cnk,n->ck", source.reshape(3, len(_NODES), -1), _WEIGHTS)
         return mean * (high - low) / 2.0 * opaque[at] * weight[at]
 
-    at, low = np.arange(len(enter)), np.zeros(len(enter))
+    at, low = np.arange(len(opaque)), np.zeros(len(opaque))
     high = low + 1.0
-    value, total = part(at, low, high), np.zeros((3, len(enter)))
+    value, total = part(at, low, high), np.zeros((3, len(opaque)))
     for left in reversed(range(HALVINGS)):
         middle = (low + high) / 2.0
         halves = part(np.tile(at, 2), np.concatenate([low, middle]), np.concatenate([middle, high]))

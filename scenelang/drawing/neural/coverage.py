@@ -158,7 +158,7 @@ class Coverage:
         self.places = (sample_places(count) - 0.5).astype(np.float32)  # from the centre
         self.near = NEAR + (self.corner - CORNERS[4])
         self.field, self.xp, self.skip = field, field.xp, skip
-        self.prove = prove and field.provable
+        self.prove = prove and field.network.config.state == field.network.config.features == 1
         self._all_draw = bool(field.draws.all())
         self._flat = not field.groups.deepest
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -23,11 +23,8 @@ from scenelang.drawing.neural.meetings import LEVELS
 from scenelang.drawing.neural.network import FramedNetwork
 from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
-
-if TYPE_CHECKING:
-    from scenelang.drawing.solid.march import Work
-
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
@@ -209,17 +206,11 @@ def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, 
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
     else:
-        result = _plane(network, program)  # type: ignore[arg-type]
+        image = draw(network, replace(program, background=None)).image  # type: ignore[arg-type]
+        field = Field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
+        coverage, rows = Coverage(field, prove=False), max(1, TILE // program.canvas[0])
+        bands = [range(program.canvas[1])[top : top + rows] for top in range(0, program.canvas[1], rows)]
+        owners = np.concatenate([coverage.owners(program.canvas, band) for band in bands])
+        result = Outputs(object=owners, alpha=np.asarray(image)[..., 3])
     assert result.object is not None
     return replace(result, object=np.array((0, *program.numbers), np.int32)[result.object])
-
-
-def _plane(network: FramedNetwork, program: Program) -> Outputs:
-    image = draw(network, replace(program, background=None)).image
-    field = Field(network, program.vectors, program.tokens, program.brought())
-    coverage = Coverage(field, prove=False)
-    height, rows = program.canvas[1], max(1, TILE // program.canvas[0])
-    result = [
-        coverage.owners(program.canvas, range(top, min(top + rows, height))) for top in range(0, height, rows)
-    ]
-    return Outputs(object=np.concatenate(result), alpha=np.asarray(image)[..., 3])

@@ -17,18 +17,9 @@ from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, r
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
-from scenelang.drawing.neural.frames import FAR, Frames, Skins, read_skins
+from scenelang.drawing.neural.frames import FAR, Floats, Frames, Skins, read_skins
 from scenelang.drawing.neural.meetings import Interval, Meetings, NestedSlot, Nesting, Shown, nesting, shown
-from scenelang.drawing.neural.network import (
-    EMPTY,
-    EXTENT,
-    RADIUS,
-    Cell,
-    Decoder,
-    Floats,
-    FramedNetwork,
-    Slopes,
-)
+from scenelang.drawing.neural.network import EMPTY, EXTENT, RADIUS, Cell, Decoder, FramedNetwork, Slopes
 from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
@@ -179,9 +170,7 @@ class Field:
         cells = Cell(*(np.asarray(xp.to_numpy(part)) for part in self.network.cell_weights()))
         # The fold of s d and s D is s D', so that the cell's own width is that of any other.
         scale = np.array([BLEND / (width or BLEND) for _, width in kinds], np.float32)
-        shown = [
-            operator if operator == SMOOTH or not width else operator + ROUNDED for operator, width in kinds
-        ]
+        shown = [kind if kind == SMOOTH or not width else kind + ROUNDED for kind, width in kinds]
         lines, bias, candidate, bump = (part[shown].T for part in rounded(cells, self.network.config.state))
         lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
         table = Cell(lines * scale, bias, candidate, bump[0] / scale)
@@ -209,11 +198,6 @@ class Field:
         if self.clear:
             opacity = xp.array(self.opacity, self.like)
             self.colours = xp.concat([self.colours * opacity, opacity[None]], 0)
-
-    @property
-    def provable(self) -> bool:
-        """True where `shown` can fold intervals through the network."""
-        return self.network.config.state == self.network.config.features == 1
 
     @property
     def blended(self) -> bool:

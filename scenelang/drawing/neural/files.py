@@ -92,39 +92,32 @@ def load_levels(name: str, digest: str) -> Mapping[bytes, npt.NDArray[np.float32
     return {code.tobytes(): row for code, row in zip(network.codes, rows, strict=False)}
 
 
-def _sizes(kind: type[Config], config: Any, most: int) -> Config:
+def sizes_of(kind: type[Config], config: Any, size: int) -> Config:
+    """Sizes of a network by the header of a file of ``size`` bytes; raises ModelError where they are bad."""
     sizes = config.get("network") if isinstance(config, dict) else None
     if not isinstance(sizes, dict):
         raise ModelError("no network sizes")
+    most = MOST_SIZE if kind is SolidConfig else MOST_WIDTH
     least = {"segment": 0, "units": 0, "hidden": 0, "answered": 0}
     if any(type(v) is not int or not least.get(name, 1) <= v <= most for name, v in sizes.items()):
         raise ModelError("a network size is out of range")
     try:
-        return kind(**sizes)
+        known = kind(**sizes)
     except TypeError as error:
         raise ModelError(f"bad network sizes: {error}") from None
-
-
-def solid_config(config: Any) -> SolidConfig:
-    """Sizes of a solids' network by its header; raises ModelError where they are none, or out of range."""
-    return _sizes(SolidConfig, config, MOST_SIZE)
-
-
-def framed_config(config: Any, size: int) -> FramedConfig:
-    """Sizes of a network of the plane by the header of a file of ``size`` bytes; raises as `solid_config`."""
-    known = _sizes(FramedConfig, config, MOST_WIDTH)
-    decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
-    rows = known.state + known.paint_lines
-    cell = (known.features + known.state) * rows + known.features * known.state
-    if 4 * max(decoder, cell) > size:
-        raise ModelError("a network larger than its file")
+    if isinstance(known, FramedConfig):
+        decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
+        rows = known.state + known.paint_lines
+        cell = (known.features + known.state) * rows + known.features * known.state
+        if 4 * max(decoder, cell) > size:
+            raise ModelError("a network larger than its file")
     return known
 
 
 def solid_arrays(data: bytes, geometries: int, materials: int) -> SolidArrays:
     """The network in a weights file, if it has so many geometries and materials; else raises ModelError."""
     header, arrays = open_weights(data)
-    config = solid_config(header.get("config"))
+    config = sizes_of(SolidConfig, header.get("config"), len(data))
     check_shapes(arrays, solid_shapes(config, geometries, materials))
     return SolidArrays(config, arrays)
 
@@ -139,7 +132,7 @@ class ArrayModel(NamedTuple):
 def framed_arrays(data: bytes, manifest: Manifest) -> FramedArrays:
     """The network that a weights file holds; raises ModelError where it does not fit the manifest."""
     header, arrays = open_weights(data)
-    config = framed_config(header.get("config", {}), len(data))
+    config = sizes_of(FramedConfig, header.get("config"), len(data))
     check_shapes(arrays, parameter_shapes(config, len(manifest.geometries), len(manifest.materials)))
     return FramedArrays(config, arrays)
 

@@ -6,7 +6,7 @@ learned. Points are one array (d, M).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -231,10 +231,3 @@ def read_skins(parts: Parts) -> Skins | None:
     behind = order.astype(int)
     last = np.where(behind & 1, grow, 0.0).astype(np.float32)
     return Skins(grow - last, shell / 2, last, (behind // 2).astype(np.float32))
-
-
-def way_back(xp: Arrays, steps: Iterable[FrameMap | FrameTurn], p: Point) -> Point:
-    """Points carried through maps and warps in turn."""
-    for step in steps:
-        p = step(xp, p)
-    return p

@@ -25,7 +25,7 @@ from scenelang.compiler.weights import (
     shipped_weights,
 )
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.files import MOST_WIDTH, framed_config, load_levels, load_slopes, solid_config
+from scenelang.drawing.neural.files import MOST_WIDTH, load_levels, load_slopes, sizes_of
 from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
@@ -157,10 +157,8 @@ def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
 
 _Make = Callable[[dict[str, Any], Manifest, int], Network]
 _MAKERS: dict[str, _Make] = {
-    "framed": lambda config, m, size: Framed(
-        framed_config(config, size), len(m.geometries), len(m.materials)
-    ),
-    "solid": lambda config, m, size: Solids(solid_config(config), len(m.geometries), len(m.materials)),
+    "framed": lambda c, m, size: Framed(sizes_of(FramedConfig, c, size), len(m.geometries), len(m.materials)),
+    "solid": lambda c, m, size: Solids(sizes_of(SolidConfig, c, size), len(m.geometries), len(m.materials)),
     "streaming": _streaming,
     "reading": _reading,
 }

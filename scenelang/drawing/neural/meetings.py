@@ -42,9 +42,8 @@ class Pairs:
 
     def take(self, index: npt.NDArray[np.generic]) -> Pairs:
         """Some of the pairs, or all in another order."""
-        return Pairs(
-            self.block[index], self.object[index], self.open[index], self.far[index], self.rate[index]
-        )
+        parts = self.block, self.object, self.open, self.far, self.rate
+        return Pairs(*(part[index] for part in parts))
 
     @classmethod
     def of(cls, block: Index, objects: Index) -> Pairs:
@@ -177,9 +176,8 @@ def nesting(meetings: Meetings, groups: Groups) -> Nesting:
         for at in reversed(number.tolist() if len(columns) else ()):
             if len(some := columns[(kept <= at) & real[columns, at]]):
                 top = real[some, : at + 1].sum(1) * count + some
-                turns.append(
-                    NestedSlot(last_path[some, at], some, top - count, top, np.zeros(len(some), bool))
-                )
+                none = np.zeros(len(some), bool)
+                turns.append(NestedSlot(last_path[some, at], some, top - count, top, none))
 
     for at, part in enumerate(slots):
         n = part.stop - part.start
@@ -318,9 +316,8 @@ class _Gates(NamedTuple):
         high = up[:, 0] * d.high + down[:, 0] * d.low + cell.bias
         low[:, given] = high[:, given] = np.inf
         rest = cell.lines[0], cell.bias[0], cell.candidate[0, 0], cell.bump[0]
-        return cls(
-            low, high, up[:, 1], down[:, 1], *rest, given, None if over is None else over & ~given, slope
-        )
+        over = None if over is None else over & ~given
+        return cls(low, high, up[:, 1], down[:, 1], *rest, given, over, slope)
 
     def some(self, which: slice | Index) -> _Gates:
         """Select some of the operands."""

@@ -41,10 +41,8 @@ from scenelang.language.words import TOKENS as WORDS
 TOKENS = len(WORDS)
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
-EXTENT, LEVEL_NODES = (
-    2.6,
-    161,
-)  # half a side, leaf units, and nodes along it of a grid that corrects a decoder
+EXTENT = 2.6  # leaf units: half a side of a grid that corrects a decoder
+LEVEL_NODES = 161  # along a side of it
 
 
 @dataclass(frozen=True, slots=True)

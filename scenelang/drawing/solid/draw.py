@@ -7,16 +7,19 @@ drawn in bands of pixels, with more samples where they are needed. Letters as in
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenelang.compiler.program import ProgramError
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Camera, Stage
+from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
+from scenelang.drawing.solid.around import ELSEWHERE, arriving, to_ground
 from scenelang.drawing.solid.field import Meeting, SolidField
+from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
 from scenelang.drawing.solid.march import (
     CAREFUL,
     MARCH_SETTINGS,
@@ -26,9 +29,11 @@ from scenelang.drawing.solid.march import (
     Trail,
     Work,
     march,
+    parted,
 )
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.passes import BEGIN, END, INF, Passes
+from scenelang.drawing.solid.passes import INF, Passes
+from scenelang.drawing.solid.soft import ASIDE, BEAMS, WIDE, form, shown
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
@@ -40,11 +45,8 @@ GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surfac
 
 
 CLEAR = 2e-4  # world units before a surface where rays from the light end
-PARTS = 3  # of pieces of which nodes do not tell enough
+THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
-JUMP = 0.03  # linear: of colours that differ
-LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its colour is asked for
-HALVINGS = 8  # of the way between
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 STEEP = 1.2  # how much more light the last node may get than the first
@@ -62,37 +64,58 @@ class Shade(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points (3, K) that light may reach, what they send to the eye without it, and more with it (R, K)."""
+    """K points that lamps may reach: F on surfaces, then those in media."""
 
-    p: Array
-    base: Array
-    more: Array
+    p: Array  # (3, K)
+    n: Array  # (3, F) unit normals
+    base: Array  # (R, K): what they send to the eye without lamps
+    colour: Array  # (R, K): of what reaches them the part that the eye gets
+    coat: Array = None  # (4 + R, F) as of `coated`, or (0, F)
+
+
+class Lamp(NamedTuple):
+    """A lamp where arrays lie."""
+
+    light: Light
+    at: Array  # (3,)
+    power: Array  # (R,)
 
 
 class Lighting:
-    """A field under the light of its stage, drawn at a pace."""
+    """A field under the light of its stage, drawn at a pace.
 
-    def __init__(self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL) -> None:
+    Under a sky ``around`` takes the place of ambient light: ``surface(p, n)`` is what points of surfaces
+    (3, K) with unit normals receive, ``medium(p)`` the mean radiance at points in media, linear, each (3, K)
+    and without what lamps send there.
+    """
+
+    def __init__(
+        self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL, around: Any = None
+    ) -> None:
         if field.edged:  # rays may clip these
             pace = pace._replace(gap=pace.gap / 2)
-        self.field, self.stage, self.xp, self.pace = field, stage, field.xp, pace
+        self.field, self.stage, self.xp, self.pace, self.around = field, stage, field.xp, pace, around
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
         forward, right, up = np.asarray(stage.camera.axes())
         # the samples of a pixel; the sides of pixels, px, are those of a picture that is 2 wide
         four = [across * right + along * up for along in (0.25, -0.25) for across in (-0.25, 0.25)]
-        self.eye, self.lamp, self.power, self.horizon, self.zenith, self._forward, self._four = (
-            field.xp.array(np.asarray(value, np.float32), like)
-            for value in (
-                stage.camera.eye,
-                stage.light.position,
-                [stage.light.power * c for c in stage.light.rgb] * twice,
-                stage.horizon * twice,
-                stage.zenith * twice,
-                forward * np.tan(stage.camera.fov_rad / 2),
-                np.transpose(four)[:, :, None],
-            )
-        )
+
+        def placed(value: object) -> Array:
+            return field.xp.array(np.asarray(value, np.float32), like)
+
+        self.eye, self._four = placed(stage.camera.eye), placed(np.transpose(four)[:, :, None])
+        self.horizon, self.zenith = placed(stage.horizon * twice), placed(stage.zenith * twice)
+        mirrors = field.rough and stage.sky is not None
+        self._bare = placed(np.zeros((4 + 3 * twice if mirrors else 0, 1)))  # coat of what does not mirror
+        self._forward = placed(forward * np.tan(stage.camera.fov_rad / 2))
+        reach = max([light.radius for light in stage.lights], default=0.0)
+        self.opaque = field.opaque((ASIDE + WIDE) * reach) if reach else field
+        self.hazy = field.hazy() if reach else field
+        self.lamps = [
+            Lamp(light, placed(light.position), placed([light.power * c for c in light.rgb] * twice))
+            for light in stage.lights
+        ]
 
     def shade(self, way: Array, px: float = 0.0) -> Shade:
         """Light along rays from the eye, whose unit directions are (3, M). Textures are looked up four times
@@ -114,7 +137,9 @@ class Lighting:
             result.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
         mist = None
         if trail.pieces:
-            pieces = self._cut(way, self._parted(trail))
+            pieces = trail.pieces[0] if self.field.sigma is None else parted(self.field, trail, True)
+            for lamp in self.lamps:
+                pieces = self._cut(way, pieces, lamp)
             mist, share = self._scattering(way, trail, pieces, px)
             result.append(mist)
         if not result:
@@ -127,7 +152,7 @@ class Lighting:
         if mist is not None:
             lit = light[:, len(both) :], free[len(both) :]
             glow, more = self._glow(way, trail, pieces, share, *lit, px)
-            clear = xp.exp(-EXTINCTION * trail.length)
+            clear = xp.exp(-trail.depth)
             seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
         return Shade(seen[:3], seen[-3:], alpha, work)
 
@@ -135,7 +160,7 @@ class Lighting:
         self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array, px: float
     ) -> tuple[Array, Work]:
         """Light (R, M) that pieces of rays in media send towards the eye, by their shares (P,) of what is
-        seen, and what nodes on them send (R, K), where light reaches them if ``free`` (K,).
+        seen, and what nodes on them send (R, K), as the lamps of ``free`` (K,) reach them.
 
         Those whose nodes do not tell how the light goes on between them are cut and asked again.
         """
@@ -148,30 +173,63 @@ class Lighting:
         whole, parts = xp.where(~cut), xp.where(cut)
         xp.add(glow, xp.take(pieces[0], whole), xp.take(sent.sum(1), whole))
         if len(parts):
-            ray, begin, end, before = (xp.take(part, parts) for part in pieces)
-            each = (end - begin) / PARTS
-            finer = [(ray, begin + i * each, begin + (i + 1) * each, before + i * each) for i in range(PARTS)]
+            ray, begin, end, before, sigma = (xp.take(part, parts) for part in pieces)
+            each = (end - begin) / THIRDS
+            finer = [
+                (ray, begin + i * each, begin + (i + 1) * each, before + i * each, sigma)
+                for i in range(THIRDS)
+            ]
             pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
             light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0], trail)
             work += more + Work(met=light.shape[1])
             xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
         return glow, work
 
+    def received(self, p: Array, n: Array) -> Array:
+        """What points on surfaces (3, K) with unit normals receive from lamps (3, K) whose middles they see;
+        bounces blur the shadows.
+        """
+        none = march(self.field, self.eye, p[:, :0], p[0, :0])
+        points = Points(p, n, self._twice(0 * p), self._twice(0 * p + 1))
+        return self._lit(points, p[0, :0], none, False)[0][:3]
+
+    def places(self, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> tuple[Array, Array]:
+        """Points of surfaces and ground, and their normals (3, K), at places of the picture in pixels; points
+        far away where there are none.
+        """
+        xp = self.xp
+        way = xp.array(directions(self.stage.camera, canvas, x, y).reshape(3, -1), self.eye)
+        limit = self.limit(way)
+        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True)
+        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+        p, n = 0 * way + ELSEWHERE, 0 * way
+        for index, result in (
+            (surface, self.surface(xp.take(way, surface), surface, trail) if len(surface) else None),
+            (floor, self._ground(xp.take(way, floor), xp.take(limit, floor)) if len(floor) else None),
+        ):
+            if result is not None:
+                xp.put(p, index, result[0])
+                xp.put(n, index, result[1])
+        return p, n
+
     def limit(self, way: Array) -> Array:
         """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
-        xp, eye, ground, never = self.xp, self.stage.camera.eye, self.stage.ground, 0 * way[0] + INF
-        if ground is None or eye[1] <= ground.y:
-            return never
-        down = way[1] < 0
-        return xp.select(down, (ground.y - eye[1]) / xp.select(down, way[1], way[1] * 0 - 1), never)
+        return to_ground(self.xp, self.stage.ground, self.stage.camera.eye[1], way)
 
-    def _reflecting(self, p: Array, n: Array, colour: Array, haze: Array) -> Points:
-        """Surface points (3, K) with unit normals and colours, and light that joins in before."""
-        to = self.lamp[:, None] - p
-        r = _length(self.xp, to).clip(NEAREST)
-        facing = (_dot(n, to) / r).clip(0.0)
-        base = colour * (AMBIENT[0] + AMBIENT[1] * n[1]) + haze
-        return Points(p + LIFT * n, base, colour * self.power[:, None] * (facing / (r * r)))
+    def _reflecting(
+        self, p: Array, n: Array, colour: Array, haze: Array, coat: Array, mirrors: int = MIRRORS
+    ) -> Points:
+        """Surface points (3, K) with unit normals and colours, light that joins in before, and coats."""
+        ambient = AMBIENT[0] + AMBIENT[1] * n[1]
+        received = ambient if self.around is None else self._twice(self.around.surface(p, n))
+        base = colour * received + haze
+        if len(coat):
+            base = base + reflected(self, p, n, coat, received, mirrors)
+        return Points(p, n, base, colour, coat)
+
+    def _twice(self, light: Array) -> Array:
+        """Light (R, K) on colours and plain colours, of (3, K)."""
+        return light if len(self.horizon) == 3 else self.xp.concat([light, light], 0)
 
     def _scattering(self, way: Array, trail: Trail, pieces: Piece, px: float) -> tuple[Points, Array]:
         """Nodes in media, whose light comes towards the eye, all pieces for each in turn, and shares (P,).
@@ -179,52 +237,110 @@ class Lighting:
         With u = 1 - T^(1 / EVEN), the integral over T sigma dt is one over EVEN (1 - u)^(EVEN - 1) du. Where
         light fades as T does, three nodes are exact.
         """
-        xp, (ray, begin, end, before) = self.xp, pieces
-        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
+        xp, (ray, begin, end, before, sigma) = self.xp, pieces
+        taken = 1 - xp.exp(-sigma / EVEN * (end - begin))
         nodes, weights = (
             xp.array(values[:, None].astype(np.float32), way)
             for values in np.polynomial.legendre.leggauss(self.pace.nodes)
         )
         nodes, weights = (nodes + 1) / 2, weights / 2
         left = 1 - nodes * taken
-        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (nodes, P)
-        weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before))
+        t = (begin - xp.log(left) * (EVEN / sigma)).reshape(-1)  # of (nodes, P)
+        weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-sigma * before))
         rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
-        colour = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register[:-1] * weight.reshape(-1)
+        register = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register
+        colour = register[: self.field.hues] * weight.reshape(-1)
         for index, node, woven in self._textured(way, trail, pieces, px):
             xp.put(colour[:3], index + node * len(ray), woven)
-        r = _length(xp, self.lamp[:, None] - p).clip(NEAREST)
-        points = Points(p, colour * AMBIENT[0], colour * self.power[:, None] / (4 * r * r))
-        return points, weight.sum(0)
+        received = AMBIENT[0] if self.around is None else self._twice(self.around.medium(p))
+        base = colour * received
+        if self.field.glowing:
+            base = base + self._twice(self.field.glow(register) * weight.reshape(-1))
+        return Points(p, way[:, :0], base, colour, self._bare * p[:1, :0]), weight.sum(0)
 
-    def _lit(self, points: Points, soft: Array, seen: Trail) -> tuple[Array, Array, Work]:
-        """Light (3, K) from points (3, K), which of them (K,) the light's own reaches, and what it took. Of
-        the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there; ``seen``
-        is the eye's trail.
+    def _lit(self, points: Points, soft: Array, seen: Trail, wide: bool = True) -> tuple[Array, Array, Work]:
+        """Light (R, K) from points, a number (K,) that tells by which lamps they are reached, and what it
+        took. Of the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there;
+        ``seen`` is the eye's trail. Unless ``wide``, what hides a lamp's middle hides all of it.
         """
-        xp, (p, light, more) = self.xp, points
-        lit = xp.where(abs(more).sum(0) > 0)
-        way = xp.take(p, lit) - self.lamp[:, None]
-        r = _length(xp, way)
-        edge = 0 * p[0]
+        xp, p, light, work = self.xp, points.p, points.base, Work()
+        free, edge = 0 * p[0], 0 * p[0]
         edge[: len(soft)] = soft
-        edge = xp.take(edge, lit) > 0
+        surfaces = points.n.shape[1]
+        normals = xp.concat([points.n, 0 * p[:, surfaces:]], 1)
+        off = p + LIFT * normals
+        for number, lamp in enumerate(self.lamps):
+            more = self._sent(points, lamp)
+            lit = xp.where(abs(more).sum(0) > 0)
+            if lamp.light.radius and wide:
+                clear, took = self._shared(lamp, xp.take(off, lit), xp.take(normals, lit))
+            else:
+                clear, took = self._reached(lamp, xp.take(off, lit), xp.take(edge, lit) > 0, seen)
+            xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
+            xp.put(free, lit, xp.take(free, lit) + (clear > 0) * 2.0**number)
+            work += took
+        return light, free, work
+
+    def _sent(self, points: Points, lamp: Lamp) -> Array:
+        """What points send to the eye (R, K) of a lamp's light if nothing is in its way."""
+        xp, surfaces = self.xp, points.n.shape[1]
+        to = lamp.at[:, None] - points.p
+        r = _length(xp, to).clip(NEAREST)
+        more = points.colour * lamp.power[:, None]
+        near, far, radius = r[:surfaces], r[surfaces:], lamp.light.radius
+        facing = _dot(points.n, to[:, :surfaces]) / near
+        received, over = facing.clip(0.0) / (near * near), 4 * far * far
+        if radius:
+            received, rim = form(xp, facing, near, radius), (1 - (radius / far) ** 2).clip(0.0)
+            over = xp.select(far > radius, 2 * far * far * (1 + xp.sqrt(rim)), 0 * far + INF)
+        more = xp.concat([more[:, :surfaces] * received, more[:, surfaces:] / over], 1)
+        if len(self._bare) and points.coat is not None:
+            some = xp.where(points.coat[0] > 0)
+            p, n, coat = (xp.take(part, some) for part in (points.p, points.n, points.coat))
+            lobe = from_lamp(xp, lamp.at, radius, p, n, coat) * lamp.power[:, None]
+            xp.put(more, some, xp.take(more, some) + lobe)
+        return more
+
+    def _shared(self, lamp: Lamp, p: Array, n: Array) -> tuple[Array, Work]:
+        """As `_reached`, of a lamp of a radius; n (3, K) are normals, 0 in media."""
+        xp, radius = self.xp, lamp.light.radius
+        part, work = shown(self.opaque, lamp.at, radius, p, n)
+        some = xp.where(part > 0)
+        if self.field.media and len(some):
+            p, clear = xp.take(p, some), 0.0
+            for off in BEAMS * radius:
+                start = xp.array(off, p)
+                way = p - (lamp.at + start)[:, None]
+                r = _length(xp, way)
+                way, along = way / r, start @ way / r
+                rim = xp.sqrt(along * along + (radius * radius - start @ start)) - along  # of the lamp
+                trail = march(self.hazy, lamp.at + start, way, r - CLEAR, 0, self.pace.gap, True, start=rim)
+                clear, work = clear + xp.exp(-trail.depth) / len(BEAMS), work + trail.work
+            xp.put(part, some, xp.take(part, some) * clear)
+        return part, work + Work(lights=len(part))
+
+    def _reached(self, lamp: Lamp, p: Array, edge: Array, seen: Trail) -> tuple[Array, Work]:
+        """Parts of a lamp's light (K,) that arrive at points (3, K), and what it took; of ``edge`` as `_lit`
+        of ``soft``.
+        """
+        xp, way = self.xp, p - lamp.at[:, None]
+        r = _length(xp, way)
         limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
-        trail = march(self.field, self.lamp, way / r.clip(1e-9), limit, 0, self.pace.gap, True, steps)
-        clear = (trail.hit == INF) * xp.exp(-EXTINCTION * trail.length)
+        ways, begin = way / r.clip(1e-9), lamp.light.radius
+        trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin)
+        clear = (trail.hit == INF) * xp.exp(-trail.depth)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
         if len(inside):  # rays may have ended before they met what is opaque there
             at = self.field.meet(trail.at(xp, inside), xp.take(r, inside), Wanted.KIND)
             opaque = (at.distance < 0) & (at.register[0] < 0.5)
             xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
-        xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
-        free = 0 * p[0] > 1
-        xp.put(free, lit, clear > 0)
-        return light, free, trail.work + Work(lights=len(lit))
+        return clear, trail.work + Work(lights=len(r))
 
-    def surface(self, way: Array, index: Array, trail: Trail, px: float = 0.0) -> tuple[Array, ...]:
-        """Points where rays meet solids, normals (3, K), colours, and light from before them (R, K)."""
+    def surface(
+        self, way: Array, index: Array, trail: Trail, px: float = 0.0, origin: Array = None
+    ) -> tuple[Array, ...]:
+        """Points where rays meet solids, normals (3, K), colours, light from before them (R, K), coats."""
         xp = self.xp
         t = xp.take(trail.hit, index)
         passes = trail.at(self.xp, index)
@@ -242,16 +358,20 @@ class Lighting:
         g = result.gradient
         towards = _dot(g, way)
         t = t + sharp * (INTO + self._ahead(result, way, None))
-        p = self.eye[:, None] + way * t
+        p = (self.eye[:, None] if origin is None else origin) + way * t
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
-        colour = result.register[:-1]
+        colour = result.register[: self.field.hues]
+        glow = self._twice(self.field.glow(result.register)) if self.field.glowing else 0 * colour
         for soft in (False, True) if px and self.field.textures else ():
             some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
             if len(some):
                 ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
                 mean = self._mean(passes.at(xp, some), ways, ts, ns, soft, px)
                 xp.put(colour[:3], some, mean)
-        return p, n, colour, 0 * colour
+        if not len(self._bare):
+            return p, n, colour, glow, self._bare * p[:1]
+        colour, coat = coated(xp, n, -way, colour, self.field.material(result).roughness)
+        return p, n, colour, glow, coat
 
     def _ahead(self, met: Meeting, way: Array, index: Array | None) -> Array:
         """Distance along rays from the points where the field was asked to the surface."""
@@ -262,74 +382,36 @@ class Lighting:
         # along a surface, at a cosine over -0.02, the distance says nothing of how far ahead it is
         return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
 
-    def _ground(self, way: Array, t: Array) -> tuple[Array, ...]:
+    def _ground(self, way: Array, t: Array, origin: Array = None) -> tuple[Array, ...]:
         """As `surface`, of the ground at t (K,)."""
         xp, ground = self.xp, self.stage.ground
         assert ground is not None
-        p = self.eye[:, None] + way * t
+        horizon = self.horizon[:, None] if origin is None else self._twice(self.around.horizon)
+        p = (self.eye[:, None] if origin is None else origin) + way * t
         n = p * 0
         n[1] = 1.0
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
         rgb = np.tile(np.asarray(ground.rgb, np.float32), len(self.horizon) // 3)
         colour = xp.array(rgb, p)[:, None]
-        return p, n, kept * colour, (1 - kept) * self.horizon[:, None]
+        return p, n, kept * colour, (1 - kept) * horizon, self._bare * p[:1]
 
-    def _parted(self, trail: Trail) -> Piece:
-        """The ways of rays through media, cut where one medium's colour gives way to another's."""
-        xp, field = self.xp, self.field
-        ray, begin, end, before = piece = tuple(
-            xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True)
-        )
-        slots = trail.at(xp, ray).slots
-        several = ((slots[BEGIN] < end) & (slots[END] > begin)).sum(0) > 1
-        some = xp.where(several)
-        if not field.coloured or not len(some):
-            return piece
-        result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
-        ray, begin, end, before = (xp.take(part, some) for part in piece)
-        passes = trail.at(xp, ray)
-        places = [begin + (end - begin) * share for share in LOOKS]
-        seen = [field.meet(passes, t, Wanted.ALL).register[-4:] for t in places]
-        steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
-        which = xp.concat(steps, 0)
-        low, high, first, last = (
-            xp.concat([xp.take(part, step) for part, step in zip(parts, steps, strict=True)], -1)
-            for parts in (places[:-1], places[1:], seen[:-1], seen[1:])
-        )
-        passes = passes.at(xp, which)
-        for _ in range(HALVINGS):
-            half = (low + high) / 2
-            there = field.meet(passes, half, Wanted.ALL).register[-4:]
-            nearer = abs(there - first).sum(0) < abs(there - last).sum(0)
-            low, high = xp.select(nearer, half, low), xp.select(nearer, high, half)
-        start, done = begin, 0
-        for step in steps:  # a ray changes once in each
-            stop, done = low[done : done + len(step)], done + len(step)
-            rays, starts, befores = (xp.take(part, step) for part in (ray, start, before))
-            result.append((rays, starts, stop, befores))
-            start, before = 1 * start, 1 * before
-            xp.put(start, step, stop)
-            xp.put(before, step, befores + stop - starts)
-        result.append((ray, start, end, before))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
-
-    def _cut(self, way: Array, piece: Piece) -> Piece:
-        """The same pieces of rays, cut where the light falls unevenly along them."""
-        xp, (ray, begin, end, before) = self.xp, piece
-        ways, to = xp.take(way, ray), (self.lamp - self.eye)[:, None]
+    def _cut(self, way: Array, piece: Piece, lamp: Lamp) -> Piece:
+        """The same pieces of rays, cut where the light of a lamp falls unevenly along them."""
+        xp, (ray, begin, end, before, sigma) = self.xp, piece
+        ways, to = xp.take(way, ray), (lamp.at - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
         narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
         result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
         wide = xp.where(~narrow)
         if not len(wide):
             return result[0]
-        ray, begin, end, before, ways = (xp.take(part, wide) for part in (*piece, ways))
+        ray, begin, end, before, sigma, ways = (xp.take(part, wide) for part in (*piece, ways))
         middle = _dot(ways, to)
         aside = _length(xp, to - ways * middle).clip(NEAREST)
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
-            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin)))
+            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin, sigma)))
         return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
 
     def _mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
@@ -365,10 +447,10 @@ class Lighting:
         self, way: Array, trail: Trail, pieces: Piece, px: float
     ) -> Iterator[tuple[Array, int, Array]]:
         """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there."""
-        xp, (ray, begin, end, _) = self.xp, pieces
+        xp, (ray, begin, end, _, sigma) = self.xp, pieces
         if not self.field.textures:
             return
-        texels = self.field.textured(trail.at(xp, ray)) * (end - begin).clip(0.0, 1 / EXTINCTION)
+        texels = self.field.textured(trail.at(xp, ray)) * xp.minimum(end - begin, 1 / sigma)
         for some, panels in (((texels > 0) & (texels <= BUSY), FEW), (texels > BUSY, MANY)):
             whole = xp.where(some)
             for start in range(0, len(whole), CHUNK):
@@ -381,7 +463,7 @@ class Lighting:
         """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
         Between nodes the light is a polynomial; it meets colours of many more points, in turn the samples'.
         """
-        xp, (ray, begin, end, before) = self.xp, pieces
+        xp, (ray, begin, end, before, sigma) = self.xp, pieces
         gauss, count = np.polynomial.legendre.leggauss, 2 * panels
         places = ((np.arange(panels)[:, None] + (gauss(2)[0] + 1) / 2) / panels).reshape(-1)
         nodes = (gauss(self.pace.nodes)[0] + 1) / 2
@@ -389,10 +471,10 @@ class Lighting:
             np.prod([(places - other) / (node - other) for other in nodes if other != node], 0)
             for node in nodes
         ]
-        taken = 1 - xp.exp(-EXTINCTION / EVEN * (end - begin))
+        taken = 1 - xp.exp(-sigma / EVEN * (end - begin))
         left = 1 - xp.array(places[:, None].astype(np.float32), way) * taken
-        t = (begin - xp.log(left) * (EVEN / EXTINCTION)).reshape(-1)  # of (places, P)
-        weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-EXTINCTION * before)
+        t = (begin - xp.log(left) * (EVEN / sigma)).reshape(-1)  # of (places, P)
+        weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-sigma * before)
         rays = xp.concat([ray] * count, 0)
         ways = xp.take(way, rays)
         p = self.eye[:, None] + ways * t
@@ -432,6 +514,9 @@ def draw_solids(
     """
     width, height = canvas
     lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
+    if stage.sky is not None:
+        lighting.around = around = arriving(lighting)
+        around.look(canvas, partial(lighting.places, canvas))
     out = np.empty((4, height, width), np.float32)
     rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
@@ -544,7 +629,7 @@ def _alpha(lighting: Lighting, way: Array) -> tuple[Trail, Array]:
     """The trail of rays (3, M) from the eye, and the share of the background that objects hide (M,)."""
     with lighting.xp.inference():
         trail = march(lighting.field, lighting.eye, way, lighting.limit(way))
-        return trail, 1 - (trail.hit == INF) * lighting.xp.exp(-EXTINCTION * trail.length)
+        return trail, 1 - (trail.hit == INF) * lighting.xp.exp(-trail.depth)
 
 
 def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
@@ -558,7 +643,7 @@ def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
         out = xp.concat([depth[None], 0 * way, 0 * alpha[None], alpha[None]], 0)
         ground = xp.where(out[0] < INF)
         out[2, ground] = 1.0
-        for ray, begin, end, before in reversed(trail.pieces):
+        for ray, begin, end, before, *_ in reversed(trail.pieces):
             first = xp.where(before == 0)  # a ray's pieces come in order
             ray, t = xp.take(ray, first), xp.take(xp.minimum((begin + end) / 2, begin + DEEP), first)
             out[4, ray] = field.meet(trail.at(xp, ray), t, Wanted.KIND, owners=True).owner

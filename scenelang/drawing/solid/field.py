@@ -29,6 +29,7 @@ from scenelang.compiler.groups import (
 )
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
+from scenelang.compiler.spaces import EXTINCTION
 from scenelang.drawing.arrays import Array, Arrays, Smooth
 from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
@@ -131,6 +132,7 @@ class Stacks:
         return stack
 
 
+AWAY = 50.0  # leaf units by which objects are moved that are not to be met
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
 
 
@@ -147,6 +149,16 @@ class Meeting(NamedTuple):
     met: int = 0  # pairs of points and objects that met
 
 
+class Material(NamedTuple):
+    """A material at points (M,); colours are linear."""
+
+    colour: Array  # (3, M)
+    medium: Array  # a mask
+    glow: Array  # (3, M)
+    density: Array  # extinction per world unit, where it is a medium
+    roughness: Array  # of what is glossy, minus it of metal, 0 of others
+
+
 class SolidPairs(NamedTuple):
     """Points of M rays and the objects that they meet: P pairs."""
 
@@ -156,8 +168,9 @@ class SolidPairs(NamedTuple):
     rays: Array  # (P,), place by place
     objects: Array  # their numbers (P,)
     at: Array  # where the rays begin behind the objects' maps (3, P)
-    way: Array  # how that changes along the rays (3, P)
+    way: Array  # how that changes along the rays (3, P); None where they are points
     depth: int = 1  # how many states a point has
+    far: bool = False  # whether points may be farther from leaves than the decoder sees
 
 
 @dataclass(slots=True)
@@ -175,7 +188,7 @@ class SolidField:
 
     Of rows of vectors (N, 64) and tokens (N,), ``brought`` and ``paints`` are elements and textures, None
     where a row has the geometry or the colour of its vector. Raises `ProgramError` where a vector holds no
-    way to a leaf, or an element is damaged.
+    way to a leaf, or an element is damaged. Distances hold up to ``reach`` around objects, at least.
     """
 
     def __init__(
@@ -185,19 +198,22 @@ class SolidField:
         tokens: np.ndarray,
         brought: Sequence[Element | None] | None = None,
         paints: Sequence[Paint | None] | None = None,
+        reach: float = 0.0,
     ) -> None:
-        self.network, self.xp, self.tree = network, network.xp, read_groups(tokens)
+        self.network, self.xp, self.tree, self.reach = network, network.xp, read_groups(tokens), reach
+        self.rows, self.paints = (vectors, tokens, brought), paints
         none = [None] * len(vectors)
         parts = network.layout.unpack(vectors)
         widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
         self.stacks = Stacks(self.xp, self.tree, network.codes) if self.tree.deepest else None
         with self.xp.inference():
-            self.solids = read_solids(network, vectors, self.tree, widths)
+            self.solids = read_solids(network, vectors, self.tree, widths, reach)
             self._tables(parts)
             self._cells(widths)
             self._textures(parts.texture, paints or none)
             self._decoders(parts.code, brought or none)
             self._alone()
+            self._properties(parts)
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         drawn = np.array([solid.draws for solid in self.solids], bool)
         self.edged = any(not isinstance(own, GridShape) and network.edged(own) for own in self.decoders)
@@ -205,7 +221,8 @@ class SolidField:
         self.media = bool(kinds.any())  # whether some object is a medium
         self.mixed = self.media and not kinds.all()  # whether some are and some are not
         # whether media have different colours
-        self.coloured = self.media and np.ptp(self.xp.to_numpy(self.looks)[-4:-1, kinds], 1).max() > 0
+        hues = self.xp.to_numpy(self.looks)[self.hues - 3 : self.hues, kinds]
+        self.coloured = self.media and np.ptp(hues, 1).max() > 0
         self.adding: Array | None = None  # (N,), 1 for objects of groups that neither draw nor take away
         if (groups := self.tree).deepest:
             there = groups.path >= 0
@@ -275,6 +292,38 @@ class SolidField:
             tags = (0.4 + 0.6 * (TAGS * (np.arange(len(paints)) + 1) % 1.0)).astype(np.float32)
             plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
             self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
+
+    def _properties(self, parts: Parts) -> None:
+        """Build what materials have beside colours: rows of the register where a scene writes them."""
+        xp, looks = self.xp, self.looks
+        self.hues = len(looks) - 1  # rows of colours, and plain ones in place of textures'
+        glow, density, roughness = (part.T for part in (parts.glow, parts.density, parts.roughness))
+        density = np.where(density > 0, density, np.float32(EXTINCTION))
+        drawn = np.array([solid.draws for solid in self.solids], bool)
+        media = (np.asarray(xp.to_numpy(looks))[-1] > 0.5) & drawn
+        there = np.unique(density[media])
+        # the extinction of media, None where they differ; and that of each object (N,)
+        self.sigma = None if len(there) > 1 else float(there[0]) if len(there) else EXTINCTION
+        self.density = xp.array(density, looks)
+        self.glowing, self.rough = bool(glow.any()), bool(roughness.any())
+        switched = [density] * (self.sigma is None) + [roughness] * self.rough
+        if rows := [*(glow if self.glowing else ()), *switched]:
+            self.looks = xp.concat([looks[:-1], xp.array(np.array(rows, np.float32), looks), looks[-1:]], 0)
+        self.switched = 1 + len(switched)  # rows that come with the kind of material
+
+    def glow(self, register: Array) -> Array:
+        """The light (3, M) that materials of registers (R, M) give off, linear."""
+        return register[self.hues : self.hues + 3] if self.glowing else 0 * register[:3]
+
+    def extinction(self, register: Array) -> Array:
+        """The extinction (M,) of media with registers (R, M), per world unit."""
+        return 0 * register[0] + self.sigma if self.sigma else register[-self.switched]
+
+    def material(self, met: Meeting) -> Material:
+        """The material at points that were asked for all (`Wanted.ALL`), as it holds wherever D < 0."""
+        register = met.register
+        parts = self.glow(register), self.extinction(register), register[-2] * self.rough
+        return Material(register[:3], register[-1] > 0.5, *parts)
 
     def _decoders(self, codes: np.ndarray, brought: Sequence[Element | None]) -> None:
         """Build the decoders of distances, and each object's index among them."""
@@ -363,9 +412,20 @@ class SolidField:
 
     def normals(self, objects: Array, p: Array) -> Array:
         """Gradients (3, P) of objects' own distances at points p (3, P)."""
-        return self._distances(*self._local(self._behind(objects, p), objects), objects, True)[1]
+        return self._distances(*self._local(self.behind(objects, p), objects), objects, True)[1]
 
-    def _behind(self, objects: Array, p: Array) -> Array:
+    def own(self, objects: Array, at: Array) -> Array:
+        """World distances (P,) from objects alone at points (3, P) behind their maps."""
+        return self._distances(*self._local(at, objects), objects, False)[0]
+
+    def before(self, objects: Array, at: Array) -> Array:
+        """World points (3, P) that objects' maps carry to points (3, P)."""
+        xp = self.xp
+        linear = np.moveaxis(np.asarray(xp.to_numpy(self.linear), np.float64), -1, 0)
+        back = xp.array(np.moveaxis(np.linalg.inv(linear), 0, -1).astype(np.float32), self.network.codes)
+        return (xp.take(back, objects) * (at - xp.take(self.shift, objects))).sum(1)
+
+    def behind(self, objects: Array, p: Array) -> Array:
         """World points (3, P) behind the objects' maps."""
         xp = self.xp
         return (xp.take(self.linear, objects) * p).sum(1) + xp.take(self.shift, objects)
@@ -394,7 +454,12 @@ class SolidField:
         return q, own
 
     def _distances(
-        self, q: Array, own: list[tuple[SolidFrame, Array, Array]], objects: Array, gradient: bool
+        self,
+        q: Array,
+        own: list[tuple[SolidFrame, Array, Array]],
+        objects: Array,
+        gradient: bool,
+        far: bool = False,
     ) -> tuple[Array, Array]:
         """World distances (P,) at leaf coordinates, as `_local` has them; gradients (3, P) if asked."""
         xp, bulge = self.xp, None
@@ -403,7 +468,7 @@ class SolidField:
         skin = None
         if self.skins is not None:
             skin = Skins(*(xp.take(part, objects) for part in self.skins))
-        d, g = self._leaf(q, partial(self._decoded, objects=objects), self.far, bulge, skin, gradient)
+        d, g = self._leaf(q, partial(self._decoded, objects=objects), far or self.far, bulge, skin, gradient)
         scale = xp.take(self.scale, objects)
         if not gradient:
             return d * scale, g
@@ -477,10 +542,52 @@ class SolidField:
             return decoder.field(q, gradient)
         return self.network.field(q, decoder, gradient)
 
-    def passes(self, origin: Array, way: Array, limit: Array, tight: bool = True) -> tuple[Array, Passes]:
+    def passes(
+        self, origin: Array, way: Array, limit: Array, tight: bool = True, *more: Any
+    ) -> tuple[Array, Passes]:
         """As `find_passes`, of unit directions way (3, M)."""
-        origins = (self.linear * origin[:, None]).sum(1) + self.shift
-        return find_passes(self.xp, self.solids, origin, origins, way, limit, tight)
+        origins = origin if origin.ndim == 2 else (self.linear * origin[:, None]).sum(1) + self.shift
+        return find_passes(self.xp, self.solids, origin, origins, way, limit, tight, *more)
+
+    def begun(self, passes: Passes, objects: Array, rays: Array) -> Array:
+        """Where rays, by their numbers (P,), begin behind the maps of objects (P,)."""
+        if passes.many:
+            return self.behind(objects, self.xp.take(passes.origins, rays))
+        return self.xp.take(passes.origins, objects)
+
+    def opaque(self, reach: float) -> SolidField:
+        """The field of what is opaque alone, with distances up to a reach around it.
+
+        A later medium takes away what is opaque before it. In a group that is not of media alone, one that
+        comes first is moved away.
+        """
+        vectors, tokens, brought = self.rows
+        if self.media:
+            medium = np.asarray(self.xp.to_numpy(self.looks))[-1] > 0.5
+            vectors, tokens, tree = vectors.copy(), tokens.copy(), self.tree
+            whole = [bool(medium[(tree.path == group).any(1)].all()) for group in range(len(tree.joins))]
+            for row in np.flatnonzero(medium).tolist():
+                groups = [whole[group] for group in tree.path[row].tolist() if group >= 0]
+                begins = bool(tree.first[row])
+                if sum(groups) > begins * groups[-1:].count(True):
+                    continue  # in a group of media, which goes as one
+                if (begins and not groups[-1]) or not row:
+                    vectors[row, self.network.layout.places.frame][3::4] += AWAY
+                elif tokens[row] & OPERATOR <= SMOOTH:
+                    tokens[row] = tokens[row] & ~OPERATOR | SUBTRACT
+                    vectors[row, self.network.layout.places.width] = 0.0
+        result = SolidField(self.network, vectors, tokens, brought, None, reach)
+        result.media = result.mixed = False  # nobody asks for kinds
+        return result
+
+    def hazy(self) -> SolidField:
+        """The field of what is not opaque alone, where all is joined by plain unions; elsewhere itself."""
+        vectors, tokens, brought = self.rows
+        if not self.mixed or self.tree.deepest or (self.tree.tokens != UNION).any():
+            return self
+        medium = np.asarray(self.xp.to_numpy(self.looks))[-1] > 0.5
+        kept = [brought[i] for i in np.flatnonzero(medium).tolist()] if brought else None
+        return SolidField(self.network, vectors[medium], tokens[medium], kept)
 
     def meet(
         self,
@@ -499,14 +606,14 @@ class SolidField:
         """
         xp, count = self.xp, len(t)
         pairs = self.pairs(passes, t) if isinstance(passes, Passes) else passes
-        steps, rays, objects, at, way, depth = pairs
+        steps, rays, objects, at, way, depth, far = pairs
         size = depth * count
         if p is None:
-            at = way * xp.take(t, rays) + at
+            at = at if way is None else way * xp.take(t, rays) + at
         else:
-            at = self._behind(objects, xp.take(p, rays))
+            at = self.behind(objects, xp.take(p, rays))
         q, own_points = self._local(at, objects)
-        d, own = self._distances(q, own_points, objects, gradient)
+        d, own = self._distances(q, own_points, objects, gradient, far)
         looks = self._looks(q, objects) if wanted == Wanted.ALL and self.textures else None
         states = States(
             memory=xp.full(((1, 2, 1 + len(self.looks))[wanted], size), 0.0, t),
@@ -570,7 +677,7 @@ class SolidField:
         depth = 1
         if most > 1 and self.stacks is not None:
             steps, depth = self.stacks.followed(places, rays, objects, every)
-        return SolidPairs(steps, rays, objects, xp.take(passes.origins, objects), pairs[WAY], depth)
+        return SolidPairs(steps, rays, objects, self.begun(passes, objects, rays), pairs[WAY], depth)
 
     def _close(self, states: States, closing: SolidClosing, wanted: Wanted) -> None:
         """Let groups end: what they come to goes into the states that they stand in, and theirs are empty."""
@@ -595,7 +702,7 @@ class SolidField:
         before = _part(xp, states.memory, index)
         if states.owner is not None:  # behind a register of 0, a look of 1 shows where its gate is open
             before, look = xp.concat([before[:1], 0 * before[1:]], 0), 0 * look + 1
-        after, take = self.network.join(near, before, look, cell, wanted)
+        after, take = self.network.join(near, before, look, cell, wanted, self.switched)
         if states.owner is not None:
             held = xp.select(after[-1] > 0.5, operand.owner, _part(xp, states.owner, index))
             states.owner = _update(xp, states.owner, index, held)

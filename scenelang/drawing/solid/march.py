@@ -12,13 +12,14 @@ affine maps, joined by unions and beyond the reach of blends, whose balls are ap
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, field
+from itertools import pairwise
 from operator import add
 from typing import NamedTuple
 
 import numpy as np
 
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.solid.field import SolidField, SolidPairs
+from scenelang.drawing.solid.field import Meeting, SolidField, SolidPairs
 from scenelang.drawing.solid.network import Wanted, folded
 from scenelang.drawing.solid.passes import BEGIN, END, INF, OBJECT, RATE, WAY, Passes, placed
 
@@ -38,7 +39,9 @@ SMALL = 2000  # rays are too few for two batches
 WAIT = 4  # times as many are under way as wait to join them at most
 
 
-Piece = tuple[Array, ...]  # of ways in media: index of the ray, begin, end, length before it, each (P,)
+# of ways in media: index of the ray, begin, end, length before it, and behind `parted` extinction, each (P,);
+# the length before is then that of media of this extinction
+Piece = tuple[Array, ...]
 
 
 @dataclass(slots=True)
@@ -66,6 +69,7 @@ class Trail:
     soft: Array  # (M,) 1 where a surface ends a medium, 0 elsewhere: the distance is not 0 there
     place: Array  # (M,) of rays in `passes`, -1 where they pass none
     passes: Passes
+    depth: Array  # (M,) optical depth of those media
     pieces: list[Piece] = field(default_factory=list)
     work: Work = field(default_factory=Work)
 
@@ -93,7 +97,9 @@ class _Batch:
 class Rays:
     """Rays under way: those that meet one object alone, side by side by its group, and the others."""
 
-    def __init__(self, solids: SolidField, trail: Trail, ids: Array, passes: Passes, gap: float) -> None:
+    def __init__(
+        self, solids: SolidField, trail: Trail, ids: Array, passes: Passes, gap: float, more: Array = None
+    ) -> None:
         self.solids, self.xp, self.trail, self.gap = solids, solids.xp, trail, gap
         self.ids, self.passes = ids, passes
         self.never = self.xp.full((), INF, passes.slots)
@@ -101,6 +107,8 @@ class Rays:
         self.struck: list[tuple[Array, Array, Array]] = []
         self.ended: list[tuple[Array, Array]] = []  # in media, where something opaque is
         rows = self.xp.full((MISTY if solids.media else STATE, len(ids)), 0.0, passes.slots)
+        if more is not None:  # that rays carry along
+            rows = self.xp.concat([rows, more], 0)
         rows[T] = rows[UNTIL] = -1.0  # before everything
         rows[LAST] = self.xp.largest(passes.slots[END])[0]
         self.between: list[tuple[Array, Array]] = []  # rays on their way from some objects to others
@@ -197,7 +205,8 @@ class Rays:
         group = xp.take(solids.group, objects)
         alone = (inside.sum(0) == 1) & (group >= 0)
         rows[GROUP] = xp.select(alone, group, 0 * t + solids.groups)
-        rows[FROM], rows[ALONG] = xp.take(passes.origins, objects), (inside * slots[WAY]).sum(1)
+        rows[FROM] = solids.begun(passes, objects, xp.where(t == t) if passes.many else t)
+        rows[ALONG] = (inside * slots[WAY]).sum(1)
         rows[SCALE] = xp.take(solids.factor, objects)
         if solids.media:
             rows[DENSE] = xp.take(solids.looks[-1], objects)
@@ -222,18 +231,26 @@ class Rays:
             groups = np.asarray(xp.to_numpy(batch.rows[GROUP]))
             batch.bounds = np.searchsorted(groups, np.arange(self.solids.groups + 1)).tolist()
 
-    def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
-        """Masks of points at t (n,) inside media and inside opaque solids, and how far both hold."""
+    def _meet(self, batch: _Batch, t: Array) -> Meeting:
+        """Let points at t (n,) meet the objects."""
         solids, rows = self.solids, batch.rows
         self.trail.work.steps += len(t)
         if batch.pairs is None:
-            self.trail.work.met += len(t)
             d = solids.decoded(rows[FROM] + rows[ALONG] * t, batch.bounds) * rows[SCALE]
-            free, dense = abs(d), rows[DENSE] > 0.5 if solids.mixed else None
+            result = Meeting(d, d[None][:0], met=len(t))
         else:
             result = solids.meet(batch.pairs, t, self.wanted, change=solids.mixed)
-            self.trail.work.met += result.met
-            d, free, dense = result.distance, abs(result.distance), None
+        self.trail.work.met += result.met
+        return result
+
+    def _ask(self, batch: _Batch, t: Array) -> tuple[Array, Array, Array]:
+        """Masks of points at t (n,) inside media and inside opaque solids, and how far both hold."""
+        solids, rows = self.solids, batch.rows
+        result = self._meet(batch, t)
+        d, free, dense = result.distance, abs(result.distance), None
+        if batch.pairs is None:
+            dense = rows[DENSE] > 0.5 if solids.mixed else None
+        else:
             if solids.mixed:
                 dense = result.register[0] > 0.5
                 free = self.xp.select((d < 0) & dense, result.change, free)
@@ -259,13 +276,20 @@ class Rays:
         # free (t - PAST) / (FREE - free). 5 % more puts the point behind the surface, so that the ray ends.
         hope = (1.05 * free) * (t - rows[PAST]) / (rows[FREE] - free).clip(1e-12) + TOUCH
         following = t + xp.minimum(xp.maximum(hope, safe), safe + self.gap)
-        alive = alive & ~done
-        over = (following > rows[UNTIL]) & alive
         lasting = rows[UNTIL] < rows[LAST]
         if self.solids.media:
             lasting = lasting | within
             rows[WITHIN] = within
-        rows[PAST], rows[FREE], rows[T] = t, free, following
+        rows[FREE] = free
+        self._go(batch, following, alive & ~done, lasting)
+
+    def _go(self, batch: _Batch, following: Array, alive: Array, lasting: Array) -> None:
+        """Move those rays (n,) of a batch on that are still alive; where they meet other objects, if they are
+        lasting, they are between batches.
+        """
+        xp, rows = self.xp, batch.rows
+        over = (following > rows[UNTIL]) & alive
+        rows[PAST], rows[T] = rows[T], following
         crossing = xp.where(over & lasting)
         if len(crossing):
             row = xp.take(rows, crossing)
@@ -335,13 +359,13 @@ def _enough(waiting: int, under_way: int) -> bool:
     return waiting > under_way / WAIT + FEW if under_way else waiting > 0
 
 
-def known(solids: SolidField, passes: Passes) -> Array:
-    """A mask (M,) of rays that the network answers for."""
+def known(solids: SolidField, passes: Passes, start: Array) -> Array:
+    """A mask (M,) of rays from a ``start`` (M,) that the network answers for."""
     xp, begin, end = solids.xp, passes.slots[BEGIN], passes.slots[END]
     objects = xp.whole(passes.slots[OBJECT]).clip(0)
     asked = xp.take(solids.asked, objects.reshape(-1)).reshape(objects.shape)
     # where the light is in a ball, both halves of the ray would have to be asked for
-    held = (asked > 0) & (begin > 0) & (passes.slots[OBJECT] >= 0)
+    held = (asked > 0) & (begin > start) & (passes.slots[OBJECT] >= 0)
     fits = (held | (begin == INF)).sum(0) == len(begin)
     for slot in range(1, len(begin)):
         fits = fits & (((begin[slot] < end[:slot]) & (begin[:slot] < end[slot])).sum(0) == 0)
@@ -349,13 +373,13 @@ def known(solids: SolidField, passes: Passes) -> Array:
 
 
 def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
-    """World units that `known` rays (M,) are in media, and how many objects they were asked of."""
+    """Optical depths of media on `known` rays (M,), and how many objects they were asked of."""
     xp, slots = solids.xp, passes.slots
     flat = xp.where((slots[BEGIN] < INF).reshape(-1))
     pairs = xp.take(slots.reshape(len(slots), -1), flat)
     objects, way, end = xp.whole(pairs[OBJECT]), pairs[WAY], pairs[END]
     speed = xp.sqrt((way * way).sum(0))
-    q = xp.take(passes.origins, objects) + way * end
+    q = solids.begun(passes, objects, flat % slots.shape[2]) + way * end
     result, which = 0 * end, xp.take(solids.decoder, objects)
     for i, layers in enumerate(solids.segments):
         some = xp.where(which == i)
@@ -363,9 +387,82 @@ def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
             x = folded(xp, xp.take(q, some), xp.take(way, some) / -xp.take(speed, some))
             xp.put(result, some, solids.network.field(x, layers, False)[0])
     result = xp.minimum(result.clip(0.0) / speed, end - pairs[BEGIN])
+    if solids.sigma is None:
+        result = result * xp.take(solids.density, objects)
     each = 0 * slots[OBJECT].reshape(-1)
     xp.put(each, flat, result)
-    return each.reshape(slots.shape[1:]).sum(0), len(flat)
+    return each.reshape(slots.shape[1:]).sum(0) * (solids.sigma or 1.0), len(flat)
+
+
+LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its material is asked for
+JUMP = 0.03  # of materials that differ: linear colours, or extinction
+BETWEEN = 8  # halvings of the way between
+
+
+def parted(solids: SolidField, trail: Trail, coloured: bool) -> Piece:
+    """The ways of rays through media, cut where one medium's density, or colour if ``coloured``, gives way to
+    another's.
+    """
+    xp, hues = solids.xp, solids.hues
+    ray, begin, end, before = (xp.concat(parts, 0) for parts in zip(*trail.pieces, strict=True))
+    slots, dense = trail.at(xp, ray).slots, solids.sigma is None
+    inside = (slots[BEGIN] < end) & (slots[END] > begin)
+    objects = xp.whole((inside * slots[OBJECT]).sum(0)).clip(0, len(solids.solids) - 1)
+    piece = ray, begin, end, before, xp.take(solids.density, objects) if dense else 0 * end + solids.sigma
+    several = inside.sum(0) > 1
+    some, coloured = xp.where(several), coloured and solids.coloured
+    if (coloured or dense) and len(some):
+
+        def material(passes: Passes, t: Array) -> Array:
+            register = solids.meet(passes, t, Wanted.ALL).register
+            colours = [register[hues - 3 : hues]] if coloured else []
+            return xp.concat([*colours, solids.extinction(register)[None], register[-1:]], 0)
+
+        result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
+        ray, begin, end, before, _ = (xp.take(part, some) for part in piece)
+        passes = trail.at(xp, ray)
+        places = [begin + (end - begin) * share for share in LOOKS]
+        seen = [material(passes, t) for t in places]
+        steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
+        which = xp.concat(steps, 0)
+        low, high, first, last = (
+            xp.concat([xp.take(part, step) for part, step in zip(parts, steps, strict=True)], -1)
+            for parts in (places[:-1], places[1:], seen[:-1], seen[1:])
+        )
+        passes = passes.at(xp, which)
+        for _ in range(BETWEEN):
+            half = (low + high) / 2
+            there = material(passes, half)
+            nearer = abs(there - first).sum(0) < abs(there - last).sum(0)
+            low, high = xp.select(nearer, half, low), xp.select(nearer, high, half)
+        start, done = begin, 0
+        for step, at in zip(steps, seen, strict=False):  # a ray changes once in each
+            stop, done = low[done : done + len(step)], done + len(step)
+            rays, starts, befores, sigma = (xp.take(part, step) for part in (ray, start, before, at[-2]))
+            result.append((rays, starts, stop, befores, sigma))
+            start, before = 1 * start, 1 * before
+            xp.put(start, step, stop)
+            xp.put(before, step, befores + stop - starts)
+        result.append((ray, start, end, before, seen[-1][-2]))
+        piece = tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
+    return _stacked(xp, piece, trail.depth) if dense else piece
+
+
+def _stacked(xp: Arrays, piece: Piece, depth: Array) -> Piece:
+    """Pieces of media of several densities, in order, with the right lengths before them; their optical
+    depths are added to those of the rays (M,).
+    """
+    order = xp.order(piece[1])
+    order = xp.take(order, xp.order(xp.take(piece[0], order)))
+    ray, begin, end, _, sigma = (xp.take(part, order) for part in piece)
+    own = sigma * (end - begin)
+    total = xp.wide(own).cumsum(0) - own
+    first = xp.where(xp.concat([ray[:1] >= 0, ray[1:] != ray[:-1]], 0))
+    base = xp.wide(0 * depth)
+    xp.put(base, xp.take(ray, first), xp.take(total, first))
+    before = xp.narrow(total - xp.take(base, ray))
+    xp.add(depth[None], ray, own[None])
+    return ray, begin, end, before / sigma, sigma
 
 
 HALVINGS = 16  # of the interval in which a medium gives way to a solid
@@ -396,8 +493,10 @@ def march(
     gap: float = CAREFUL.gap,
     whole: bool = False,
     steps: int = STEPS,
+    start: Array | float = 0.0,
 ) -> Trail:
-    """Follow rays from an origin (3,) along unit directions (3, M) up to a limit (M,), in ``steps`` at most.
+    """Follow rays from an origin (3,), or one each (3, M), along unit directions (3, M), from ``start`` (M,)
+    up to a limit (M,), in ``steps`` at most.
 
     ``halvings`` of the interval find where a medium gives way to a solid; ``gap`` is that of
     `MarchSettings`. If ``whole``, nobody asks where media begin and end, so that the network for segments may
@@ -405,16 +504,20 @@ def march(
     """
     xp = solids.xp
     hit, length, soft = (xp.full((way.shape[1],), value, way) for value in (INF, 0.0, 0.0))
-    ids, passes = solids.passes(origin, way, limit, tight=not (whole and solids.answered))
-    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes)
+    ids, passes = solids.passes(origin, way, limit, not (whole and solids.answered), start)
+    trail = Trail(hit, length, soft, placed(xp, ids, xp.whole(length)), passes, 0 * length)
     trail.work.near = len(ids)
     if whole and solids.answered and len(ids):
-        sure = known(solids, passes)
+        sure = known(solids, passes, xp.take(0 * limit + start, ids))
         some, rest = xp.where(sure), xp.where(~sure)
         if len(some):
             answers, trail.work.met = lengths(solids, passes.at(xp, some))
-            xp.put(length, xp.take(ids, some), answers)
+            xp.put(trail.depth, xp.take(ids, some), answers)
         ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):
         Rays(solids, trail, ids, passes, gap).run(halvings, steps)
+    if trail.pieces and solids.sigma is None:
+        trail.pieces = [parted(solids, trail, not whole)]
+    elif trail.pieces:
+        trail.depth += solids.sigma * length
     return trail

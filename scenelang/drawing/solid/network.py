@@ -147,6 +147,7 @@ class SolidNetwork:
     cell_bias: Any  # (TOKENS, 1 + L + K)
     candidate: Any  # (TOKENS,)
     bump: Any  # (TOKENS,)
+    last: Any = None  # the `Around` of the last picture
 
     def lifted(self, code: Array) -> Array:
         """What weights are linear in (C',): a code (C,), its hidden units, and 1."""
@@ -245,12 +246,13 @@ class SolidNetwork:
         return xp.concat([value, g], 0)
 
     def join(
-        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted
+        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted, switched: int = 1
     ) -> tuple[Array, Array]:
         """The memory behind an object at distances (M,), and how far the distance's gate is open (M,).
 
         Memory is the distance so far and the register behind it: (1, M), (2, M) with the medium alone, or,
-        with colours before it, (1 + R, M); ``look`` is the object's own register (R, 1), or (R, M).
+        with colours before it, (1 + R, M); ``look`` is the object's own register (R, 1), or (R, M). Its last
+        rows, ``switched``, come with the kind of material.
         """
         xp, state = self.xp, memory[:1]
         gates = xp.unit(cell.own * d + cell.past * state + cell.bias)
@@ -265,7 +267,7 @@ class SolidNetwork:
             return xp.concat([new, memory[1:] + kind * (look[-1:] - memory[1:])], 0), take
         n = 1 + self.config.paint_lines
         paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
-        gate = xp.concat([paint] * (len(memory) - 2) + [kind], 0)
+        gate = xp.concat([paint] * (len(memory) - 1 - switched) + [kind] * switched, 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
     def alone(self, reach: Array, cell: SolidCell) -> Array:

@@ -221,8 +221,12 @@ class Solid:
     )
 
 
-def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widths: Floats) -> list[Solid]:
-    """The objects of a stream, whose groups and widths of blends are as of `felt`; raises `ProgramError`."""
+def read_solids(
+    network: SolidNetwork, vectors: np.ndarray, groups: Groups, widths: Floats, reach: float = 0.0
+) -> list[Solid]:
+    """The objects of a stream, whose groups and widths of blends are as of `felt`, with distances up to
+    ``reach`` around them; raises `ProgramError`.
+    """
     xp, layout, like = network.xp, network.layout, network.codes
     solids: list[Solid] = []
     frames = [read_solid_frame(vector, layout) for vector in vectors]
@@ -242,7 +246,7 @@ def read_solids(network: SolidNetwork, vectors: np.ndarray, groups: Groups, widt
     deep = matters.everywhere & taken
     for i, frame in enumerate(frames):
         # a blend reaches as far as its width, and each lowers the distance by a quarter of that at most
-        blends = float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
+        blends = reach + float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
         if deep[i]:
             blends += deepest
         radius = 1 + SLACK + float(more[i] + LOOSE * abs(grown[i])) + blends / frame.scale
@@ -314,16 +318,18 @@ def _widened(
 
 
 class Passes(NamedTuple):
-    """The balls that M rays from one point pass, K at most."""
+    """The balls that M rays pass, K at most."""
 
     # (SLOT, K, M), a ray's last object first: its number, or -1 minus it where it does not draw; the ray's
     # direction behind its map; begin and end, inf and -inf where there is none; the distance's greatest rate
     slots: Array
-    origins: Array  # (3, N), the point behind the map of each object
+    origins: Array  # (3, N), the point behind the map of each object, or (3, M) in the world
+    many: bool = False  # whether each ray has a point of its own
 
     def at(self, xp: Arrays, index: Array) -> Passes:
         """Passes of some of the rays."""
-        return Passes(xp.take(self.slots, index), self.origins)
+        origins = xp.take(self.origins, index) if self.many else self.origins
+        return Passes(xp.take(self.slots, index), origins, self.many)
 
 
 def find_passes(
@@ -334,16 +340,21 @@ def find_passes(
     way: Array,
     limit: Array,
     tight: bool = True,
+    begin: Array | float = 0.0,
+    spare: Array = None,
 ) -> tuple[Array, Passes]:
     """Indices (k,) of rays that may meet something that draws, and the balls that these pass, boxes too if
-    ``tight``. Rays go from (3,), behind the objects' maps (3, N), along unit directions (3, M) up to a limit.
+    ``tight``. Rays go from (3,), behind the objects' maps (3, N), or from a point each (3, M), along unit
+    directions (3, M) from ``begin`` (M,) up to a limit. Balls of rays from (3,) may be smaller by ``spare``
+    (2, M), its first row for each unit of the way and the second at its beginning.
     """
-    low, high, result = 0 * way[0], limit, []
-    filled, drawn = xp.whole(low), low > 0
+    low, high, result = 0 * way[0] + begin, limit, []
+    filled, drawn = xp.whole(0 * low), low < 0
     around: list[tuple[Array, Array]] = []  # of the groups that a group stands in
     for i, solid in reversed(list(enumerate(solids))):
         around += [(low, high)] * solid.ends
-        rays, values = _crossed(xp, solid, origin, origins[:, i], way, low, high, tight)
+        start = origins if origin.ndim == 2 else origins[:, i, None]
+        rays, values = _crossed(xp, solid, origin, start, (way, low, high), tight, spare)
         if solid.begins:
             low, high = around.pop()
         if solid.clips:
@@ -367,27 +378,40 @@ def find_passes(
         if len(kept) < len(place):
             place, slot, values = (xp.take(each, kept) for each in (place, slot, values))
         xp.put(slots.reshape(SLOT, -1), slot * count + place, values)
-    return some, Passes(slots, origins)
+    many = origin.ndim == 2
+    return some, Passes(slots, xp.take(origins, some) if many else origins, many)
 
 
 def _crossed(
-    xp: Arrays, solid: Solid, origin: Array, start: Array, way: Array, low: Array, high: Array, tight: bool
+    xp: Arrays, solid: Solid, origin: Array, start: Array, ways: tuple[Array, ...], tight: bool, spare: Array
 ) -> tuple[Array, Array]:
     """Indices (k,) of rays that pass an object's ball between low and high, and their slots (SLOT, k)."""
-    near, to = None, solid.centre - origin
-    far = float(xp.sqrt(to @ to))
-    if far > solid.extent:  # rays within a cone around the ball, by its cosine less 1e-5 for rounding
-        near = xp.where(to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
+    (way, low, high), near, less = ways, None, 0.0  # leaf units by which the ball is smaller
+    if origin.ndim == 2:  # the ball is ahead, or around
+        to = solid.centre[:, None] - origin
+        ahead, room = (to * way).sum(0), solid.extent**2 * (1 + 1e-5) - (to * to).sum(0)
+        near = xp.where((room >= 0) | ((ahead > 0) & (room + ahead * ahead >= 0)))
+        start = solid.frame.outer(xp, xp.take(origin, near))
+    else:
+        to = solid.centre - origin
+        far = float(xp.sqrt(to @ to))
+        if far > solid.extent:  # rays within a cone around the ball, by its cosine less 1e-5 for rounding
+            near = xp.where(to @ way >= far * (1 - (solid.extent / far) ** 2) ** 0.5 - 1e-5 * far)
+            if spare is not None and not solid.wide:
+                rate, least = xp.take(spare, near)
+                less = (least + rate * (far - solid.extent)).clip(0.0) / solid.frame.scale
+    if near is not None:
         way, low, high = xp.take(way, near), xp.take(low, near), xp.take(high, near)
     a = solid.frame.outer.linear @ way
     square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    middle = -(start @ a) / square
-    closest = start[:, None] + middle * a  # to the ball's centre
-    left = solid.ball**2 - closest[0] * closest[0] - closest[1] * closest[1] - closest[2] * closest[2]
+    middle = -((start * a).sum(0) if origin.ndim == 2 else start[:, 0] @ a) / square
+    closest = start + middle * a  # to the ball's centre
+    ball = solid.ball - solid.frame.reach * less
+    left = ball**2 - closest[0] * closest[0] - closest[1] * closest[1] - closest[2] * closest[2]
     half = xp.sqrt((left / square).clip(0.0))
     begin, end = xp.maximum(middle - half, low), xp.minimum(middle + half, high)
     if tight and solid.box is not None:
-        first, last = ((side - start[:, None]) / a for side in solid.box)
+        first, last = ((side - start) / a for side in (solid.box[0] + less, solid.box[1] - less))
         begin = xp.maximum(begin, xp.largest(xp.minimum(first, last))[0])
         end = xp.minimum(end, xp.least(xp.maximum(first, last)))
     hit = xp.where((left > 0) & (begin <= end))

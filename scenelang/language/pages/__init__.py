@@ -63,11 +63,6 @@ class Page(Record):
         return self.text.partition("\n")[0].partition(": ")[2]
 
     @property
-    def retired(self) -> bool:
-        """Test whether no diagnostic has this code any more; it is not used again."""
-        return self.title.startswith("retired: ")
-
-    @property
     def severity(self) -> str:
         return "warning" if self.code.startswith("W") else "error"
 

@@ -7,8 +7,8 @@ export const WORDS = [
   {"scope": "constant.language.boolean", "words": ["true", "false"], "after": ""},
   {"scope": "constant.language", "words": ["PI", "TAU", "X", "Y", "Z", "none"], "after": ""},
   {"scope": "variable.language", "words": ["t", "u", "frame", "frames"], "after": "(?!\\s*[({])"},
-  {"scope": "support.function.setting", "words": ["canvas", "background", "animate", "samples", "camera", "light", "ground"], "after": "(?=\\s*\\()"},
-  {"scope": "support.function.transform", "words": ["translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "displace", "grow", "shell", "flip", "color", "grayscale", "hue", "opacity", "stop"], "after": "(?=\\s*\\()"},
+  {"scope": "support.function.setting", "words": ["canvas", "background", "animate", "samples", "camera", "light", "ground", "sky"], "after": "(?=\\s*\\()"},
+  {"scope": "support.function.transform", "words": ["translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "displace", "grow", "shell", "flip", "color", "grayscale", "hue", "opacity", "glow", "density", "roughness", "stop"], "after": "(?=\\s*\\()"},
   {"scope": "support.function", "words": ["sin", "cos", "tan", "asin", "acos", "atan2", "abs", "min", "max", "clamp", "floor", "ceil", "round", "sqrt", "exp", "log", "mix", "smoothstep", "len", "rand", "rgb", "hsv"], "after": "(?=\\s*\\()"},
 ];
 export const TERMINALS = {

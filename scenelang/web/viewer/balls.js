@@ -70,15 +70,16 @@ const inner = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
  * @param {number[][]} axes - unit vectors forward, right and up
  * @param {number[]} scale, middle - a direction's cell is right / forward * scale + middle, and likewise up
  * @param {number[]} counts - cells across and up
+ * @param {number} more - by which balls are larger
  */
-export function cellsOf(from, axes, scale, middle, counts) {
+export function cellsOf(from, axes, scale, middle, counts, more = 0) {
   return {
     count: counts[0] * counts[1],
     /** Calls of the numbers of all cells where a ball may be seen. */
     of(centre, extent, call) {
       const to = centre.map((v, i) => v - from[i]), ahead = inner(to, axes[0]), ranges = [];
       for (const i of [0, 1]) {
-        const range = bearings(inner(to, axes[1 + i]), ahead, extent * (1 + 1e-5));
+        const range = bearings(inner(to, axes[1 + i]), ahead, (extent + more) * (1 + 1e-5));
         if (!range) return;
         const [low, high] = range.map((v) => Math.floor(v * scale[i] + middle[i]));
         ranges.push([Math.max(low, 0), Math.min(high, counts[i] - 1)]);
@@ -89,13 +90,13 @@ export function cellsOf(from, axes, scale, middle, counts) {
   };
 }
 
-/** The six sides of a cube around a point, each of side x side cells, two for each axis. */
-export function cubeOf(from, side) {
+/** The six sides of a cube around a lamp, each of side x side cells, two for each axis. */
+export function cubeOf(from, side, radius) {
   const unit = (i) => [0, 1, 2].map((j) => Number(i % 3 === j));
   return [0, 1, 2, 3, 4, 5].map((face) => {
     const axis = face >> 1, forward = unit(axis).map((v) => (face & 1 ? -v : v));
     const half = side / 2;
-    return cellsOf(from, [forward, unit(axis + 1), unit(axis + 2)], [half, half], [half, half], [side, side]);
+    return cellsOf(from, [forward, unit(axis + 1), unit(axis + 2)], [half, half], [half, half], [side, side], radius);
   });
 }
 

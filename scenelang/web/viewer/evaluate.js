@@ -8,7 +8,7 @@ import { entering, looping, prepared } from "./expressions.js";
 import { lineOf } from "./letters.js";
 import { MAPS } from "./maps.js";
 import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
-import { stageFrom } from "./stage.js";
+import { sharesOf, stageFrom } from "./stage.js";
 import { checkEye } from "./eye.js";
 
 const MOST_WORK = 5e6; // passes of loops, calls, objects, transforms and numbers of vectors
@@ -48,13 +48,13 @@ class SceneRun {
   picture({ params = {}, frame = 0 }) {
     this.globals.fill(undefined);
     this.globals.length = this.form.slots;
-    Object.assign(this, { params, frame, work: 0, calls: 0, objects: 0, settings: {} });
+    Object.assign(this, { params, frame, work: 0, calls: 0, objects: 0, settings: {}, lights: [] });
     this.animated = this.form.animates ? [] : [0, 0, 0, 1];
     const out = new Block();
     for (const act of this.body) act(undefined, out);
     const rows = rowsOf(out.links, this.form);
     const samples = samplesFrom(this.settings.samples);
-    const made = { rows, samples, ...stageFrom(this.settings, this.form) };
+    const made = { rows, samples, ...stageFrom(this.settings, this.lights, this.form) };
     if (made.stage !== null) checkEye(made, this.form);
     return made;
   }
@@ -78,7 +78,9 @@ class SceneRun {
     return (slots) => {
       const out = new Block();
       act(slots, out);
-      if (out.steps.filter((step) => step[0] === "opacity").length > 1) refuse("`opacity` is given twice");
+      for (const word of PROPERTIES) {
+        if (out.steps.filter((step) => step[0] === word).length > 1) refuse(`\`${word}\` is given twice`);
+      }
       return out.steps;
     };
   }
@@ -193,7 +195,19 @@ const INKS = {
   hue: ([angle]) => ["hue", radians(angle) / (2 * Math.PI)],
   stop: ([offset, rgb]) => ["stop", bare(offset), ...numbersOf(rgb, 3)],
   opacity: ([share]) => ["opacity", opacityFrom(bare(share))],
+  glow: ([rgb, power = 1]) => ["glow", powerFrom(bare(power)), ...sharesOf(rgb)],
+  density: ([density]) => ["density", densityFrom(bare(density))],
 };
+const PROPERTIES = ["opacity", "glow", "density"];
+const MOST_DENSE = 100;
+
+function powerFrom(power) {
+  return power >= 0 && power <= 1e12 ? power : refuse(`a power of ${power}`);
+}
+
+function densityFrom(density) {
+  return density > 0 && density <= MOST_DENSE ? density : refuse(`a density of ${density}`);
+}
 
 function opacityFrom(share) {
   return share >= 0 && share <= 1 ? share : refuse(`an opacity of ${share} is outside 0..1`);
@@ -334,7 +348,9 @@ const STATEMENTS_OF_FORMS = {
   set: ([name, ...args], run) => {
     const parts = args.map((arg) => optionalValue(arg, run));
     return (slots) => {
-      run.settings[name] = parts.map((part) => part(slots));
+      const values = parts.map((part) => part(slots));
+      if (name === "light") run.lights.push(values);
+      else run.settings[name] = values;
     };
   },
 };

@@ -7,17 +7,31 @@ const float NOTHING = 10.0; // world units: how far away a group is at most for 
 
 // What is at a point, as far as rays ask.
 float state; // distance
-float dense; // whether it is a medium
+float dense; // whether it is a medium; where there are several densities, 1 more than that
+#ifdef DENSE
+const float OTHER = 1e-3; // a difference of kinds
+#else
+const float OTHER = 0.5;
+#endif
 float change; // how far the kind of material is sure to stay
 
 // What else is seen of it: colour, the same with plain colours in place of textures', gradient of the distance.
 vec3 seen, even, slope;
+#ifdef GLOWS
+vec3 shine; // light that it sends out, of media over their density
+#define SHINE shine
+#else
+#define SHINE vec3(0.0)
+#endif
 
 // Nothing is there.
 void clear(bool all) {
   state = EMPTY;
   dense = 0.0;
   if (all) seen = even = slope = vec3(0.0);
+#ifdef GLOWS
+  shine = vec3(0.0);
+#endif
 }
 
 // Let something join by a kind of the cell, as far as rays ask.
@@ -29,13 +43,13 @@ void join(int kind_, float narrow, float d, float medium) {
 #ifdef MIXED
   float gap = abs(d);
   if (kind_ == SMOOTH) gap = min(gap, abs(before - d) / 2.0);
-  if (abs(dense - medium) > 0.5) change = min(change, gap);
+  if (abs(dense - medium) > OTHER) change = min(change, gap);
   dense += kind(at, d * narrow, before * narrow) * (medium - dense);
 #endif
 }
 
 // The same of all that is seen.
-void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3 plain) {
+void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3 plain, vec3 sent) {
   int at = kind_ * CELL;
   float before = state, own = d * narrow, past = before * narrow;
   float take = taking(at, own, past), keep = 1.0 - take;
@@ -50,12 +64,18 @@ void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3
   even += gate * (plain - even);
 #endif
   seen += gate * (rgb - seen);
+#ifdef GLOWS
+  shine += gate * (sent - shine);
+#endif
 }
 
 #ifdef DEPTH
 bool looking; // whether all that is seen is asked for
 int depth, open; // how many groups are open, and the part of the innermost: kind, narrow, last row, around it
 struct State { float state, dense; vec3 seen, even, slope; } below[DEPTH]; // what open groups will join
+#ifdef GLOWS
+vec3 shines[DEPTH];
+#endif
 
 // End groups that a row stands behind.
 void leave(int row) {
@@ -63,7 +83,7 @@ void leave(int row) {
     vec4 group = part(0, open);
     if (row <= int(group.z)) break;
     float d = min(state, NOTHING), medium = dense;
-    vec3 g = slope, rgb = seen, plain = even;
+    vec3 g = slope, rgb = seen, plain = even, sent = SHINE;
     State outer = below[--depth];
     state = outer.state;
     dense = outer.dense;
@@ -75,7 +95,10 @@ void leave(int row) {
     seen = outer.seen;
     even = outer.even;
     slope = outer.slope;
-    join(int(group.x), group.y, d, medium, g, rgb, plain);
+#ifdef GLOWS
+    shine = shines[depth];
+#endif
+    join(int(group.x), group.y, d, medium, g, rgb, plain, sent);
   }
 }
 
@@ -85,6 +108,9 @@ void enter(int row) {
   int group = int(part(row, PAINT).w), more = 0;
   for (int g = group; g != open; g = int(part(0, g).w)) more++;
   for (; more > zero; more--) {
+#ifdef GLOWS
+    shines[depth] = shine;
+#endif
     below[depth++] = State(state, dense, seen, even, slope);
     clear(looking);
   }

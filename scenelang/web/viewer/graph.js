@@ -9,7 +9,6 @@ import { flatMap, invertedMap, usableMap } from "./maps.js";
 import { checkChain, isOwn, mergedChain, normalChain, scaleOfChain, skinOfChain } from "./chain.js";
 import { lookOf } from "./looks.js";
 import { BEGINS, ENDS } from "./groups.js";
-import { skinReach } from "./ways.js";
 
 export const MOST_OBJECTS = 20000;
 export const USUAL_BLEND = 0.15; // the width of a `smooth`, unless said
@@ -132,10 +131,9 @@ function putRows(links, depth, rows, first = null) {
 
 // ---------------------------------------------------------------- rows
 
-function rowData({ token, leaf, k }, { dimension, geometries }) {
+function rowData({ token, leaf, k }, { dimension }) {
   const { look, shape, number } = leaf;
   const skin = skinOfChain(leaf.steps);
-  if (shape >= geometries.length && skinReach({ skin }) > 0) refuse("an element grows");
   const bump = leaf.steps.find((step) => step.amount !== undefined);
   const steps = wayBack(leaf.steps, dimension);
   if (steps.length > MOST_ROW_STEPS) refuse(`more than ${MOST_ROW_STEPS} steps from the world to an object`);
@@ -147,6 +145,8 @@ function rowData({ token, leaf, k }, { dimension, geometries }) {
     scale: scaleOfChain(leaf.steps, dimension),
     colour: look.colour,
     opacity: look.opacity,
+    glow: look.glow?.some(Boolean) ? look.glow : undefined,
+    density: look.density,
     paint: look.paint,
     place: look.place,
     paintSteps: look.paintSteps,

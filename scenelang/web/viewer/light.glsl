@@ -2,31 +2,6 @@
 // What rays from the eye see under the light.
 
 const float INTO = 3e-5; // behind a surface where its material is asked for
-const float CLEAR = 2e-4; // before a surface where rays from the light end
-
-uniform Stage stage; // as scenelang/compiler/spaces.py has it; `on` of a part that is there
-uniform vec3 forward, right, up; // the camera's; forward over the tangent of half the angle of view
-uniform vec3 canvas; // width, height, world units of a pixel at the focus
-uniform ivec4 grid; // pixels along a side, cells in a row; first of the light's, these along a side of a cube
-
-#define EYE stage.camera.eye
-#define LAMP stage.light.position
-#define POWER (stage.light.power * stage.light.rgb)
-
-// What of the light reaches a point: on a surface, or in a medium where something opaque may begin.
-float lit(vec3 p, bool edge) {
-  vec3 way = p - LAMP, a;
-  float r = length(way);
-  way /= max(r, 1e-9);
-  a = abs(way);
-  int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-  vec3 turned_ = axis == 0 ? way : axis == 1 ? way.yzx : way.zxy;
-  float side = float(grid.w);
-  ivec2 at = ivec2(clamp((turned_.yz / abs(turned_.x) * 0.5 + 0.5) * side, 0.0, side - 1.0));
-  int face = 2 * axis + (turned_.x > 0.0 ? 0 : 1);
-  march(cell(grid.z + (face * grid.w + at.y) * grid.w + at.x), LAMP, way, r - (edge ? 0.0 : CLEAR));
-  return hit < NEVER ? 0.0 : exp(-EXTINCTION * fog);
-}
 
 #ifdef MEDIA
 const vec3 NODES = vec3(0.1127016654, 0.5, 0.8872983346), WEIGHTS = vec3(5.0, 8.0, 5.0) / 18.0; // of Gauss
@@ -42,14 +17,14 @@ const int PARTS = 3; // of pieces of which the nodes do not tell enough
 vec3 glow, evenGlow; // light that media send towards the eye
 
 // Light from a piece of a ray: from three nodes, or those of its parts where these do not tell enough.
-void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
+void scatter(ivec2 list, vec3 way, float begin, float end, float before, float sigma) {
   vec3 total = vec3(0.0), evenTotal = vec3(0.0);
-  float share = 0.0, first = 0.0, last = 0.0, free = 0.0;
-  bool woven = false;
+  float share = 0.0, first = 0.0, last = 0.0;
+  int once = 0;
+  bool woven = false, edge = false;
   for (int i = zero; i < 3 + 3 * PARTS; i++) {
     int node = i % 3;
     if (i == 3) {
-      bool edge = free > 0.5 && free < 2.5;
       if (share <= LEAST || !(edge || woven || last > STEEP * first || end - begin > LONG)) break;
       total = evenTotal = vec3(0.0);
     }
@@ -58,21 +33,26 @@ void scatter(ivec2 list, vec3 way, float begin, float end, float before) {
       size /= float(PARTS);
       from += size * float(i / 3 - 1);
     }
-    float taken = 1.0 - exp(-EXTINCTION / EVEN * size), left = 1.0 - NODES[node] * taken;
-    float t = from - log(left) * (EVEN / EXTINCTION);
-    float weight = WEIGHTS[node] * EVEN * taken * left * exp(-EXTINCTION * (before + from - begin));
+    float taken = 1.0 - exp(-sigma / EVEN * size), left = 1.0 - NODES[node] * taken;
+    float t = from - log(left) * (EVEN / sigma);
+    float weight = WEIGHTS[node] * EVEN * taken * left * exp(-before - sigma * (from - begin));
     vec3 p = EYE + t * way;
     look(list, p);
     vec3 own = seen, plain = even;
     woven = woven || worn;
-    float r = max(length(LAMP - p), NEAREST), clear = lit(p, false);
-    vec3 light = weight * (AMBIENT_EVEN + POWER * (clear / (4.0 * r * r)));
-    total += own * light;
-    evenTotal += plain * light;
+    vec3 shone = SHINE, light = HAZE(p);
+    int reached = 0; // by which lamps
+    EACH_LAMP {
+      float clear;
+      light += sent(p, clear);
+      reached += clear > 0.0 ? 1 << lamp : 0;
+    }
+    total += weight * (own * light + shone);
+    evenTotal += weight * (plain * light + shone);
     share += weight;
-    free += clear > 0.0 ? 1.0 : 0.0;
-    last = dot(plain * light, vec3(1.0));
-    if (i == 0) first = last;
+    last = weight * dot(plain * light + shone, vec3(1.0));
+    if (i == 0) first = last, once = reached;
+    else if (i < 3 && reached != once) edge = true;
   }
   glow += total;
   evenGlow += evenTotal;
@@ -86,19 +66,20 @@ float lasting(ivec2 list, vec3 way, float from, vec2 piece) {
   float size = (piece.y - piece.x) / 8.0, low = from + 0.02 * size, high = NEVER;
   vec3 first, last;
   look(list, EYE + low * way);
-  first = even;
+  first = even + SHINE;
   for (int i = zero; i < 16; i++) {
     bool halving = high < NEVER;
     float t = halving ? 0.5 * (low + high) : min(low + size, piece.y - 0.02 * size);
     if (t <= low) return halving ? low : piece.y;
     look(list, EYE + t * way);
-    if (halving ? dot(abs(even - first), vec3(1.0)) < dot(abs(even - last), vec3(1.0))
-      : dot(abs(even - first), vec3(1.0)) <= JUMP) {
+    vec3 here = even + SHINE;
+    if (halving ? dot(abs(here - first), vec3(1.0)) < dot(abs(here - last), vec3(1.0))
+      : dot(abs(here - first), vec3(1.0)) <= JUMP) {
       low = t;
-      first = halving ? first : even;
+      first = halving ? first : here;
     } else {
       high = t;
-      last = halving ? last : even;
+      last = halving ? last : here;
     }
   }
   return high < NEVER ? low : piece.y;
@@ -128,11 +109,14 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
     if (surface) {
       float ahead = 0.0, towards = 0.0;
       for (int i = zero; i < 2; i++) {
-        vec3 was = slope, wore = seen, plainly = even;
+        vec3 was = slope, wore = seen, plainly = even, shone = SHINE;
         float off = state;
         look(list, EYE + (t + INTO) * way);
         if (i == 1 && dot(slope, slope) < 0.01) { // past an edge, where nothing is
           slope = was, seen = wore, even = plainly, state = off;
+#ifdef GLOWS
+          shine = shone;
+#endif
           t -= ahead;
         }
         towards = dot(slope, way);
@@ -144,6 +128,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
       n = slope * ((towards > 0.0 ? -1.0 : 1.0) / max(length(slope), 1e-12));
       colour = seen;
       other = even;
+      haze = SHINE;
 #ifdef TEXTURES
       if (px > 0.0 && worn && !edge) { // the mean of what the pixel's samples see of the plane there
         colour = vec3(0.0);
@@ -167,42 +152,48 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
       colour = other = kept * stage.ground.rgb;
       haze = (1.0 - kept) * stage.horizon;
     }
-    vec3 to = LAMP - p;
-    float r = max(length(to), NEAREST), facing = max(dot(n, to) / r, 0.0) / (r * r);
+#ifdef SKY
+    vec3 all = surface ? arriving(p, n) : arrivingDown(p);
+#else
     vec3 all = vec3(AMBIENT_EVEN + AMBIENT_UP * n.y);
-    if (facing > 0.0 && POWER != vec3(0.0)) all += POWER * (facing * lit(p + LIFT * n, edge));
+#endif
+    EACH_LAMP all += sent(p, n, edge);
     light = vec4(colour * all + haze, 1.0);
     plain = vec4(other * all + haze, 1.0);
   }
 #ifdef MEDIA
   if (pieceCount > 0) {
     glow = evenGlow = vec3(0.0);
-    float before = 0.0, middle = dot(LAMP - EYE, way);
-    float aside = max(length(LAMP - EYE - middle * way), NEAREST);
+    float before = 0.0;
     for (int i = zero; i < pieceCount; i++) {
       vec2 piece = pieces[i];
-      float from = piece.x;
+      float from = piece.x, sigma = SIGMA(i);
       for (int j = zero; j < 9 && from < piece.y; j++) { // by colours
         float to = piece.y;
 #ifdef COLOURED
         if (j < 8) to = lasting(list, way, from, piece);
 #endif
-        vec3 a = LAMP - EYE - from * way, b = LAMP - EYE - to * way;
-        bool narrow = dot(a, b) > NARROW * length(a) * length(b);
-        for (int k = zero; k < 9; k++) { // by the angle at the light, where that is wide
-          float low = from, high = to;
-          if (!narrow) {
-            if (k > 0) low = max(low, middle + CUTS[k - 1] * aside);
-            if (k < 8) high = min(high, middle + CUTS[k] * aside);
+        float low = from;
+        for (int k = zero; k <= 8 * LAMPS && low < to; k++) { // by the angles at lamps, where these are wide
+          float high = to;
+          EACH_LAMP {
+            vec3 off = LAMP - EYE, a = off - from * way, b = off - to * way;
+            float middle = dot(off, way), aside = max(length(off - middle * way), NEAREST);
+            if (dot(a, b) <= NARROW * length(a) * length(b)) {
+              for (int c = zero; c < 8; c++) {
+                float cut = middle + CUTS[c] * aside;
+                if (cut > low) high = min(high, cut);
+              }
+            }
           }
-          if (low < high) scatter(list, way, low, high, before + low - piece.x);
-          if (narrow) break;
+          scatter(list, way, low, high, before + sigma * (low - piece.x), sigma);
+          low = high;
         }
         from = to;
       }
-      before += piece.y - piece.x;
+      before += sigma * (piece.y - piece.x);
     }
-    float clear = exp(-EXTINCTION * thick);
+    float clear = exp(-thick);
     light = vec4(light.rgb * clear + glow, 1.0 - (1.0 - light.a) * clear);
     plain = vec4(plain.rgb * clear + evenGlow, light.a);
   }
@@ -218,7 +209,7 @@ void main() {
   met = 0.0;
   look(cell(0), texelFetch(places, ivec2(gl_FragCoord.xy), 0).xyz);
   found = vec4(state, seen);
-  more = vec4(dense, 0.0, 0.0, 0.0);
+  more = vec4(min(dense, 1.0), 0.0, 0.0, 0.0);
 }
 #else
 layout(location = 0) out vec4 picture;
@@ -261,6 +252,7 @@ void main() {
 #endif
   int samples = along * along;
   for (int i = zero; i < samples; i++) {
+    sampleAt = i;
     vec2 off = (vec2(i % along, i / along) + 0.5) / float(along) - 0.5;
     vec2 at = (gl_FragCoord.xy + off - 0.5 * canvas.xy) * canvas.z;
     shade(normalize(forward + at.x * right + at.y * up), list, whole ? canvas.z : 0.0, one, plain);

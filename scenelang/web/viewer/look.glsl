@@ -125,7 +125,11 @@ void look(ivec2 list, vec3 p, vec3 off) {
       own.rgb = textured(row, paint, q);
     }
 #endif
-    join(flags & KIND, head.w, d, own.w, g * way * head.z, own.rgb, plain);
+    vec3 sent = vec3(0.0);
+#ifdef GLOWS
+    sent = part(row, GLOW).rgb;
+#endif
+    join(flags & KIND, head.w, d, own.w, g * way * head.z, own.rgb, plain, sent);
   }
 #ifdef DEPTH
   leave(ALL);

@@ -58,12 +58,12 @@ function fewerInks(steps) {
 
 /**
  * What a row says of a material.
- * @param {Wearing} worn - its `ops` are maps {rows}, colour steps and opacities, of which the last one counts
+ * @param {Wearing} worn - its `ops` are maps {rows}, colour steps and properties, of which the last one counts
  */
 export function lookOf(worn, form) {
   let moved = IDENTITY;
   const steps = [], stops = [];
-  let opacity = 1;
+  let opacity = 1, glow, density;
   for (const op of worn.ops) {
     if (op[0] === "stop") {
       const rgb = op.slice(2).map(shareOf);
@@ -72,6 +72,15 @@ export function lookOf(worn, form) {
     }
     if (op[0] === "opacity") {
       opacity = op[1];
+      continue;
+    }
+    if (op[0] === "glow") {
+      glow = linearColour(op.slice(2)).map((v) => v * op[1]);
+      continue;
+    }
+    if (op[0] === "density") {
+      density = op[1];
+      if (!form.media.includes(worn.lit)) refuse("a density of what is not volumetric");
       continue;
     }
     if (Array.isArray(op)) {
@@ -87,7 +96,7 @@ export function lookOf(worn, form) {
   if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
   checkStops(stops, worn.paint >= 0 && form.graded[worn.paint]);
   if (opacity !== 1 && form.dimension === 3) refuse("in space nothing but mist is translucent");
-  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity };
+  const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity, glow, density };
   if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
   const paintSteps = fewerInks(steps);
   if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");

@@ -84,6 +84,16 @@ vec2 local(vec2 p, int at, int steps, inout float spread) {
 
 // ------------------------------------------------------------ elements
 
+#ifdef SKINS
+const int NEARER = 4; // as in scenelang/drawing/neural/assets.py
+const float ALONG = 0.6;
+
+/** Whether an object reaches farther out than its leaf. */
+bool grows(int at) {
+  return dot(texel(rows, at + 4).xyz, vec3(1.0)) > 0.0;
+}
+#endif
+
 #ifdef NODES
 float node(int at) {
   return texelFetch(nodes, ivec2(at & 2047, at >> 11), 0).r;
@@ -106,6 +116,34 @@ float lattice(vec2 q, int first, int side) {
   SPEND(12);
   return off == vec2(0) ? found : sqrt(found * found + dot(off, off));
 }
+
+#ifdef SKINS
+/** About the point of an outline that is nearest to a point of the square, and the unit normal there. */
+vec2 foot(vec2 q, int first, int side, out vec2 normal) {
+  vec2 a = max(q - 1.0 / float(side - 1), -1.0), b = min(q + 1.0 / float(side - 1), 1.0);
+  float across_ = lattice(vec2(b.x, q.y), first, side) - lattice(vec2(a.x, q.y), first, side);
+  float up = lattice(vec2(q.x, b.y), first, side) - lattice(vec2(q.x, a.y), first, side);
+  vec2 slope = vec2(across_, up) / (b - a);
+  normal = slope / max(length(slope), 1e-9);
+  return q - lattice(q, first, side) * normal;
+}
+
+/** A distance by a grid of what grows out of the square, as `GrownShape` of scenelang/drawing/neural/assets.py. */
+float grown(vec2 q, int first, int side) {
+  vec2 inside = clamp(q, -1.0, 1.0), normal, next;
+  if (q == inside) return lattice(q, first, side);
+  vec2 best = foot(inside, first, side, normal);
+  for (int i = 0; i < NEARER; i++) {
+    vec2 away = q - best;
+    inside = clamp(best + ALONG * (away - dot(away, normal) * normal), -1.0, 1.0);
+    vec2 found = foot(inside, first, side, next);
+    if (length(q - found) >= length(away)) continue;
+    best = found;
+    normal = next;
+  }
+  return length(q - best);
+}
+#endif
 #endif
 
 #ifdef OUTLINES
@@ -359,6 +397,9 @@ void meet(vec2 p, ivec2 span) {
 #endif
       {
 #ifdef GRIDS
+#ifdef SKINS
+        if (c.y > 0.0 && grows(at)) distance = grown(q, int(c.x), int(c.y)); else
+#endif
         if (c.y > 0.0) distance = lattice(q, int(c.x), int(c.y)); else
 #endif
 #ifdef OUTLINES

@@ -95,8 +95,8 @@ float gather(ivec2 list, float low, float high) {
     }
     bool some = begin <= end;
     float name = float(row);
-#ifdef OTHERS
     int flags = int(part(row, HEAD).x);
+#ifdef OTHERS
     if ((flags & CLIPS) > 0) { // outside its ball nothing is left of what came before
       low = some ? begin : NEVER;
       high = some ? end : -NEVER;
@@ -125,7 +125,7 @@ float gather(ivec2 list, float low, float high) {
   return sure;
 }
 
-// What a ray met: how far the first surface is, the way in media before it, whether one of these ends there.
+// What a ray met: how far the first surface is, how thick media before it are, whether one of these ends there.
 float hit, fog;
 bool soft;
 #ifdef MEDIA
@@ -133,11 +133,23 @@ const int PIECES = 12;
 vec2 pieces[PIECES]; // ways through media
 int pieceCount;
 bool seeing; // whether the ray is the eye's
+#ifdef DENSE
+float density, densities[PIECES]; // where the ray is, and of pieces
+#define SIGMA(i) densities[i]
+#else
+const float density = EXTINCTION;
+#define SIGMA(i) EXTINCTION
+#endif
 
 void close(float begin, float end) {
   end = max(begin, end);
-  if (seeing && pieceCount < PIECES) pieces[pieceCount++] = vec2(begin, end);
-  fog += end - begin;
+  if (seeing && pieceCount < PIECES) {
+#ifdef DENSE
+    densities[pieceCount] = density;
+#endif
+    pieces[pieceCount++] = vec2(begin, end);
+  }
+  fog += density * (end - begin);
 }
 #endif
 
@@ -217,6 +229,19 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
         }
         return;
       }
+#ifdef DENSE
+      if (inside && within && abs(dense - 1.0 - density) > 1e-3) { // one medium gives way to another
+        float a = past, b = t, own = dense - 1.0;
+        for (int i = zero; i < HALVINGS; i++) {
+          float half_ = 0.5 * (a + b);
+          meet(half_);
+          if (abs(dense - 1.0 - density) > 1e-3) b = half_; else a = half_;
+        }
+        close(since, b);
+        since = b;
+        density = own;
+      } else if (inside && !within) density = dense - 1.0;
+#endif
       if (inside && !within) since = root;
       if (!inside && within) close(since, root);
       within = inside;

@@ -5,16 +5,21 @@ precision highp isampler2D;
 precision highp sampler3D;
 precision highp usampler3D;
 
+vec4 swish(vec4 x) { // of a number and its gradient
+  float s = 1.0 / (1.0 + exp(-x.x));
+  return vec4(x.x * s, x.yzw * (s * (1.0 + x.x * (1.0 - s))));
+}
+
 // The network, made for its sizes: decoder(shape, q), decoder(shape, q, g), taking, painting, kind.
 //network//
 
 // The field of solids. Of what a scene lacks nothing is compiled: SHAPE_i (a geometry), MEDIA, MIXED (with
-// solids), COLOURED (media of several colours), TEXTURES, GRIDS, TURNS, BUMPS, SKINS, OTHERS (than objects
+// solids), DENSE (media of other densities), COLOURED (media of several colours), GLOWS, LAMPS (how many), TEXTURES, GRIDS, TURNS, BUMPS, SKINS, OTHERS (than objects
 // that draw), FAR (points from leaves). SLOTS: balls that a ray keeps; DEPTH: groups that are open at once.
 
 const float NEVER = 1e30;
 const int SMOOTH = 1;
-const int ROW = 14; // numbers of a row, in fours, the first three its map
+const int ROW = 15; // numbers of a row, in fours, the first three its map
 const int HEAD = 3; // kind of join and flags, shape, scale, usual width of a blend in widths of its own
 const int MORE = 4; // amount and frequency of its displacement, where its steps begin, how many
 const int AROUND = 5; // centre and squared radius of a ball of the world around it
@@ -25,6 +30,7 @@ const int PAINT = 9; // kind of texture, where its colour steps begin, how many;
 const int PLACE = 10; // two: from the leaf to its picture; where that begins
 const int GRID = 12; // side and first slice of a grid, sides of a texture
 const int SKIN = 13; // how far it grows, half of its shell, how far behind that; whether displacements are behind it
+const int GLOW = 14; // linear
 
 uniform int zero; // keeps compilers from unrolling
 uniform sampler2D table; // rows and steps
@@ -115,6 +121,49 @@ float gridded(vec4 grid, vec3 q) {
   float found = mix(near.x, near.y, share.x), beyond = dot(off, off);
   return beyond > 0.0 ? sqrt(found * found + beyond) : found;
 }
+
+#ifdef SKINS
+const int NEARER = 4; // as in scenelang/drawing/neural/assets.py
+const float ALONG = 0.6;
+
+// About the point of a surface that is nearest to a point of the cube, and the unit normal there.
+vec3 foot(vec4 grid, vec3 q, out vec3 normal) {
+  float h = 1.0 / (grid.x - 1.0);
+  vec3 slope;
+  for (int i = zero; i < 3; i++) {
+    vec3 a = q, b = q;
+    a[i] = max(q[i] - h, -1.0);
+    b[i] = min(q[i] + h, 1.0);
+    slope[i] = (gridded(grid, b) - gridded(grid, a)) / (b[i] - a[i]);
+  }
+  normal = slope / max(length(slope), 1e-9);
+  return q - gridded(grid, q) * normal;
+}
+
+// The way to a point outside of the cube from the nearest of the surface, as `GrownShape` there has it.
+vec3 beside(vec4 grid, vec3 q) {
+  vec3 normal, next, best = foot(grid, clamp(q, -1.0, 1.0), normal);
+  for (int i = zero; i < NEARER; i++) {
+    vec3 away = q - best, along = best + ALONG * (away - dot(away, normal) * normal);
+    vec3 found = foot(grid, clamp(along, -1.0, 1.0), next);
+    if (length(q - found) >= length(away)) continue;
+    best = found;
+    normal = next;
+  }
+  return q - best;
+}
+#endif
+
+// Whether a point lies outside of the cube of an object that has a skin, and the way to it from the surface.
+bool outside(int row, vec4 grid, vec3 q, out vec3 away) {
+#ifdef SKINS
+  if (any(notEqual(part(row, SKIN).xyz, vec3(0.0))) && any(greaterThan(abs(q), vec3(1.0)))) {
+    away = beside(grid, q);
+    return true;
+  }
+#endif
+  return false;
+}
 #endif
 
 float met; // points and objects that met
@@ -129,7 +178,10 @@ float leaf(int row, vec4 head, vec3 q) {
   place *= RADIUS / max(r, RADIUS);
 #endif
 #ifdef GRIDS
-  if (int(head.y) >= GEOMETRIES) d = gridded(part(row, GRID), place); else
+  if (int(head.y) >= GEOMETRIES) {
+    vec3 away;
+    d = outside(row, part(row, GRID), place, away) ? length(away) : gridded(part(row, GRID), place);
+  } else
 #endif
   d = decoder(int(head.y), place);
 #ifdef FAR
@@ -166,6 +218,11 @@ float leaf(int row, vec4 head, vec3 q, out vec3 g) {
     for (int i = zero; i < 3; i++) {
       vec3 off = vec3(i == 0, i == 1, i == 2) * h;
       g[i] = (gridded(grid, place + off) - gridded(grid, place - off)) / (2.0 * h);
+    }
+    vec3 away;
+    if (outside(row, grid, place, away)) {
+      d = length(away);
+      g = away / max(d, 1e-9);
     }
   } else
 #endif

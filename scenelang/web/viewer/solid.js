@@ -5,11 +5,12 @@ import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
 import { axesOf } from "./stage.js";
+import { aroundOf } from "./around.js";
 
-const ROW_TEXELS = 14; // as the shader has it
+const ROW_TEXELS = 15; // as the shader has it
 const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
-const CUBE_SIDE = 12; // cells along a side of the cube around the light
+const CUBE_SIDE = 12; // cells along a side of the cube around a lamp
 const BAND = 1 << 14; // pixels drawn at a time
 const MOST_SLOTS = 256; // balls that a ray keeps
 const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
@@ -17,13 +18,22 @@ const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
 /** Whether a row wears a medium. */
 const isMedium = (view, row) => view.materials[row.material].medium > 0.5;
 
+/** Extinction of a row's medium per world unit. */
+const densityOf = (view, row) => row.density ?? view.network.extinction;
+
+/** The lamps of a stage, and dark ones up to a number. */
+function lampsOf({ light, lights = [light] }, least = 1) {
+  const dark = { position: [0, 0, 0], power: 0, rgb: [0, 0, 0] }, more = Math.max(0, least - lights.length);
+  return [...lights, ...new Array(more).fill(dark)].map((lamp) => ({ radius: 0, ...lamp }));
+}
+
 /** A row's colour, as far as no texture changes it. */
 function plainColour(view, row) {
   return view.materials[row.material].albedo.map((v, i) => Math.min(1, Math.max(0, v * row.colour[i])));
 }
 
 /** The rows' numbers for the shader: ROW_TEXELS texels a row, then groups and steps of space and of colours. */
-function tableOf(view, rows, joins, balls, elements) {
+function tableOf(view, rows, joins, balls, elements, dense) {
   const blocks = [], blank = () => new Float32Array(4 * ROW_TEXELS);
   for (let i = 0; i < rows.length; i++) blocks.push(blank());
   const more = (texels) => { // as many rows as hold some texels; the number of the first
@@ -55,7 +65,7 @@ function tableOf(view, rows, joins, balls, elements) {
       ...centre, extent * extent * (1 + 1e-5) + 1e-9,
       ...box[0], ball * ball,
       ...box[1], rate,
-      ...plainColour(view, row), material.medium,
+      ...plainColour(view, row), dense && isMedium(view, row) ? 1 + densityOf(view, row) : material.medium,
       paint ? paint.kind : 0, more([...stops, ...ops]), ops.length, places.get(joins[i].around),
       // to (u, v), or to shares of the picture's sides, from its upper left corner
       ...(row.stops ? [a, b, u, 0, c, d, v, stops.length] : [
@@ -63,6 +73,7 @@ function tableOf(view, rows, joins, balls, elements) {
       ]),
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
       ...(row.skin ?? [0, 0, 0, 0]),
+      ...(row.glow ?? [0, 0, 0]), 0,
     ]);
   });
   const data = new Float32Array(blocks.length * 4 * ROW_TEXELS);
@@ -78,12 +89,16 @@ function flagsOfSolid({ kind, draws, always, adds, around }) {
 /** What the shader has to know of, for some rows and their balls, as names of defines. */
 function featuresOf(view, rows, joins, balls) {
   const media = rows.filter((row) => isMedium(view, row)), has = (holds) => rows.some(holds);
-  const colours = new Set(media.map((row) => (row.paint < 0 ? plainColour(view, row).join() : row.object)));
+  const lookOfMedium = (row) => (row.paint < 0 ? [...plainColour(view, row), row.glow].join() : row.object);
+  const colours = new Set(media.map(lookOfMedium));
+  const dense = media.some((row) => densityOf(view, row) !== view.network.extinction);
   const shown = [...new Set(rows.map((row) => row.shape))].sort((a, b) => a - b);
   const learned = shown.filter((shape) => shape < view.network.geometries).map((shape) => `SHAPE_${shape}`);
   const others = Object.entries({
     MEDIA: media.length > 0,
-    MIXED: media.length > 0 && media.length < rows.length,
+    MIXED: dense || (media.length > 0 && media.length < rows.length),
+    DENSE: dense,
+    GLOWS: has((row) => row.glow?.some(Boolean)),
     COLOURED: colours.size > 1,
     TEXTURES: has((row) => row.paint >= 0),
     GRIDS: learned.length < shown.length,
@@ -134,16 +149,19 @@ function setUniforms(gl, at, name, value) {
   else if (Array.isArray(value)) gl.uniform3fv(at(name), value);
   else {
     const parts = Object.entries({ ...value, on: value !== null });
-    for (const [key, part] of parts) setUniforms(gl, at, `${name}.${key}`, part);
+    for (const [key, part] of parts) {
+      const several = key === "lights" ? part.map((one, i) => [`${key}[${i}]`, one]) : [[key, part]];
+      for (const [field, one] of several) setUniforms(gl, at, `${name}.${field}`, one);
+    }
   }
 }
 
 /** Draws a view of solids; docs/architecture.md has what drawers do. */
 export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
-  const elements = solidElements(gl, view);
+  const elements = solidElements(gl, view), around = aroundOf(gl, view.around);
   const features = new Set(); // and slots only grow, so that frames of an animation share a shader
-  let slots = 8, depth = 0, first = null, ready = {};
+  let slots = 8, depth = 0, lamps = 1, first = null, ready = {};
 
   const boxOf = (row) => {
     if (row.shape >= network.geometries) return elements.grids[row.shape].box;
@@ -153,7 +171,7 @@ export function solidDrawer(gl, view) {
 
   /** The shader for what is known and some defines more, compiled once; it may be under way yet. */
   const shaderOf = (names) => {
-    const sizes = [`SLOTS=${slots}`, ...(depth ? [`DEPTH=${depth}`] : [])];
+    const sizes = [`SLOTS=${slots}`, ...(depth ? [`DEPTH=${depth}`] : []), ...(lamps > 1 ? [`LAMPS=${lamps}`] : [])];
     const all = [...features, ...sizes, ...names], key = all.join();
     if (!shaders.has(key)) {
       const defines = all.map((name) => `#define ${name}\n`.replace("=", " ")).join("");
@@ -183,10 +201,14 @@ export function solidDrawer(gl, view) {
     const axes = axesOf(stage.camera.eye, stage.camera.target);
     const seen = cellsOf(stage.camera.eye, axes, [scale, scale],
       [width / 2 / TILE_SIDE, height / 2 / TILE_SIDE], tiles);
-    const { data, longest } = listsOf(joins, balls, [seen, ...cubeOf(stage.light.position, CUBE_SIDE)]);
-    wholes(gl, data, lists);
-    floats(gl, tableOf(view, rows, joins, balls, elements), 1024, table);
+    const cubes = lampsOf(stage).flatMap(({ position, radius }) => cubeOf(position, CUBE_SIDE, radius));
+    const { data, longest } = listsOf(joins, balls, [seen, ...cubes]);
     for (const name of featuresOf(view, rows, joins, balls)) features.add(name);
+    if (view.around) features.add("SKY");
+    if (lampsOf(stage).some(({ radius }) => radius > 0)) features.add("SOFT");
+    wholes(gl, data, lists);
+    floats(gl, tableOf(view, rows, joins, balls, elements, features.has("DENSE")), 1024, table);
+    lamps = Math.max(lamps, lampsOf(stage).length);
     depth = Math.max(depth, groupsOf(joins).depth);
     while (slots < Math.min(MOST_SLOTS, longest)) slots *= 2;
     ready = {
@@ -197,8 +219,9 @@ export function solidDrawer(gl, view) {
   /** Begin to draw by a shader. */
   const use = (names, textures = {}) => {
     const { axes } = ready, at = begin(shaderOf(names));
-    Object.entries({ table, lists, ...elements.textures, ...textures }).forEach(([name, texture], unit) => {
-      const space = name === "grids" || name === "colours";
+    const all = { table, lists, ...elements.textures, ...around.textures, ...textures };
+    Object.entries(all).forEach(([name, texture], unit) => {
+      const space = ["grids", "colours", "around"].includes(name);
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(space ? gl.TEXTURE_3D : gl.TEXTURE_2D, texture);
       gl.uniform1i(at(name), unit);
@@ -210,9 +233,11 @@ export function solidDrawer(gl, view) {
       canvas: [ready.width, ready.height, ready.pixel],
     };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
-    setUniforms(gl, at, "stage", ready.program.stage);
+    const { light: _, ...stage } = ready.program.stage;
+    setUniforms(gl, at, "stage", { ...stage, lights: lampsOf(ready.program.stage, lamps) });
     gl.uniform4iv(at("grid"), ready.cells);
     gl.uniform4fv(at("cells"), network.cells);
+    for (const [name, value] of Object.entries(around.uniforms)) gl[`uniform${value.length}fv`](at(name), value);
   };
 
   /** Draw a picture in bands, so that no call takes long; stops after each. */
@@ -303,7 +328,7 @@ export function solidDrawer(gl, view) {
 
     dispose() {
       for (const { program } of shaders.values()) gl.deleteProgram(program);
-      for (const texture of [table, lists, ...Object.values(elements.textures)]) gl.deleteTexture(texture);
+      for (const texture of [table, lists, ...[elements, around].flatMap(({ textures }) => Object.values(textures))]) gl.deleteTexture(texture);
       if (first) dropScreens(gl, first);
     },
   };

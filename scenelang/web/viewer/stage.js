@@ -4,29 +4,48 @@ import { bare, numbersOf, radians, refuse } from "./values.js";
 import { linearColour } from "./looks.js";
 
 const MOST_OF_STAGE = 1e12; // narrower views are none
+const MOST_LAMPS = 8;
 
 /** Readers of arguments, by their kinds. */
 const KINDS_OF_STAGE = {
-  number: bare, angle: radians, point: (value) => numbersOf(value, 3),
-  opaque: (value) => linearColour(shares(value)),
+  number: bare, power: bare, extent: bare, angle: radians, point: (value) => numbersOf(value, 3),
+  opaque: (value) => linearColour(sharesOf(value)),
 };
 
 /**
  * What `evaluateForm` says besides rows.
  * @param settings - values of the arguments of `background` and of words of the stage, where given
+ * @param lamps - those of each `light`
  * @param form - its `stage` has the usual one, and of each word's arguments the field, kind and range
  */
-export function stageFrom({ background, ...given }, { dimension, stage: known }) {
-  const sky = background === undefined ? undefined : background[0] === null ? null : shares(background[0]);
-  const behind = sky === undefined ? [1, 1, 1] : sky;
+export function stageFrom({ background, ...given }, lamps, { dimension, stage: known }) {
+  const paint = background === undefined ? undefined : background[0] === null ? null : sharesOf(background[0]);
+  const behind = paint === undefined ? [1, 1, 1] : paint;
   if (dimension === 2) return { stage: null, background: behind };
-  const stage = { ...known.usual, transparent: sky === null };
-  for (const [word, values] of Object.entries(given)) stage[word] = partFrom(word, values, known);
-  if (sky) stage.horizon = stage.zenith = linearColour(sky);
+  const stage = { ...known.usual, sky: null, transparent: paint === null };
+  if (paint) stage.horizon = stage.zenith = linearColour(paint);
+  const usual = { ...known.usual, sky: { ...known.usual.sky, horizon: stage.horizon, zenith: stage.zenith } };
+  for (const [word, values] of Object.entries(given)) stage[word] = partFrom(word, values, { ...known, usual });
+  if (stage.sky && !paint) Object.assign(stage, { horizon: stage.sky.horizon, zenith: stage.sky.zenith });
+  stage.lights = lamps.length ? lightsFrom(lamps, known) : [stage.light];
+  stage.lights = stage.lights.map(({ radius, ...lamp }) => (radius ? { ...lamp, radius } : lamp));
+  [stage.light] = stage.lights;
+  if (stage.sky || stage.lights.length !== 1 || stage.light.radius) delete stage.light;
+  else for (const word of ["sky", "lights"]) delete stage[word]; // as stages were before there was more
   const { eye, target, fov_rad: view } = stage.camera;
   if (eye.every((number, axis) => number === target[axis])) refuse("the eye is the target");
   if (!(view > 1 / MOST_OF_STAGE && view < Math.PI)) refuse("a field of view not between 0° and 180°");
   return { stage, background: behind };
+}
+
+/** The lamps; `light(none)` stands alone. */
+function lightsFrom(lamps, known) {
+  const dark = lamps.some(([first]) => first === null);
+  if (dark && (lamps.length > 1 || lamps[0].some((value, at) => at && value !== undefined))) {
+    refuse("`light(none)` beside another light or value");
+  }
+  if (lamps.length > MOST_LAMPS) refuse(`more than ${MOST_LAMPS} lights`);
+  return dark ? [] : lamps.map((values) => partFrom("light", values, known));
 }
 
 function partFrom(word, [...values], { usual, fields }) {
@@ -43,7 +62,7 @@ function partFrom(word, [...values], { usual, fields }) {
   return part;
 }
 
-function shares(value) {
+export function sharesOf(value) {
   const rgb = numbersOf(value, 3);
   return rgb.every((part) => part >= 0 && part <= 1) ? rgb : refuse("a colour is outside 0..1");
 }

@@ -14,7 +14,7 @@ export function unpack(data, buffer) {
   return Object.fromEntries(Object.entries(data).map(([name, value]) => [name, unpack(value, buffer)]));
 }
 
-export const WITH_ARRAYS = ["shader", "network", "shapes", "materials", "paints"]; // parts of a view
+export const WITH_ARRAYS = ["shader", "network", "shapes", "materials", "paints", "around"]; // parts of a view
 
 /** The view of a message: data whose `blob` is deflated and in base64. */
 export async function readView({ blob, ...view }) {

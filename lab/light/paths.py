@@ -1,0 +1,739 @@
+"""A path tracer: the light that comes along rays, to points of surfaces and of media, and to pixels.
+
+Surfaces are found by sphere tracing and a root; ways through media are exact where their extinction is
+constant between steps. Lamps are sampled by the solid angle that they fill, at glossy surfaces by reflected
+directions as well (Veach's balance heuristic). The first numbers of a path come from Sobol' points that each
+pixel shifts by its own; independent shifts tell the standard error.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lab.light.field import (
+    DIFFUSE,
+    GLOSSY,
+    MEDIUM,
+    METAL,
+    OPAQUE,
+    OUT,
+    VOLUMETRIC,
+    Array,
+    Field,
+    World,
+    body_distance,
+    colours,
+    compiled,
+    folded,
+    scratch,
+    slope,
+)
+from scenelang.compiler.spaces import FADE, LIFT, NEAREST, Stage
+from scenelang.drawing.exact.solid import FAR, ways
+from scenelang.drawing.image import encoded
+
+STEP = 1e-3  # least step of a ray
+MOST = 4_000  # steps of a ray, and turns of a path
+SURELY = 4  # turns of a path before chance may end it
+AIMED = 0.4  # share of a path's turns that aim at what glows
+CAPS = 0.98, 0.99  # of colours of surfaces and media
+_INSIDE = 1e-6  # how far behind a surface its colour is asked for
+_ENDS, _MEETS, _HITS, _STUCK = range(4)  # of a ray's way: its end, a medium's particle, a surface, in a solid
+EYE, RAY, SURFACE, MIDST = range(4)
+ONES = 1.0, 1.0, 1.0
+_DIMENSIONS, _TURN = 32, 8  # numbers of a Sobol' point, and of a turn of a path
+_GOLDEN, _ONE, _TWO = (
+    np.uint64(0x9E3779B97F4A7C15),
+    np.uint64(0xBF58476D1CE4E5B9),
+    np.uint64(0x94D049BB133111EB),
+)
+_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+
+
+class Room(NamedTuple):
+    """What one thread writes to: `scratch`, colour and glow (6,), chance (its state, shift and number of the
+    path), f cos (3,), light and alpha (4,), a ray (o, d, its way through balls of media, and how likely it
+    meets a particle where it does); and Sobol' points (K, D).
+    """
+
+    d: Array
+    stack: Array
+    spans: Array
+    look: Array
+    chance: Array
+    f: Array
+    light: Array
+    ray: Array
+    table: Array
+
+
+def room_of(w: World, table: Array) -> Room:
+    return Room(
+        *scratch(w), np.empty(6), np.zeros(3, np.uint64), np.empty(3), np.empty(4), np.zeros(9), table
+    )
+
+
+@compiled
+def scrambled(z: Any) -> Any:
+    """A hash of 64 bits (SplitMix64: Steele, Lea and Flood 2014)."""
+    z = (z ^ (z >> _S30)) * _ONE
+    z = (z ^ (z >> _S27)) * _TWO
+    return z ^ (z >> _S31)
+
+
+@compiled
+def draw(room: Room, dimension: int) -> float:
+    """A number in [0, 1): of a shifted Sobol' point while it has any left, then at random."""
+    if dimension < room.table.shape[1]:
+        shift = scrambled(room.chance[1] + np.uint64(dimension) * _GOLDEN) >> _S11
+        value: float = room.table[int(room.chance[2]), dimension] + shift * 2.0**-53
+        return value - 1.0 if value >= 1.0 else value
+    room.chance[0] += _GOLDEN
+    return float((scrambled(room.chance[0]) >> _S11) * 2.0**-53)
+
+
+@compiled
+def probe(field: Field, o: Any, d: Any, t: float, room: Room) -> tuple[float, int, float, float]:
+    """Distance, kind, extinction and how far the ray may go from t."""
+    x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
+    spans, fastest, most, following = room.spans, 1e-9, FAR, FAR
+    for i in range(len(room.d)):
+        room.d[i] = FAR
+        if spans[0, i] <= t:
+            if t <= spans[1, i]:
+                room.d[i], rate, reach = body_distance(field.rows, field.back, field.grids, i, x, y, z)
+                fastest, most = max(fastest, rate * spans[2, i]), min(most, reach)
+        elif spans[0, i] < following:
+            following = spans[0, i]
+    value, near, who = folded(field.code, field.width, room.d, room.stack)
+    way = abs(value)
+    if value < 0.0 and field.mixed:
+        way = min(way, near)
+    way = min(max(min(way / fastest, most), STEP), following - t)
+    if value >= 0.0:
+        return value, OUT, 0.0, way
+    sigma = field.rows[who, 34]
+    return value, MEDIUM if sigma > 0.0 else OPAQUE, sigma, way
+
+
+@compiled
+def march(
+    field: Field, o: Any, d: Any, end: float, target: float, fine: bool, room: Room
+) -> tuple[float, int, float]:
+    """Follow a ray to its end, a surface, or an optical depth; how far it came, how it ended, the depth."""
+    rows, spans, stop = field.rows, room.spans, -1.0
+    for i in range(len(room.d)):
+        a, b, c = 0.0, 0.0, -rows[i, 20] * rows[i, 20]
+        for row in range(3):
+            e, f, g = rows[i, 4 * row], rows[i, 4 * row + 1], rows[i, 4 * row + 2]
+            p = e * o[0] + f * o[1] + g * o[2] + rows[i, 4 * row + 3] - rows[i, 17 + row]
+            v = e * d[0] + f * d[1] + g * d[2]
+            a, b, c = a + v * v, b + p * v, c + p * p
+        root = b * b - a * c
+        spans[0, i], spans[1, i], spans[2, i] = np.inf, -np.inf, math.sqrt(a)
+        if root > 0.0:
+            root = math.sqrt(root)
+            leave = min((root - b) / a, end)
+            if leave > 0.0 and (-b - root) / a < leave:
+                spans[0, i], spans[1, i] = (-b - root) / a, leave
+                stop = max(stop, leave)
+    if stop < 0.0:
+        return end, _ENDS, 0.0
+    t, tau = 0.0, 0.0
+    value, kind, sigma, way = probe(field, o, d, t, room)
+    if kind == OPAQUE:
+        return t, _STUCK, tau
+    for _ in range(MOST):
+        now = min(t + way, stop)
+        value1, kind1, sigma1, way = probe(field, o, d, now, room)
+        edge = now
+        if kind1 != kind:
+            edge = _edge(field, o, d, t, value, kind, now, value1, fine and kind1 == OPAQUE, room)
+        if sigma > 0.0:
+            if tau + sigma * (edge - t) >= target:
+                return t + (target - tau) / sigma, _MEETS, target
+            tau += sigma * (edge - t)
+        if kind1 == OPAQUE:
+            return edge, _HITS, tau
+        if sigma1 > 0.0 and edge < now:
+            if tau + sigma1 * (now - edge) >= target:
+                return edge + (target - tau) / sigma1, _MEETS, target
+            tau += sigma1 * (now - edge)
+        if now >= stop:
+            break
+        t, value, kind, sigma = now, value1, kind1, sigma1
+    return end, _ENDS, tau
+
+
+@compiled
+def _edge(
+    field: Field, o: Any, d: Any, low: float, low_d: float, kind: int, high: float, high_d: float, fine: bool,
+    room: Room,
+) -> float:  # fmt: skip
+    """The place between two points of a ray where kinds change, to about 1e-9 if ``fine``."""
+    if low_d < 0.0 and high_d < 0.0:
+        for _ in range(16 if fine else 0):
+            middle = (low + high) / 2
+            if probe(field, o, d, middle, room)[1] == kind:
+                low = middle
+            else:
+                high = middle
+        return (low + high) / 2
+    side, at = 0, low + (high - low) * low_d / (low_d - high_d)
+    for _ in range(8 if fine else 0):  # the Illinois rule
+        here = probe(field, o, d, at, room)[0]
+        if abs(here) < 1e-9:
+            break
+        if (here < 0.0) == (high_d < 0.0):
+            high, high_d = at, here
+            low_d = low_d / 2 if side == 1 else low_d
+            side = 1
+        else:
+            low, low_d = at, here
+            high_d = high_d / 2 if side == 2 else high_d
+            side = 2
+        at = low + (high - low) * low_d / (low_d - high_d)
+    return at
+
+
+@compiled
+def frame(n: Any) -> Any:
+    """Two unit vectors across a unit vector (Duff et al. 2017)."""
+    sign = 1.0 if n[2] >= 0.0 else -1.0
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    return (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1])
+
+
+@compiled
+def turned(n: Any, x: float, y: float, z: float) -> Any:
+    """A vector of the frame about ``n`` in the world."""
+    t, b = frame(n)
+    return (
+        x * t[0] + y * b[0] + z * n[0],
+        x * t[1] + y * b[1] + z * n[1],
+        x * t[2] + y * b[2] + z * n[2],
+    )
+
+
+@compiled
+def dot(a: Any, b: Any) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def plus(a: Any, s: float, b: Any) -> Any:
+    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
+
+
+@compiled
+def times(a: Any, s: float, b: Any) -> Any:
+    return (a[0] * s * b[0], a[1] * s * b[1], a[2] * s * b[2])
+
+
+@compiled
+def gains(light: Array, a: Any, s: float, b: Any) -> None:
+    """Add ``a`` times ``s`` times ``b`` to light."""
+    for c in range(3):
+        light[c] += a[c] * s * b[c]
+
+
+@compiled
+def to_lamp(w: World, j: int, p: Any, u: float, v: float) -> Any:
+    """Direction to a lamp, how far it is, how strong (1 / r² of a point), and its solid angle, 0 of none."""
+    lamp = w.lamps[j]
+    way = (lamp[0] - p[0], lamp[1] - p[1], lamp[2] - p[2])
+    r, radius = math.sqrt(dot(way, way)), lamp[6]
+    if radius == 0.0:
+        r = max(r, 1e-300)
+        return (way[0] / r, way[1] / r, way[2] / r), r, 1.0 / max(r, NEAREST) ** 2, 0.0
+    if r <= radius:
+        return (0.0, 1.0, 0.0), 0.0, 0.0, 0.0
+    sine = (radius / r) ** 2
+    cap = sine / (1.0 + math.sqrt(1.0 - sine))  # 1 - the cosine at the rim
+    cos = 1.0 - u * cap
+    sin2 = max(1.0 - cos * cos, 0.0)
+    x, phi = math.sqrt(sin2), 2 * math.pi * v
+    d = turned((way[0] / r, way[1] / r, way[2] / r), x * math.cos(phi), x * math.sin(phi), cos)
+    far = r * cos - math.sqrt(max(radius * radius - r * r * sin2, 0.0))
+    return d, far, 2.0 * cap / radius**2, 2.0 * math.pi * cap
+
+
+@compiled
+def reflect(kind: int, rgb: Any, alpha: float, n: Any, v: Any, way: Any, f: Array) -> Any:
+    """Write what a surface reflects from ``way`` to ``v``, times the cosine; the odds of ``way``."""
+    nv, nl = max(dot(n, v), 1e-6), dot(n, way)
+    if nl <= 0.0:
+        f[:] = 0.0
+        return 0.0
+    if kind == DIFFUSE:
+        for c in range(3):
+            f[c] = rgb[c] * nl / math.pi
+        return nl / math.pi
+    h = (v[0] + way[0], v[1] + way[1], v[2] + way[2])
+    size = max(math.sqrt(dot(h, h)), 1e-300)
+    nh, hv = dot(n, h) / size, dot(v, h) / size
+    a2 = alpha * alpha
+    density = a2 / (math.pi * (nh * nh * (a2 - 1.0) + 1.0) ** 2)
+    mask_v = 2.0 * nv / (nv + math.sqrt(a2 + (1.0 - a2) * nv * nv))
+    mask_l = 2.0 * nl / (nl + math.sqrt(a2 + (1.0 - a2) * nl * nl))
+    lobe = density * mask_v * mask_l / (4.0 * nv)
+    odds = density * mask_v / (4.0 * nv)
+    grazing = max(1.0 - hv, 0.0) ** 5
+    if kind == METAL:
+        for c in range(3):
+            f[c] = (rgb[c] + (1.0 - rgb[c]) * grazing) * lobe
+        return odds
+    base = (1.0 - 0.04 - 0.96 * (1.0 - nv) ** 5) * nl / math.pi
+    for c in range(3):
+        f[c] = (0.04 + 0.96 * grazing) * lobe + base * rgb[c]
+    return 0.5 * odds + 0.5 * nl / math.pi
+
+
+@compiled
+def mirrored(n: Any, v: Any, alpha: float, u: float, w: float) -> Any:
+    """A direction by the visible normals of GGX (Heitz 2018)."""
+    t, b = frame(n)
+    x, y, z = dot(t, v), dot(b, v), max(dot(n, v), 1e-6)
+    hx, hy, hz = alpha * x, alpha * y, z
+    size = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / size, hy / size, hz / size
+    flat = math.sqrt(hx * hx + hy * hy)
+    px, py = (-hy / flat, hx / flat) if flat > 1e-9 else (1.0, 0.0)
+    qx, qy, qz = -hz * py, hz * px, hx * py - hy * px
+    radius, phi = math.sqrt(u), 2 * math.pi * w
+    a, c = radius * math.cos(phi), radius * math.sin(phi)
+    c = (1.0 - (1.0 + hz) / 2) * math.sqrt(max(1.0 - a * a, 0.0)) + (1.0 + hz) / 2 * c
+    e = math.sqrt(max(1.0 - a * a - c * c, 0.0))
+    mx, my = alpha * (a * px + c * qx + e * hx), alpha * (a * py + c * qy + e * hy)
+    mz = max(c * qz + e * hz, 0.0)
+    size = max(math.sqrt(mx * mx + my * my + mz * mz), 1e-300)
+    mx, my, mz = mx / size, my / size, mz / size
+    k = 2.0 * (x * mx + y * my + z * mz)
+    return turned(n, k * mx - x, k * my - y, k * mz - z)
+
+
+@compiled
+def lamps_at(
+    w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room, dim: int
+) -> Any:
+    """Light (3,) that lamps send by way of a point: at the eye's from all, else from one by chance."""
+    count = len(w.lamps)
+    out = (0.0, 0.0, 0.0)
+    if count == 0:
+        return out
+    u, x, pick = draw(room, dim), draw(room, dim + 1), draw(room, dim + 2)
+    total = 0.0
+    if dim >= _TURN and count > 1:
+        for j in range(count):
+            total += _guess(w, j, p)
+        pick *= total
+    for j in range(count):
+        share = 1.0
+        if total > 0.0:
+            guess = _guess(w, j, p)
+            share, pick = guess / total, pick - guess
+            if pick >= 0.0 and j < count - 1:
+                continue
+        u1, x1 = (u + j * 0.7548776662466927) % 1.0, (x + j * 0.5698402909980532) % 1.0
+        d, far, strength, angle = to_lamp(w, j, p, u1, x1)
+        weight = math.pi * strength / share
+        if kind == VOLUMETRIC:
+            for c in range(3):
+                room.f[c] = rgb[c] / (4.0 * math.pi)
+            if w.lamps[j, 7] > 0.0 and room.ray[8] > 0.0:
+                weight *= room.ray[8] / (room.ray[8] + beside(w, j, room.ray, p)[1])
+        else:
+            odds = reflect(kind, rgb, alpha, n, v, d, room.f)
+            if kind != DIFFUSE and angle > 0.0:
+                weight /= 1.0 + odds * angle
+        f = room.f[0], room.f[1], room.f[2]
+        if weight * max(f[0], max(f[1], f[2])) > 0.0:
+            _, ending, tau = march(w.field, p, d, far, np.inf, False, room)
+            if ending == _ENDS:
+                weight *= math.exp(-tau)
+                lamp = w.lamps[j]
+                out = plus(out, weight, (f[0] * lamp[3], f[1] * lamp[4], f[2] * lamp[5]))
+        if total > 0.0:
+            break
+    return out
+
+
+@compiled
+def beside(w: World, j: int, ray: Array, p: Any) -> Any:
+    """Where the angle at a lamp begins and how far it goes along a ray, the odds of a point of it, and the
+    foot and length of the perpendicular (Kulla and Fajardo 2012).
+    """
+    o, d = (ray[0], ray[1], ray[2]), (ray[3], ray[4], ray[5])
+    way = (w.lamps[j, 0] - o[0], w.lamps[j, 1] - o[1], w.lamps[j, 2] - o[2])
+    foot = dot(way, d)
+    off = max(math.sqrt(max(dot(way, way) - foot * foot, 0.0)), 1e-5)
+    low, high = math.atan((ray[6] - foot) / off), math.atan((ray[7] - foot) / off)
+    t = dot((p[0] - o[0], p[1] - o[1], p[2] - o[2]), d) - foot
+    return low, off / ((high - low) * (off * off + t * t)), high - low, foot, off
+
+
+@compiled
+def passing(w: World, o: Any, d: Any, cap: float, room: Room) -> Any:
+    """Light (3,) that media along a ray scatter of lamps in or near them, by points chosen by the angle."""
+    ray, out = room.ray, (0.0, 0.0, 0.0)
+    ray[0], ray[1], ray[2], ray[3], ray[4], ray[5] = o[0], o[1], o[2], d[0], d[1], d[2]
+    ray[6], ray[7], ray[8] = np.inf, 0.0, 0.0
+    for i in range(len(room.d)):
+        if w.field.rows[i, 34] > 0.0 and room.spans[1, i] > 0.0:
+            ray[6], ray[7] = min(ray[6], max(room.spans[0, i], 0.0)), max(ray[7], room.spans[1, i])
+    for j in range(len(w.lamps)):
+        if w.lamps[j, 7] == 0.0 or ray[7] <= ray[6]:
+            continue
+        low, _, wide, foot, off = beside(w, j, ray, o)
+        t = foot + off * math.tan(low + wide * draw(room, _DIMENSIONS))
+        t = min(max(t, ray[6]), ray[7])
+        p = plus(o, t, d)
+        who = colours(w, p[0], p[1], p[2], room.d, room.stack, room.look)
+        sigma = w.field.rows[who, 34]
+        if room.stack[0, 0] >= 0.0 or sigma == 0.0:
+            continue
+        rgb = (min(room.look[0], cap), min(room.look[1], cap), min(room.look[2], cap))
+        way, far, strength, _ = to_lamp(w, j, p, draw(room, _DIMENSIONS), draw(room, _DIMENSIONS))
+        if strength == 0.0:
+            continue
+        _, ending, before = march(w.field, o, d, t, np.inf, False, room)
+        if ending != _ENDS:
+            continue
+        _, ending, after = march(w.field, p, way, far, np.inf, False, room)
+        if ending == _ENDS:
+            meets = sigma * math.exp(-before)
+            share = meets * math.exp(-after) * strength / 4.0 / (meets + beside(w, j, ray, p)[1])
+            lamp = w.lamps[j]
+            out = plus(out, share, (rgb[0] * lamp[3], rgb[1] * lamp[4], rgb[2] * lamp[5]))
+    return out
+
+
+@compiled
+def _guess(w: World, j: int, p: Any) -> Any:
+    """About how much light a lamp sends to a point."""
+    lamp = w.lamps[j]
+    way = (lamp[0] - p[0], lamp[1] - p[1], lamp[2] - p[2])
+    return max(lamp[3], lamp[4], lamp[5]) / max(dot(way, way), 0.01 + lamp[6] * lamp[6])
+
+
+@compiled
+def end_of(w: World, o: Any, d: Any) -> Any:
+    """How far away a ray meets the ground."""
+    return (w.ground[0] - o[1]) / d[1] if d[1] < 0.0 and o[1] > w.ground[0] else np.inf
+
+
+@compiled
+def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Room, dim: int) -> None:
+    """Write the light and alpha (4,) that come along a ray; ``known`` is how far it goes, or -1."""
+    light, through = room.light, (1.0, 1.0, 1.0)
+    light[:] = 0.0
+    odds, tau = -1.0, 0.0  # odds of the direction, where lamps are met by it too
+    for turn in range(MOST):
+        end = end_of(w, o, d)
+        t, ending = known, how
+        if t < 0.0:
+            target = -math.log(1.0 - draw(room, dim)) if w.media else np.inf
+            t, ending, tau = march(w.field, o, d, end, target, True, room)
+        known = -1.0
+        if w.media and ending != _STUCK and len(w.lamps) and w.lamps[:, 7].any():
+            sent = passing(w, o, d, CAPS[1], room)
+            gains(light, through, 1.0, sent)
+        if odds >= 0.0:
+            for j in range(len(w.lamps)):
+                lamp = w.lamps[j]
+                way = (lamp[0] - o[0], lamp[1] - o[1], lamp[2] - o[2])
+                along, far = dot(way, d), dot(way, way)
+                root = along * along - far + lamp[6] ** 2
+                ahead = lamp[6] > 0.0 and along > 0.0 and root > 0.0 and far > lamp[6] ** 2
+                if ahead and along - math.sqrt(root) < t:
+                    sine = lamp[6] ** 2 / far
+                    angle = 2 * math.pi * sine / (1.0 + math.sqrt(1.0 - sine))
+                    weight = odds * angle / (1.0 + odds * angle) / lamp[6] ** 2
+                    gains(light, through, weight, lamp[3:6])
+        if ending == _STUCK:
+            break
+        p = plus(o, t, d)
+        sky = w.seen if eye else w.sky
+        if ending == _ENDS and end == np.inf:
+            up = min(max(d[1] / 0.5, 0.0), 1.0)
+            for c in range(3):
+                light[c] += through[c] * (sky[c] + (sky[3 + c] - sky[c]) * up) * (w.seen[6] if eye else 1.0)
+            light[3] = max(light[3], w.seen[6])
+            break
+        light[3] = 1.0
+        kind, alpha, n, lift = DIFFUSE, 0.0, (0.0, 1.0, 0.0), LIFT
+        if ending == _ENDS:
+            clear = math.exp(-(p[0] * p[0] + p[2] * p[2]) / FADE)
+            gains(light, through, 1.0 - clear, sky)
+            through = times(through, clear, ONES)
+            rgb, cap = (w.ground[1], w.ground[2], w.ground[3]), CAPS[0]
+        else:
+            q = _INSIDE if ending == _HITS else 0.0
+            look = room.look
+            x, y, z = plus(p, q, d)
+            who = colours(w, x, y, z, room.d, room.stack, look)
+            gains(light, through, 1.0, look[3:6])
+            rgb, kind, cap = (look[0], look[1], look[2]), int(w.field.rows[who, 33]), CAPS[0]
+            if ending == _MEETS:
+                kind, cap, lift = VOLUMETRIC, CAPS[1], 0.0
+                room.ray[8] = w.field.rows[who, 34] * math.exp(-tau)
+            else:
+                alpha = w.look[who, 6] ** 2
+                n = slope(w.field, who, p[0], p[1], p[2], room.d, room.stack)
+                if dot(n, d) > 0.0:
+                    n = (-n[0], -n[1], -n[2])
+        rgb = (min(rgb[0], cap), min(rgb[1], cap), min(rgb[2], cap))
+        o = plus(p, lift, n)
+        v = (-d[0], -d[1], -d[2])
+        sent = lamps_at(w, o, n, v, kind, alpha, rgb, room, dim + 1)
+        gains(light, through, 1.0, sent)
+        d, odds, ratio = onward(w, o, n, v, kind, alpha, rgb, room, dim + 4)
+        through = times(through, 1.0, ratio)
+        most = max(through[0], max(through[1], through[2]))
+        if turn >= SURELY:
+            keep = min(most, 0.99)
+            if draw(room, dim + 7) >= keep:
+                break
+            through = times(through, 1.0 / keep, ONES)
+        if most <= 0.0:
+            break
+        eye = False
+        dim += _TURN
+
+
+@compiled
+def onward(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room, dim: int) -> Any:
+    """A path's next direction, its odds where lamps are met by it too (else -1), and its weight (3,)."""
+    a, b, pick = draw(room, dim), draw(room, dim + 1), draw(room, dim + 2)
+    aims = AIMED if len(w.glowing) else 0.0
+    if pick < aims:
+        d = aimed(w.glowing, p, pick / aims, a, b)
+    else:
+        pick = (pick - aims) / (1.0 - aims)
+        if kind == VOLUMETRIC:
+            d = around(a, b)
+        elif kind == METAL or (kind == GLOSSY and pick < 0.5):
+            d = mirrored(n, v, alpha, a, b)
+        else:
+            d = across(n, a, b)
+    if aims == 0.0 and kind in (VOLUMETRIC, DIFFUSE):
+        return d, -1.0, rgb
+    f = room.f
+    if kind == VOLUMETRIC:
+        odds = 1.0 / (4.0 * math.pi)
+        f[0], f[1], f[2] = rgb[0] * odds, rgb[1] * odds, rgb[2] * odds
+    else:
+        odds = reflect(kind, rgb, alpha, n, v, d, f)
+    if max(f[0], max(f[1], f[2])) <= 0.0:
+        return d, -1.0, (0.0, 0.0, 0.0)
+    meets = odds if kind in (GLOSSY, METAL) else -1.0
+    if aims > 0.0:
+        odds = (1.0 - aims) * odds + aims * aim_odds(w.glowing, p, d)
+    return d, meets, (f[0] / odds, f[1] / odds, f[2] / odds)
+
+
+@compiled
+def _seen(balls: Array, j: int, p: Any) -> Any:
+    """The direction of a ball, 1 - the cosine of its rim, and how bright it may be."""
+    way = (balls[j, 0] - p[0], balls[j, 1] - p[1], balls[j, 2] - p[2])
+    r2, radius2 = dot(way, way), balls[j, 3] * balls[j, 3]
+    if r2 <= radius2:
+        return (0.0, 0.0, 1.0), 2.0, balls[j, 4]
+    r, sine = math.sqrt(r2), radius2 / r2
+    return (way[0] / r, way[1] / r, way[2] / r), sine / (1.0 + math.sqrt(1.0 - sine)), balls[j, 4] * sine
+
+
+@compiled
+def aimed(balls: Array, p: Any, pick: float, a: float, b: float) -> Any:
+    """A direction into a ball."""
+    total = 0.0
+    for j in range(len(balls)):
+        total += _seen(balls, j, p)[2]
+    pick *= total
+    for j in range(len(balls)):
+        way, cap, bright = _seen(balls, j, p)
+        pick -= bright
+        if pick < 0.0 or j == len(balls) - 1:
+            cos = 1.0 - a * cap
+            r, phi = math.sqrt(max(1.0 - cos * cos, 0.0)), 2 * math.pi * b
+            return turned(way, r * math.cos(phi), r * math.sin(phi), cos)
+    return p
+
+
+@compiled
+def aim_odds(balls: Array, p: Any, d: Any) -> float:
+    """The odds of a direction as of `aimed`."""
+    total, found = 0.0, 0.0
+    for j in range(len(balls)):
+        way, cap, bright = _seen(balls, j, p)
+        total += bright
+        if dot(way, d) >= 1.0 - cap:
+            found += bright / (2.0 * math.pi * cap)
+    return found / total
+
+
+@compiled
+def across(n: Any, a: float, b: float) -> Any:
+    """A direction by the cosine with ``n``."""
+    r, phi = math.sqrt(a), 2 * math.pi * b
+    return turned(n, r * math.cos(phi), r * math.sin(phi), math.sqrt(1.0 - a))
+
+
+@compiled
+def around(a: float, b: float) -> Any:
+    """A direction of the sphere."""
+    z = 1.0 - 2.0 * a
+    r = math.sqrt(max(1.0 - z * z, 0.0))
+    return (r * math.cos(2 * math.pi * b), r * math.sin(2 * math.pi * b), z)
+
+
+@compiled
+def traced(
+    w: World, o: Array, d: Array, mode: int, lamps: bool, block: int, first: int, seed: Any, count: int,
+    room: Room, out: Array,
+) -> None:  # fmt: skip
+    """Write the mean light (M, 4) of ``count`` paths for each of M rays or points; see `light`."""
+    up = (0.0, 1.0, 0.0)
+    for m in range(len(o)):
+        own = scrambled(seed + np.uint64((first + m) // block) * _GOLDEN)
+        room.chance[1] = scrambled(own + _ONE)
+        room.chance[0] = scrambled(own + np.uint64((first + m) % block) * _TWO)
+        p, n = (o[m, 0], o[m, 1], o[m, 2]), (d[m, 0], d[m, 1], d[m, 2])
+        known, how, paths = -1.0, 0, count
+        out[m] = 0.0
+        if mode == EYE and not w.media:
+            known, how, _ = march(w.field, p, n, end_of(w, p, n), np.inf, True, room)
+            if how == _ENDS and known == np.inf:
+                paths = 1
+        for i in range(paths):
+            room.chance[2] = np.uint64((first + m) % block * count + i)
+            base, way, start = 0, n, p
+            if mode >= SURFACE:
+                a, b = draw(room, 4), draw(room, 5)
+                base = _TURN
+                way = around(a, b) if mode == MIDST else across(n, a, b)
+                if mode == SURFACE:
+                    start = plus(p, LIFT, n)
+                if lamps:
+                    room.ray[8], kind = 0.0, VOLUMETRIC if mode == MIDST else DIFFUSE
+                    sent = lamps_at(w, start, n, up, kind, 0.0, ONES, room, 1)
+                    for c in range(3):
+                        out[m, c] += sent[c]
+            follow(w, start, way, mode == EYE, known, how, room, base)
+            for c in range(4):
+                out[m, c] += room.light[c]
+        for c in range(4):
+            out[m, c] /= paths
+
+
+def light(
+    w: World,
+    origins: npt.ArrayLike,
+    directions: npt.ArrayLike,
+    paths: int,
+    *,
+    mode: int = RAY,
+    lamps: bool = True,
+    block: int = 1,
+    seed: int = 0,
+    threads: int = 2,
+) -> Array:
+    """Trace light to rays or points.
+
+    Args:
+        w: a scene.
+        origins, directions: (M, 3), the latter of length 1.
+        paths: of each ray, a power of two.
+        mode: `EYE` or `RAY` for radiance along rays; `SURFACE` for (1/π) ∫ L cos θ dω about normals, which
+            directions are then; `MIDST` for (1/4π) ∫ L dω.
+        lamps: with the lamps' own light, in the last two.
+        block: as many rays in order share their Sobol' points, as the samples of a pixel do.
+
+    Returns:
+        Linear light and alpha (M, 4).
+    """
+    from scipy.stats.qmc import Sobol
+
+    o, d = (np.ascontiguousarray(v, np.float64) for v in (origins, directions))
+    count = block * paths
+    table = np.asarray(Sobol(_DIMENSIONS, scramble=False).random(count))
+    out = np.empty((len(o), 4))
+    size = max(block, -(-min(4096, -(-len(o) // (8 * threads))) // block) * block)
+    key = np.uint64(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
+
+    def part(first: int) -> None:
+        rows = slice(first, first + size)
+        traced(w, o[rows], d[rows], mode, lamps, block, first, key, paths, room_of(w, table), out[rows])
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(part, range(0, len(o), size)))
+    return out
+
+
+def irradiance(w: World, points: Array, normals: Array, paths: int, **how: Any) -> Array:
+    """(1/π) ∫ L cos θ dω (M, 3) over the hemispheres of surface points (M, 3); options as of `light`."""
+    return light(w, points, normals, paths, mode=SURFACE, **how)[:, :3]
+
+
+def fluence(w: World, points: Array, paths: int, **how: Any) -> Array:
+    """(1/4π) ∫ L dω (M, 3) over the sphere at points (M, 3); options as of `light`."""
+    return light(w, points, np.zeros_like(points), paths, mode=MIDST, **how)[:, :3]
+
+
+class Traced(NamedTuple):
+    """Linear light and alpha (4, H, W), and the standard error of the mean, the like."""
+
+    mean: Array
+    error: Array
+    paths: int  # of a pixel
+
+    @property
+    def decibels(self) -> float:
+        """PSNR of the encoded picture to what more paths would give, as far as the standard error tells."""
+        high, low = encoded(self.mean[:3] + self.error[:3]), encoded(self.mean[:3] - self.error[:3])
+        return float(-10.0 * np.log10(np.mean(((high - low) / 2.0) ** 2) + 1e-12))
+
+
+def traced_picture(
+    w: World,
+    stage: Stage,
+    canvas: tuple[int, int],
+    *,
+    per_side: int = 2,
+    paths: int = 64,
+    batch: int = 64,
+    enough: float = np.inf,
+    seed: int = 0,
+    threads: int = 2,
+) -> Traced:
+    """Trace a picture.
+
+    Args:
+        w: the scene's tables; ``stage`` has its camera.
+        canvas: width and height in pixels.
+        per_side: samples of a pixel along each side.
+        paths: of a pixel at most, in batches of a power of two for each sample, two at least.
+        enough: decibels of `Traced` after which no batch begins.
+    """
+    width, height = canvas
+    d = ways(stage, canvas, range(height), per_side)
+    d = d.reshape(3, height, per_side, width, per_side).transpose(1, 3, 2, 4, 0).reshape(-1, 3)
+    o = np.broadcast_to(np.asarray(stage.camera.eye), d.shape)
+    block = per_side**2
+    each = 1 << max(0, round(math.log2(max(batch / block, 1))))
+    total, square = np.zeros((2, 4, height, width))
+    for done in range(1, max(paths // (each * block), 2) + 1):
+        found = light(w, o, d, each, mode=EYE, block=block, seed=seed * 65_537 + done, threads=threads)
+        value = found.reshape(height, width, block, 4).mean(2).transpose(2, 0, 1)
+        total, square = total + value, square + value**2
+        spread = np.maximum(square / done - (total / done) ** 2, 0.0) / max(done - 1, 1)
+        traced = Traced(total / done, np.sqrt(spread), each * block * done)
+        if done > 1 and traced.decibels >= enough:
+            break
+    return traced

@@ -1,0 +1,473 @@
+"""Light that arrives from everywhere: sky, ground, and surfaces that pass light on.
+
+1. *Nodes* (`nodes.py`) on objects and ground are lit by lamps. Rays from each, the same in every picture,
+   find what it sees; what nodes send to nodes is a matrix, and its fixed point has all bounces (radiosity).
+2. From the points of a lattice on the picture rays go all over the hemisphere (final gathering). Nodes around
+   where they end say what comes from there.
+3. Points of the lattice share what they receive with those around on the same surface. Pixels between take
+   from these, or send a few rays themselves.
+
+Letters: J nodes, K points, L points of the lattice, R rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from scenelang.compiler.spaces import FADE, LIFT, Ground, Sky, Stage
+from scenelang.drawing.arrays import NUMPY, Array, Arrays
+from scenelang.drawing.solid.emitters import Emitters
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.mist import Mist
+from scenelang.drawing.solid.near import near
+from scenelang.drawing.solid.network import Wanted
+from scenelang.drawing.solid.nodes import Nodes, ground_places, on_ground, on_objects, turned
+from scenelang.drawing.solid.passes import INF
+
+RAYS, GROUND_RAYS = 16, 16  # of nodes on objects and on the ground
+GAP = 0.01  # world units, as of `MarchSettings`
+DOME = 64  # directions to the sky alone
+CAP = 0.98  # of colours
+ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
+EXACT = 1e-3  # the part of the light that bounces leave out at most
+FLAT = 1e-6  # sine: directions so level meet no ground
+NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearby
+TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
+ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
+GOLDEN = 2.399963  # radians
+LATTICE = 40  # of points along the picture's shorter side
+LATTICE_RAYS, PIXEL_RAYS, MISTY = 32, 8, 4  # of each, of pixels that are asked themselves, and through media
+SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
+WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
+OFF = 1e-3  # world units off a surface where these begin
+TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
+EIGHTHS = 8  # of pixels are places told apart by
+# of the light on the lattice, above which there are more rays, and how many
+NOISE, MORE = 0.03, 192
+BATCH = 1 << 16  # rays at once
+THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
+ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
+ELSEWHERE = 1e6  # world units: where points are that the eye does not see
+NEXT = (0, 0), (1, 0), (0, 1), (1, 1)
+AROUND = tuple((x, y) for x in range(-1, 3) for y in range(-1, 3))  # of those corners
+PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
+CELLS = 10  # of the grid of nodes, along its longest side
+
+
+def disc(r: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Directions (3, …) above places of the unit disc."""
+    return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r * r)])
+
+
+def product(xp: Arrays, a: Array, b: Array) -> Array:
+    """The product of matrices (M, K) and (K, N), so few rows at once that OpenBLAS keeps to one core."""
+    each = max(1, PRODUCTS // max(1, b.shape[0] * b.shape[1]))
+    return xp.concat([a[at : at + each] @ b for at in range(0, max(1, len(a)), each)], 0)
+
+
+def to_ground(xp: Arrays, ground: Ground | None, y: Array | float, way: Array) -> Array:
+    """Distances (K,) to the ground along rays (3, K) from a height y, inf where there is none."""
+    never = 0 * way[0] + INF
+    if ground is None:
+        return never
+    down = (way[1] < 0) & (y > ground.y)
+    return xp.select(down, (ground.y - y) / xp.select(down, way[1], way[1] * 0 - 1), never)
+
+
+class Lookup:
+    """Nodes on objects near places, by a grid whose cells know the nearest ones."""
+
+    def __init__(self, xp: Arrays, nodes: Nodes) -> None:
+        self.xp, self.nodes = xp, nodes
+        p = np.asarray(xp.to_numpy(nodes.p))  # (3, J)
+        low, high = p.min(1), p.max(1)
+        self.side = max(float((high - low).max()) / CELLS, 1e-3)
+        self.low, self.counts = low, np.ceil((high - low) / self.side).astype(int).clip(1)
+        places = np.stack(np.meshgrid(*map(np.arange, self.counts), indexing="ij"), 0).reshape(3, -1)
+        centres = (low[:, None] + (places + 0.5) * self.side).astype(np.float32)
+        off = (p * p).sum(0) - 2 * product(NUMPY, centres.T, p)  # (cells, J), less the same in each row
+        count, most = (min(number, p.shape[1]) for number in (NEAREST, CLOSE))
+        close = np.argpartition(off, most - 1, 1)[:, :most]
+        off = np.take_along_axis(off, close, 1)
+        off -= off.min(1)[:, None]
+        facing, found = np.asarray(xp.to_numpy(nodes.n)).T[close], []
+        for axis, sign in np.ndindex(3, 2):  # of ways: those nodes that face against them
+            along = facing[..., axis] * (2 * sign - 1)
+            chosen = np.argpartition(off + AWAY * (along > -TURNED), count - 1, 1)[:, :count]
+            found.append(np.take_along_axis(close, chosen, 1))
+        self.index = xp.array(np.concatenate(found).astype(np.int64), nodes.p)  # (6 cells, k)
+        # what places ask, cell by cell: positions, normals and weights of its nodes (cells, 7, k)
+        self.about = self.rows(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0))
+        self.room = float(self.side / 4) ** 2  # the square of how near is near
+
+    def rows(self, values: Array) -> Array:
+        """Values (R, J) of nodes, cell by cell (cells, R, k)."""
+        rows = self.xp.take(values[:, : len(self.nodes.weight)], self.index.reshape(-1))
+        return self.xp.packed(rows.reshape(len(values), *self.index.shape).swapaxes(0, 1))
+
+    def near(self, p: Array, way: Array) -> tuple[Array, Array]:
+        """Cells (K,) of points (3, K), and shares (K, k) of the nodes near them that face against unit
+        directions and in whose planes they lie.
+        """
+        xp, size = self.xp, abs(way)
+        first, second = size[0] >= xp.maximum(size[1], size[2]), size[1] >= size[2]
+        along = xp.select(first, way[0], xp.select(second, way[1], way[2]))
+        cell = xp.whole(~first) * xp.whole(4 - 2 * second) + xp.whole(along > 0)
+        for axis, count in enumerate(self.counts.tolist()):
+            at = (p[axis] - float(self.low[axis])) / self.side
+            cell = cell * count + self.xp.whole(at.clip(0, count - 1))
+        about = self.about[cell]
+        facing: Any = 0.0
+        above: Any = 0.0
+        square = self.room
+        for axis in range(3):
+            off, normal = about[:, axis] - p[axis][:, None], about[:, 3 + axis]
+            square = square + off * off
+            above = above + off * normal
+            facing = facing - normal * way[axis][:, None]
+        square = square + ASIDE * (above * above)
+        shares = about[:, 6] * (facing.clip(0.0) ** 2 + 1e-5) / (square * square)
+        return cell, shares / shares.sum(1).clip(1e-20)[:, None]
+
+    def mixed(self, rows: Array, cell: Array, shares: Array) -> Array:
+        """Values (R, K) of nodes, as `rows` has them, by their shares."""
+        return (rows[cell] * shares[:, None]).sum(2).T
+
+
+class Seen(NamedTuple):
+    """Points of the eye's rays on a lattice of the picture, row by row."""
+
+    p: Array  # (3, L); where there is nothing, far away
+    n: Array  # (3, L) unit normals
+    received: Array  # (3, L)
+
+
+class Around:
+    """The light that arrives at points of a field under a stage, but for what comes straight from lamps.
+
+    ``lamps`` tells what points (3, K) with unit normals (3, K) receive of these.
+    """
+
+    fixed: Any = None  # what it rests on, see `arriving`
+
+    def __init__(self, field: SolidField, stage: Stage, lamps: Callable[[Array, Array], Array]) -> None:
+        self.field, self.stage, self.xp = field, stage, field.xp
+        xp, like, sky = field.xp, field.network.codes, stage.sky or Sky()
+        self.horizon, self.zenith = (
+            xp.array(np.asarray(colour, np.float32) * np.float32(sky.power), like)[:, None]
+            for colour in (sky.horizon, sky.zenith)
+        )
+        self.seen: Any = None  # a `Seen`, once a picture is looked at
+        self.mist = Mist(field, stage) if field.media else None
+        own, floor = on_objects(field, stage), on_ground(field, stage)
+        self.emitters = Emitters(field, own)
+        kept = xp.where(own.place[4] > 0)
+        own = Nodes(*(xp.take(part, kept) for part in own))
+        self.first = own.p.shape[1]  # node of the ground
+        self.lookup: Any = Lookup(xp, own) if self.first else None
+        self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
+        self.count = self.nodes.p.shape[1]
+        n, numbers = self.nodes, np.arange(self.count)
+        rays = np.where(numbers < self.first, RAYS, GROUND_RAYS)
+        with xp.inference():
+            matrix, less = self._row(numbers, rays)
+            self.exchange = matrix, self._dome(n.n) + less
+        self.light(lamps)
+
+    def light(self, lamps: Callable[[Array, Array], Array]) -> None:
+        """Find what nodes send and receive under lamps."""
+        n = self.nodes
+        with self.xp.inference():
+            direct = lamps(n.p, n.n) + self.emitters.received(n.p, n.n)
+            received = self._solved(direct)
+            self.sent = n.colour.clip(0.0, CAP) * (direct + received)  # (3, J), without what glows
+            self.sent_rows = self.lookup.rows(self.sent) if self.lookup else None
+        if self.mist is not None:
+            self.mist.relight(self._floored)
+            self.medium = self.mist.medium
+
+    def look(
+        self, canvas: tuple[int, int], places: Callable[[np.ndarray, np.ndarray], tuple[Array, Array]]
+    ) -> None:
+        """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
+        by places of the picture in pixels.
+        """
+        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE))
+        self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
+        with self.xp.inference():
+            p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
+            wanted = Wanted.KIND if self.field.mixed else Wanted.DISTANCE
+            found = near(self.field, p + OFF * n, 0 * p[0] + GAP, wanted)
+            buried = found.distance < 0  # in what touches the surface
+            if self.field.mixed:
+                buried = buried & (found.register[0] < 0.5)
+            p = p + 2 * ELSEWHERE * buried
+            there = self.xp.where(p[0] < ELSEWHERE)
+            numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
+
+            def received(rays: int) -> Array:
+                result = 0 * p
+                light = self.gathered(self.xp.take(p, there), self.xp.take(n, there), numbers, rays)
+                self.xp.put(result, there, light)
+                return result
+
+            self.seen = Seen(p, n, received(LATTICE_RAYS))
+            light, even = self.seen.received, self._evened()
+            noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
+            rays = round(min(max(noise / NOISE - 1, 0.0), 1.0) * MORE / LATTICE_RAYS) * LATTICE_RAYS
+            if rays:  # inside of what is closed
+                share = LATTICE_RAYS / (LATTICE_RAYS + rays)
+                self.seen = self.seen._replace(received=light * share + received(rays) * (1 - share))
+                even = self._evened()
+            self.seen = self.seen._replace(received=even)
+
+    def sky(self, way: Array) -> Array:
+        """Light of the sky (3, …) from directions (3, …)."""
+        high = (way[1] * 2).clip(0.0, 1.0)
+        shape = (3,) + (1,) * (way.ndim - 1)
+        return self.horizon.reshape(shape) + (self.zenith - self.horizon).reshape(shape) * high
+
+    def _dome(self, n: Array) -> Array:
+        """What points with unit normals (3, K) receive of the sky alone (3, K)."""
+        xp, index = self.xp, np.arange(DOME)
+        local = disc(np.sqrt((index + 0.5) / DOME), GOLDEN * index)[:, :, None].astype(np.float32)
+        up = turned(xp, n, xp.array(local, n), (1,))[0]
+        open_ = up >= -FLAT if self.stage.ground is not None else up > -INF
+        high = ((2 * up).clip(0.0, 1.0) * open_).sum(0) / DOME
+        return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
+
+    def _row(self, index: np.ndarray, rays: np.ndarray) -> tuple[Array, Array]:
+        """What nodes (k,) see of each node (k, J) by so many rays, and of the horizon less what is hidden of
+        the sky (3, k).
+        """
+        xp, nodes, count = self.xp, self.nodes, len(index)
+        row, escaped = xp.full((1, count * self.count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
+        found: list[tuple[Array, Array]] = []  # places in the row, and shares
+        node = np.repeat(np.arange(count), rays)
+        each = np.arange(len(node)) - np.repeat(np.cumsum(rays) - rays, rays)
+        share = 1 / rays[node]
+        own = np.asarray(xp.to_numpy(nodes.place[:3]), np.float64)[:, index]
+        turns = 2 * np.pi * (SCATTER @ own % 1.0)[node]
+        local = disc(np.sqrt((each + 0.5) * share), GOLDEN * each + turns).astype(np.float32)
+        node, share, local = (xp.array(part, nodes.p) for part in (node, share.astype(np.float32), local))
+        n = nodes.n[:, index]
+        way = turned(xp, xp.take(n, node), local)
+        p = xp.take(nodes.p[:, index] + LIFT * n, node)
+        limit = to_ground(xp, self.stage.ground, p[1], way)
+        hit, through = march(self.field, p, way, limit, 0, GAP, True).hit, share
+        if self.mist is not None:
+            light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
+            xp.add(escaped, node, light * share)
+            through = share * clear
+        met = xp.where(hit < INF)
+        if len(met) and self.lookup is not None:
+            ways = xp.take(way, met)
+            at = xp.take(p, met) + ways * xp.take(hit, met)
+            cell, shares = self._around(at, ways)
+            place = (xp.take(node, met) * self.count)[:, None] + self.lookup.index[cell]
+            found.append((place.reshape(-1), (shares * xp.take(through, met)[:, None]).reshape(-1)))
+        floor = xp.where((hit == INF) & (limit < INF))
+        if len(floor):
+            at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
+            index, shares, kept = self._on_floor(at)
+            place, part = xp.take(node, floor) * self.count + index, xp.take(through, floor)
+            found.append((place.reshape(-1), (shares * (kept * part)).reshape(-1)))
+            xp.add(escaped, xp.take(node, floor), self.horizon * ((1 - kept) * part))
+        if found:
+            place, shares = (xp.concat(parts, 0) for parts in zip(*found, strict=True))
+            xp.add(row, place, shares[None])
+        lost = share - through * (hit == INF)
+        hidden = xp.where((lost > 0) & ((way[1] >= -FLAT) | (self.stage.ground is None)))
+        xp.add(escaped, xp.take(node, hidden), -self.sky(xp.take(way, hidden)) * xp.take(lost, hidden))
+        return row.reshape(count, self.count), escaped
+
+    def _around(self, at: Array, way: Array) -> tuple[Array, Array]:
+        """Cells and shares, as of `Lookup.near`, of nodes around points (3, K) where rays end."""
+        xp = self.xp
+        g = near(self.field, at, 0 * at[0] + GAP, gradient=True).gradient
+        against = (g * way).sum(0) > 0
+        g = g * (xp.select(against, 0 * at[0] + 1, 0 * at[0] - 1) / xp.length(list(g)).clip(1e-9))
+        way = WAY * way + g
+        lookup: Lookup = self.lookup
+        return lookup.near(at, way / xp.length(list(way)).clip(1e-9))
+
+    def _on_floor(self, at: Array) -> tuple[Array, Array, Array]:
+        """Nodes (4, K) around points on the ground, their shares, and how much is kept in the fade."""
+        xp = self.xp
+        index, shares = ground_places(xp, at[0], at[2])
+        index = index + self.first
+        shares = shares * (xp.take(self.nodes.weight, index.reshape(-1)).reshape(index.shape) + 1e-4)
+        return index, shares / shares.sum(0), xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / FADE))
+
+    def _solved(self, direct: Array) -> Array:
+        """What nodes receive (3, J) after any number of bounces, by generalised conjugate residuals
+        (Eisenstat, Elman and Schultz 1983).
+        """
+        xp, colour, (matrix, escaped) = self.xp, self.nodes.colour.clip(0.0, CAP), self.exchange
+
+        def through(values: Array) -> Array:
+            return product(xp, matrix, xp.packed(values.T)).T
+
+        r = through(direct * colour) + escaped
+        x, least, kept = 0 * r, EXACT**2 * float((r * r).sum()), list[tuple[Array, Array, float]]()
+        for _ in range(ROUNDS):
+            p, q = r, r - through(colour * r)
+            for before, image, size in kept:
+                share = float((q * image).sum()) / size
+                p, q = p - share * before, q - share * image
+            size = float((q * q).sum())
+            if size <= 1e-3 * least:
+                break
+            share = float((r * q).sum()) / size
+            x, r, kept = x + share * p, r - share * q, [*kept[1 - KEPT :], (p, q, size)]
+            if float((r * r).sum()) <= least:
+                break
+        return x
+
+    def _floored(self, at: Array) -> Array:
+        """What the ground sends (3, K) from points (3, K) of it."""
+        index, shares, kept = self._on_floor(at)
+        return self._mixed(self.sent, index, shares) * kept + self.horizon * (1 - kept)
+
+    def _mixed(self, values: Array, index: Array, shares: Array) -> Array:
+        """Values (3, K) of those of nodes (3, J) by their indices and shares (k, K)."""
+        xp, flat = self.xp, index.reshape(-1)
+        return xp.stack([(xp.take(row, flat).reshape(index.shape) * shares).sum(0) for row in values], 0)
+
+    def surface(self, p: Array, n: Array) -> Array:
+        """What surfaces receive (3, K) at points (3, K) with unit normals (3, K)."""
+        xp = self.xp
+        if self.seen is None:
+            return self.gathered(p, n, np.stack([np.arange(p.shape[1])] * 2), LATTICE_RAYS)
+        places = self._places(p)
+        result, fits = self._between(p, n, *places, NEXT)
+        rest = xp.where(~fits)
+        if len(rest):
+            side, u, v = (xp.take(part, rest) for part in places)
+            few = xp.take(p, rest), xp.take(n, rest)
+            values, fits = self._between(*few, side, u, v, AROUND)
+            xp.put(result, rest, values)
+            alone = xp.where(~fits)
+            if len(alone):
+                at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
+                numbers = np.rint(at * (EIGHTHS * self.step))
+                p, n = (xp.take(part, alone) for part in few)
+                xp.put(result, xp.take(rest, alone), self.gathered(p, n, numbers, PIXEL_RAYS))
+        return result
+
+    def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
+        """What points (3, K) with unit normals receive (3, K) by so many rays, which numbers (2, K) turn."""
+        result = self.emitters.received(p, n)
+        for start in range(0, p.shape[1], BATCH // rays):
+            band = slice(start, start + BATCH // rays)
+            result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays)
+        return result
+
+    def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
+        xp, misty = self.xp, max(MISTY, rays * MISTY // LATTICE_RAYS)
+        each = np.arange(rays).reshape(misty, -1).T.reshape(-1, 1)
+        shift, turn = (TURNS @ numbers + 0.5) % 1.0
+        local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
+        way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
+        begin = xp.concat([p + OFF * n] * rays, 1)
+        light, reach = self.arriving(begin, way)
+        result = light.reshape(3, rays, -1).mean(1)
+        if self.mist is None:
+            return result
+        some = slice(0, misty * p.shape[1])
+        parts = self.mist.along(begin[:, some], way[:, some], reach[some])
+        more, clear = (part.reshape(*part.shape[:-1], misty, -1).mean(-2) for part in parts)
+        return result * clear + more
+
+    def arriving(self, p: Array, way: Array) -> tuple[Array, Array]:
+        """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far."""
+        xp = self.xp
+        limit = to_ground(xp, self.stage.ground, p[1], way)
+        hit = march(self.field, p, way, limit, 0, GAP).hit
+        met, floor = xp.where(hit < INF), xp.where((hit == INF) & (limit < INF))
+        light = self.sky(way)
+        if len(floor):
+            at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
+            xp.put(light, floor, self._floored(at))
+        if len(met) and self.lookup is not None:
+            ways = xp.take(way, met)
+            at = xp.take(p, met) + ways * xp.take(hit, met)
+            seen = self._around(at, ways)
+            xp.put(light, met, self.lookup.mixed(self.sent_rows, *seen))
+        return light, xp.minimum(hit, limit)
+
+    def _places(self, p: Array) -> tuple[Array, Array, Array]:
+        """Sides (K,) in world units of cells of the lattice where points (3, K) are, and their places."""
+        xp, camera, (width, height) = self.xp, self.stage.camera, self.canvas
+        axes = xp.array(np.array([camera.eye, *camera.axes()], np.float32), p)
+        forward, right, up = axes[1:] @ (p - axes[0][:, None])
+        scale = min(self.canvas) / 2 / float(np.tan(camera.fov_rad / 2))
+        ahead = forward.clip(1e-6)
+        u, v = (
+            ((scale * off / ahead + side / 2) / self.step).clip(0.0, count - 1.001)
+            for off, side, count in ((right, width, self.columns), (-up, height, self.rows))
+        )
+        return ahead * (self.step / scale), u, v
+
+    def _alike(self, p: Array, n: Array, index: Array, side: Array) -> Array:
+        """How surely points (3, K) and some of the lattice (K,) lie on the same surface (K,)."""
+        off: Any = 0.0
+        facing: Any = 0.0
+        for axis in range(3):
+            other = self.xp.take(self.seen.n[axis], index)
+            off = off + (self.xp.take(self.seen.p[axis], index) - p[axis]) * (other + n[axis])
+            facing = facing + other * n[axis]
+        fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
+        return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
+
+    def _evened(self) -> Array:
+        """What points of the lattice receive (3, L), mixed with those around on the same surface."""
+        xp, seen = self.xp, self.seen
+        side, result, total = self._places(seen.p)[0], 0 * seen.p, 0 * seen.p[0]
+        row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
+        for below, right in np.ndindex(3, 3):
+            index = (row + below - 1).clip(0, self.rows - 1) * self.columns
+            index = xp.array(index + (column + right - 1).clip(0, self.columns - 1), seen.p)
+            weight = (1, 2, 1)[below] * (1, 2, 1)[right] * self._alike(seen.p, seen.n, index, side)
+            total, result = total + weight, result + weight * xp.take(seen.received, index)
+        return result / total.clip(1e-9)
+
+    def _between(
+        self, p: Array, n: Array, side: Array, u: Array, v: Array, corners: tuple[tuple[int, int], ...]
+    ) -> tuple[Array, Array]:
+        """Light (3, K) that corners of cells receive on the same surface, and where there are any."""
+        xp, i, j = self.xp, self.xp.floor(u), self.xp.floor(v)
+        total, result, most = 0 * u, 0 * p, 0 * u
+        for right, below in corners:
+            column, row = (
+                (k + step).clip(0, count - 1)
+                for k, step, count in ((i, right, self.columns), (j, below, self.rows))
+            )
+            index = xp.whole(row) * self.columns + xp.whole(column)
+            fit = self._alike(p, n, index, side)
+            weight = fit * ((1 - abs(u - column)).clip(0.0) * (1 - abs(v - row)).clip(0.0) + 0.02)
+            total, most = total + weight, xp.maximum(most, fit)
+            result = result + weight * xp.take(self.seen.received, index)
+        return result / total.clip(1e-9), most > 0.5
+
+
+def arriving(lighting: Any) -> Around:
+    """`Around` of a `Lighting`; the last one's where only the camera or, without media, lamps differ."""
+    field, stage, last = lighting.field, lighting.stage, lighting.field.network.last
+    things = [*map(id, [*(field.rows[2] or ()), None, *(field.paints or ())])]
+    numbers = [things, *(rows.tobytes() for rows in field.rows[:2])]
+    fixed = numbers, stage.ground, stage.sky, lighting.pace, field.media and stage.lights
+    if last is None or last.fixed != fixed:
+        result = Around(field, stage, lighting.received)
+    else:
+        result = copy(last)
+        result.field, result.stage, result.seen = field, stage, None
+        if last.stage.lights != stage.lights:
+            result.light(lighting.received)
+    result.fixed, field.network.last = fixed, result
+    return result

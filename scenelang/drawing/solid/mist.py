@@ -1,0 +1,328 @@
+"""Light that media scatter any number of times, solved on a lattice.
+
+The field is asked once at the nodes of a cubic lattice around the media; the rest is arithmetic. Light goes
+along the lattice's axes and the diagonals of its cells, so that a ray passes through nodes and nothing is
+interpolated between rays (long characteristics, with the quadrature of 14 points that is exact to degree 5).
+On the way from a node to the next the source is linear, and what lamps send fades exponentially. What arrives
+at the nodes, J, is the fixed point of sending it on, found by sweeps that Anderson's method speeds up.
+
+Media that are denser than the lattice resolves are drawn thinner, by similarity: what they show depends on
+optical depths, so a point is looked up where the thinner medium is as deep.
+
+Letters: n nodes, K points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scenelang.compiler.spaces import Light, Sky, Stage
+from scenelang.drawing.arrays import Array
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.near import near
+from scenelang.drawing.solid.network import Wanted
+from scenelang.drawing.solid.passes import INF, inverse_of
+
+Floats = npt.NDArray[np.float32]
+Shift = tuple[int, ...]
+Slices = tuple[slice, ...]
+
+NODES = 22**3  # of a lattice, about
+DEEPEST = 2.5  # optical depth from a node to the next; denser media are drawn thinner
+DEEP = 3.0  # cells by which points move inwards at most, where these are
+ENOUGH = 2e-3  # of the most light there is, by which the last sweep changes it,
+FIRST = 1e-2  # and where the ground's light is not known
+SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
+DARK = 1e-30
+ALBEDO, WHITEST = 0.99, 0.98  # colours of media and of surfaces count as no more
+OWN, FAR = 0.62, 6.0  # cells: radius of a ball like one, and of those that surfaces tell apart
+HALF_UP = 0.135  # share of the zenith's colour in directions about the horizontal: the sky's mean is right
+STEPS = 8  # through media of light for surfaces
+GAP = 0.03  # world units, as of `MarchSettings`
+
+AROUND: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
+DIRECTIONS: Final = [d for d in AROUND if sum(map(abs, d)) != 2]
+SHARES: Final = {1: 1 / 15, 3: 3 / 40}  # of the sphere, for directions with so many steps
+
+
+class Segment(NamedTuple):
+    """Ways from all nodes in one direction, each to the next node; arrays are (n…,) or (3, n…)."""
+
+    share: float
+    here: Floats  # parts of the sources at a node and at the next that come along
+    next: Floats
+    surface: Floats | None  # part of J that an opaque surface between sends back
+    to: Slices  # nodes that have a next
+    on: Slices  # those
+    base: Floats  # light that joins whatever J is
+    clear: list[tuple[Floats, Slices, Slices]]  # what comes through to the 1st, 2nd, 4th … next node
+
+
+class Mist:
+    """Light in the media of a field under a sky."""
+
+    def __init__(self, field: SolidField, stage: Stage) -> None:
+        self.field, self.stage, self.xp, self.sky = field, stage, field.xp, stage.sky or Sky()
+        with np.errstate(all="ignore"):
+            self._place(*box_of(field, np.asarray(self.xp.to_numpy(field.looks))[-1] > 0.5))
+            self._ask()
+            self._segments()
+            self.light = 0 * self.albedo
+            self.relight()
+
+    def _place(self, low: np.ndarray, high: np.ndarray) -> None:
+        """Lay the lattice around a box; it moves with the box, and has more nodes only where nothing is."""
+        sides, least, most = (high - low).clip(1e-3), 0.0, float((high - low).max()) + 1.0
+        for _ in range(50):
+            h = (least + most) / 2
+            least, most = (h, most) if np.prod(sides / h + 2) > NODES else (least, h)
+        self.h, ground = h, self.stage.ground
+        self.low = low - 0.999 * h
+        if ground is not None and high[1] > ground.y:
+            self.low[1] = max(self.low[1], ground.y + 1e-3)
+        self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
+        axes = [a + h * np.arange(n) for a, n in zip(self.low, self.sides, strict=True)]
+        faces = np.array([[axis[at] for axis in axes] for at in (0, -1)], np.float32)
+        self.faces = [self.xp.array(face[:, None], self.field.network.codes) for face in faces]
+        self.p = np.stack(np.meshgrid(*axes, indexing="ij")).astype(np.float32)  # (3, n…)
+
+    def _ask(self) -> None:
+        """Ask the field, and lamps, at the nodes."""
+        field, like = self.field, self.field.network.codes
+        p = self.xp.array(self.p.reshape(3, -1), like)
+        with self.xp.inference():
+            met = near(field, p, 0 * p[0] + 2 * self.h, Wanted.ALL)
+            answers = [met.distance.clip(None, 2 * self.h), *field.material(met)]
+        d, colour, medium, glow, density, _ = (
+            np.asarray(self.xp.to_numpy(part)).reshape(*part.shape[:-1], *self.sides) for part in answers
+        )
+        self.d, inside = d, d < 0
+        self.mist, self.opaque = inside & medium, inside & ~medium
+        self.reflected, self.shining = colour.clip(0.0, WHITEST) * self.opaque, glow * self.opaque
+        looks = np.concatenate([colour.clip(0.0, ALBEDO), glow, density[None]]) * self.mist
+        # nodes around media have what those next to them have
+        around, count = 0 * looks, 0 * d
+        for shift in AROUND:
+            to, on = pair_of(self.sides, shift)
+            around[:, *to] += looks[:, *on]
+            count[to] += self.mist[on]
+        looks = np.where(self.mist, looks, around / count.clip(1.0))
+        self.albedo, self.glow, self.density = looks[:3], looks[3:6], looks[6]
+        self.thin = np.minimum(1.0, DEEPEST / (self.h * self.density).clip(1e-9))
+        self.thinned = self.density * self.thin
+        active = np.flatnonzero(((count > 0) | self.mist) & ~self.opaque)
+        self.slopes = np.array(np.gradient(d, self.h))
+        # what arrives (n…,), the same as surfaces see it, and colours with their power
+        self.lamps: list[tuple[Floats, ...]] = []
+        self.received = 0 * self.albedo  # from lamps, by surfaces next to nodes
+        for light in self.stage.lights:
+            sent = np.zeros(d.size, np.float32)
+            clear = self._reached(light, self.p.reshape(3, -1)[:, active])
+            sent[active] = np.where(clear > 0, clear.clip(DARK) ** self.thin.reshape(-1)[active], 0.0)
+            at, rgb = np.reshape((light.position, light.rgb), (2, 3, 1, 1, 1)).astype(np.float32)
+            r = np.linalg.norm(self.p - at, axis=0)
+            rim = np.sqrt((1 - (light.radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
+            sent = sent.reshape(self.sides) * (r > light.radius) / (2 + 2 * rim)
+            own, far = (sent * _spread(r, radius * self.h) for radius in (OWN, FAR))
+            self.lamps.append((own, far, light.power * rgb))
+            facing = (self.slopes * (at - self.p)).sum(0).clip(0.0) / r.clip(1e-6)
+            self.received += 4 * light.power * rgb * own * facing
+
+    def _reached(self, light: Light, p: np.ndarray) -> np.ndarray:
+        """Parts of a lamp's light (K,) that arrive at points (3, K)."""
+        xp, like = self.xp, self.field.network.codes
+        at = xp.array(np.asarray(light.position, np.float32), like)
+        with xp.inference():
+            way = xp.array(p, like) - at[:, None]
+            r = xp.length(list(way)).clip(1e-6)
+            trail = march(self.field, at, way / r, r, 0, GAP, True)
+            return np.asarray(xp.to_numpy((trail.hit == INF) * xp.exp(-trail.depth)))
+
+    def _segments(self) -> None:
+        """Integrate along the ways from all nodes to their neighbours."""
+        self.segments, sides, d, mist = [], self.sides, self.d, self.mist
+        for shift in DIRECTIONS:
+            steps = sum(map(abs, shift))
+            to, on = pair_of(sides, shift)
+            m0, m1 = mist[to], mist[on]
+            # the part of the way, from begin to end, that is in the medium
+            cross = abs(d[to]) / (abs(d[to]) + abs(d[on])).clip(1e-9)
+            begin, end = np.where(m0, 0.0, cross), np.where(m1, 1.0, cross)
+            density = (self.thinned[to] * m0 + self.thinned[on] * m1) / (m0 * 1.0 + m1).clip(1.0)
+            depth = density * (self.h * steps**0.5) * (end - begin)
+            t = depth.clip(1e-4)
+            gone = np.exp(-t)
+            e0, e1 = 1 - gone, np.where(t < 1e-2, t / 2, (1 - (1 + t) * gone) / t)
+            stop = self.opaque[on]  # nothing is known of light behind it
+            following = (e0 * begin + e1 * (end - begin)) * ~stop
+            parts = np.zeros((2, *sides), np.float32)
+            parts[:, *to] = np.stack([e0 - following, following]) * (m0 | m1)
+            base = self.glow * parts[0]
+            base[:, *to] += self.glow[:, *on] * parts[1][to]
+            for sent, _, rgb in self.lamps:
+                first = sent[to].clip(DARK)
+                last = np.where(stop, first, sent[on].clip(DARK))
+                x = (1 + (np.log(first / last) / t).clip(-8.0, 50.0)) * t
+                x = np.where(abs(x) < 1e-4, 1e-4, x)
+                along = np.where(m0 | m1, first * t * (1 - np.exp(-x)) / x, 0.0)
+                base[:, *to] += self.albedo[:, *to] * rgb * along
+            through, surface = np.zeros(sides, np.float32), None
+            if self.opaque.any():
+                surface, shown = np.zeros_like(base), np.exp(-depth) * (stop & ~self.opaque[to])
+                surface[:, *to] = self.reflected[:, *on] * shown
+                base += surface * self.received
+                base[:, *to] += self.shining[:, *on] * shown
+            through[to] = np.where(stop | self.opaque[to], 0.0, np.exp(-depth))
+            clear, step = [(through, to, on)], shift
+            while all(2 * abs(s) < n for s, n in zip(step, sides, strict=True)):
+                more, (to2, on2) = np.zeros(sides, np.float32), pair_of(sides, step)
+                more[to2] = through[to2] * through[on2]
+                through, step = more, tuple(2 * s for s in step)
+                clear.append((through, *pair_of(sides, step)))
+            base = base.astype(np.float32)
+            self.segments.append(Segment(SHARES[steps], parts[0], parts[1], surface, to, on, base, clear))
+
+    def relight(self, floor: Callable[[Array], Array] | None = None) -> None:
+        """Find the light at the nodes, beginning with what it was; ``floor`` tells what the ground sends
+        (3, K) from points (3, K), without it as much as the horizon.
+        """
+        horizon, zenith = np.reshape((self.sky.horizon, self.sky.zenith), (2, 3, 1)) * self.sky.power
+        base, ground = [1 * segment.base for segment in self.segments], self.stage.ground
+        for shift, segment, light in zip(DIRECTIONS, self.segments, base, strict=True):
+            edge = np.ones(self.sides, bool)  # nodes that have no next
+            edge[segment.to] = False
+            p, rise = self.p[:, edge], shift[1] / sum(map(abs, shift)) ** 0.5
+            sent = horizon + (zenith - horizon) * min(max(2 * rise + HALF_UP, 0.0), 1.0)
+            if ground is not None and floor is not None and rise < 0:
+                at = p + np.reshape(shift, (3, 1)) * ((ground.y - p[1]) / shift[1])
+                sent = self.xp.to_numpy(floor(self.xp.array(at.astype(np.float32), self.field.network.codes)))
+            light[:, edge] = sent
+        self._solve(base, FIRST if floor is None else ENOUGH)
+        light = np.where(self.opaque, 0.0, self.light).astype(np.float32)
+        sends = self.albedo * light + self.glow
+        for _, sent, rgb in self.lamps:
+            sends += self.albedo * sent * rgb
+        dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0) * ~self.opaque
+        rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
+        rows += [dense * sends, dense[None]]
+        table = np.concatenate(rows).reshape(13, -1)
+        self.table = self.xp.array(np.ascontiguousarray(table, np.float32), self.field.network.codes)
+
+    def _solve(self, base: list[Floats], enough: float) -> None:
+        """Sweep until the light changes by no more than that (Anderson 1965)."""
+        kept: list[tuple[Floats, Floats]] = []
+        stays = sum((segment.share * segment.here for segment in self.segments), 0 * self.d)
+        ahead = 1 / (1 - self.albedo * stays)  # what a node sends to itself is summed to its end
+        for _ in range(SWEEPS):
+            change = (self._sweep(base) - self.light) * ahead
+            swept = self.light = self.light + change
+            if abs(change).max() <= enough * swept.max():
+                break
+            kept = [*kept[-KEPT:], (change.reshape(-1), swept.reshape(-1))]
+            if len(kept) > 1:
+                changes, lights = (np.diff(np.stack(part), axis=0) for part in zip(*kept, strict=True))
+                gram = np.einsum("ik,jk->ij", changes, changes).astype(np.float64)
+                gram += 1e-7 * np.trace(gram) * np.eye(len(gram))
+                mix = np.linalg.solve(gram, np.einsum("ik,k->i", changes, kept[-1][0])).astype(np.float32)
+                self.light = (kept[-1][1] - np.einsum("i,ik->k", mix, lights)).reshape(swept.shape)
+
+    def _sweep(self, base: list[Floats]) -> Floats:
+        """What arrives at the nodes (3, n…) if that is sent on which arrived before."""
+        source, result = self.albedo * self.light, 0 * self.light
+        for segment, more in zip(self.segments, base, strict=True):
+            light = segment.here * source + more
+            light[:, *segment.to] += segment.next[segment.to] * source[:, *segment.on]
+            if segment.surface is not None:
+                light += segment.surface * self.light
+            for clear, to, on in segment.clear:  # with each the light of twice as many nodes has joined
+                light[:, *to] += clear[to] * light[:, *on]
+            result += segment.share * light
+        return result
+
+    def medium(self, p: Array) -> Array:
+        """The mean radiance (3, K), linear, that arrives at points (3, K) in media from all directions, but
+        for what lamps send there.
+        """
+        xp = self.xp
+        if self.thin.min() < 1.0:
+            d, *slope, denser = self._between(p, slice(4, 9))
+            length = xp.length(slope).clip(1e-6)
+            moved = ((-d).clip(0.0) * denser).clip(0.0, DEEP * self.h)
+            p = p - xp.stack(slope, 0) * (moved / length)
+        light = self._between(p, slice(0, 4))
+        return (light[:3] / light[3].clip(1e-6)).clip(0.0)
+
+    def along(self, p: Array, way: Array, reach: Array) -> tuple[Array, Array]:
+        """Light (3, K) that media send back along rays from points (3, K) in unit directions (3, K), from as
+        far as a reach (K,), and the part (K,) that they let through.
+        """
+        xp = self.xp
+        low, high = ((side - p) / xp.select(abs(way) > 1e-6, way, 0 * way + 1e-6) for side in self.faces)
+        begin = xp.largest(xp.minimum(low, high))[0].clip(0.0)
+        each = (xp.minimum(xp.least(xp.maximum(low, high)), reach) - begin).clip(0.0) / STEPS
+        light, clear = 0 * p, 0 * each + 1
+        some = xp.where(each > 0)
+        ahead, on, step = 0 * xp.take(p, some), xp.take(way, some), xp.take(each, some)
+        here, through = xp.take(p + way * begin, some), 0 * step + 1
+        for i in range(STEPS):
+            *sent, dense = self._between(here + on * ((i + 0.5) * step), slice(9, 13))
+            dense = dense.clip(1e-9)
+            past = through * xp.exp(-dense * step)
+            ahead = ahead + xp.stack(sent, 0) * ((through - past) / dense)
+            through = past
+        xp.put(light, some, ahead)
+        xp.put(clear, some, through)
+        return light, clear
+
+    def _between(self, p: Array, rows: slice) -> Array:
+        """Rows of the table at points (3, K), linear between nodes."""
+        xp, table, parts, index = self.xp, self.table[rows], [], 0
+        for x, low, count in zip(p, self.low.tolist(), self.sides, strict=True):
+            u = ((x - low) * (1 / self.h)).clip(0.0, count - 1.001)
+            i = xp.floor(u)
+            parts.append((u - i, 1 - (u - i)))
+            index = index * count + xp.whole(i)
+        _, b, c = self.sides
+        result = 0.0
+        for x, y, z in product((0, 1), repeat=3):
+            weight = parts[0][1 - x] * parts[1][1 - y] * parts[2][1 - z]
+            result = result + weight * xp.take(table, index + ((x * b + y) * c + z))
+        return result
+
+
+def pair_of(sides: tuple[int, ...], shift: Shift) -> tuple[Slices, Slices]:
+    """Slices of the nodes from which a shift leads to another, and of those others."""
+    ends = list(zip(sides, shift, strict=True))
+    to = tuple(slice(max(0, -s), n - max(0, s)) for n, s in ends)
+    return to, tuple(slice(max(0, s), n - max(0, -s)) for n, s in ends)
+
+
+def _spread(r: np.ndarray, radius: float) -> np.ndarray:
+    """The mean of 1 / r² over balls of a radius whose centres are at distances r."""
+    d = r.clip(1e-3 * radius) / radius
+    near = 0.75 * (2 + (1 - d * d) / d * np.log((1 + d) / abs(1 - d).clip(1e-6)))
+    return np.where(d > 30, 1 / (d * d), near) / radius**2
+
+
+def box_of(field: SolidField, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the greatest coordinates (3,) of where those objects may be that are wanted (N,)."""
+    low, high = [], []
+    for solid, its in zip(field.solids, wanted.tolist(), strict=True):
+        if its and solid.draws:
+            back, shift = (np.asarray(field.xp.to_numpy(part), np.float64) for part in solid.frame.outer)
+            back = inverse_of(back)
+            if solid.box is None:
+                half, middle = solid.ball * np.linalg.norm(back, axis=1), -back @ shift
+            else:
+                first, last = (np.asarray(field.xp.to_numpy(side), np.float64)[:, 0] for side in solid.box)
+                half = abs(back) @ (last - first) / 2
+                middle = back @ ((first + last) / 2 - shift)
+            low.append(middle - half)
+            high.append(middle + half)
+    return np.min(low or [np.zeros(3)], axis=0), np.max(high or [np.zeros(3)], axis=0)

@@ -1,0 +1,197 @@
+"""Nodes of the light: fixed points on the surfaces of objects and on the ground.
+
+Points on an object lie where fixed chords of the ball around it meet its own surface, so that they move with
+it, and are drawn onto the surface of all objects. A node fades where another object covers it, and nothing
+jumps. Uniform chords meet equal areas equally often (Cauchy and Crofton).
+
+Letters: J nodes, the first ones on objects, N objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from scenelang.compiler.spaces import Stage
+from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.near import near
+from scenelang.drawing.solid.network import Wanted
+
+ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
+COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
+CHORDS, GLOWING = 1500, 400  # of those that glow, and nodes of the light on each
+NODES, LEAST, MOST = 300, 20, 400  # on all objects, on one at least and at most
+HOLLOW = 3  # times as many where something may be hollow
+COVERED = 0.06  # world units by which a surface is covered where its nodes have faded
+NEWTON = 2
+INSIDE = 1e-3  # world units behind a surface where its material is asked for
+FLAT = 0.01  # of distances; less is none
+BEFORE = 0.02  # world units before a surface where nothing must be, lest a node fades
+SIDE = 24  # nodes of the ground along one axis
+FAR, WARP = 20.0, 4.5  # world units to the last ones; they lie at FAR sinh(WARP u) / sinh(WARP)
+
+
+class Nodes(NamedTuple):
+    """Points that light comes from and goes to."""
+
+    p: Array  # (3, J)
+    n: Array  # (3, J) unit normals
+    colour: Array  # (3, J) linear
+    glow: Array  # (3, J) linear
+    weight: Array  # (J,) in (0, 1]; less where they are nearly covered
+    area: Array  # (J,) of the surface that each stands for; 0 on the ground
+    # (8, J) places behind the maps of their objects, numbers of these, 1 for nodes of the light and
+    # 0 for those of what glows alone, and normals behind the maps
+    place: Array
+
+
+def spread(index: np.ndarray, count: int = 4) -> np.ndarray:
+    """Points (count, K) of the unit cube that lie evenly (a Kronecker sequence)."""
+    return np.asarray((0.5 + np.outer(ROOTS[:count], index)) % 1.0)
+
+
+def turned(xp: Arrays, n: Array, local: Array, wanted: Sequence[int] = (0, 1, 2)) -> Array:
+    """Directions (3, …, K) whose third axis is that of unit normals (3, K), or some of their coordinates
+    (Duff et al. 2017).
+    """
+    sign = xp.select(n[1] < 0, 0 * n[1] - 1, 0 * n[1] + 1)
+    a = -1 / (sign + n[1])
+    b = n[0] * n[2] * a
+    first = (1 + sign * n[0] * n[0] * a, -sign * n[0], sign * b)
+    second = (b, -n[2], sign + n[2] * n[2] * a)
+    x, y, z = local
+    return xp.stack([first[i] * x + second[i] * y + n[i] * z for i in wanted], 0)
+
+
+def chords(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where lines begin that meet a ball about the origin evenly, and all the way through it (3, K)."""
+    u, v, r, turn = spread(np.arange(count))
+    z, angle = 2 * u - 1, 2 * np.pi * v
+    way = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
+    least = np.eye(3)[abs(way).argmin(0)].T
+    side = np.cross(way, least, axis=0)
+    side /= np.linalg.norm(side, axis=0)
+    off = np.cos(2 * np.pi * turn) * side + np.sin(2 * np.pi * turn) * np.cross(way, side, axis=0)
+    half = np.sqrt(1 - r) * radius
+    return np.sqrt(r) * radius * off - way * half, 2 * half * way
+
+
+def on_objects(field: SolidField, stage: Stage) -> Nodes:
+    """Nodes on objects; many chords find even the thin ones that glow."""
+    xp, like = field.xp, field.network.codes
+    sizes = np.array([solid.extent for solid in field.solids])
+    glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
+    more = HOLLOW if field.skinned.any() or not field.draws else 1
+    shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
+    counts = np.ceil(shares.clip(LEAST, more * MOST)).astype(int)
+    balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
+    tried = np.where(glows, CHORDS, counts)
+    parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True)]
+    lines = np.concatenate([np.zeros((6, 0)), *parts], 1).astype(np.float32)
+    objects = np.repeat(np.arange(len(sizes)), tried)
+    line, at = _crossings(field, objects, lines[:3], lines[3:], np.where(glows, FINE, COARSE))
+    owner = objects[line]
+    # each stands for as much of the surface behind the map
+    area = (2 * np.pi * balls**2 / tried)[owner].astype(np.float32)
+    found = np.bincount(owner, minlength=len(sizes))
+    rank = np.arange(len(owner)) - np.repeat(np.cumsum(found) - found, found)
+    kept = ~glows[owner] | (rank % (found // GLOWING).clip(1)[owner] == 0)
+    place = xp.array(np.concatenate([at, owner[None], kept[None]]).astype(np.float32), like)
+    owner, at, area = (xp.array(part, like) for part in (owner, at, area))
+    return _settled(field, stage, field.before(owner, at), owner, area, place)
+
+
+def _crossings(
+    field: SolidField, objects: np.ndarray, begin: np.ndarray, way: np.ndarray, parts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lines (k,) that meet the surfaces of their objects, and where (3, k), by steps that are as long as the
+    distance, and at least so small a part of a line.
+    """
+    xp, like = field.xp, field.network.codes
+
+    def distance(index: np.ndarray, t: np.ndarray) -> np.ndarray:
+        at = xp.array(begin[:, index] + way[:, index] * t, like)
+        return np.asarray(xp.to_numpy(field.own(xp.array(objects[index], like), at)))
+
+    rates = np.array([solid.rate for solid in field.solids])[objects] * np.sqrt((way * way).sum(0))
+    index, t = np.arange(len(objects)), np.zeros(len(objects), np.float32)
+    d, lines, places = distance(index, t), [index[:0]], [begin[:, :0]]
+    while len(index):
+        step = np.maximum(abs(d) / rates[index], 1 / parts[objects[index]]).astype(np.float32)
+        past = distance(index, t + step)
+        met = np.flatnonzero((past < 0) != (d < 0))
+        share = t[met] + step[met] * d[met] / (d[met] - past[met])
+        lines.append(index[met])
+        places.append(begin[:, index[met]] + way[:, index[met]] * share)
+        on = np.flatnonzero(t + step < 1)
+        index, t, d = index[on], (t + step)[on], past[on]
+    return np.concatenate(lines), np.concatenate(places, 1).astype(np.float32)
+
+
+def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Array, place: Array) -> Nodes:
+    """Nodes at points (3, K) drawn onto the surface; without those that are covered."""
+    xp, weight = field.xp, None
+    reach = 0 * p[0] + 4 * COVERED
+    for _ in range(NEWTON):
+        met = near(field, p, reach, gradient=True)
+        if weight is None:
+            weight = (1 - abs(met.distance) / COVERED).clip(0.0)
+        square = (met.gradient * met.gradient).sum(0).clip(1e-6)
+        p = p - met.gradient * (met.distance.clip(-COVERED, COVERED) / square)
+    g = met.gradient
+    slope = xp.sqrt((g * g).sum(0))  # of what is scaled unevenly, less than 1
+    n = g / slope.clip(1e-9)
+    inside = near(field, p - INSIDE * n, reach, Wanted.ALL)
+    material = field.material(inside)
+    weight = weight * (inside.distance < 0) * ~material.medium * (slope > FLAT)
+    if len(field.solids) > 1 and not field.media:  # where two touch nobody sees their nodes
+        before = near(field, p + BEFORE * n, reach)
+        weight = weight * (before.distance / (BEFORE * slope.clip(FLAT))).clip(0.0, 1.0)
+    if stage.ground is not None:
+        weight = weight * ((p[1] - stage.ground.y) / COVERED).clip(0.0, 1.0)
+    kept = xp.where(weight > 0)
+    linear = np.moveaxis(np.asarray(xp.to_numpy(field.linear), np.float64), -1, 0)
+    shrunk = np.linalg.inv(linear) * abs(np.linalg.det(linear))[:, None, None]  # of areas, with normals
+    across = xp.take(xp.array(np.moveaxis(shrunk, 0, -1).astype(np.float32), p), owner)  # (3, 3, K)
+    pulled = (across * n[:, None]).sum(0)
+    length = xp.sqrt((pulled * pulled).sum(0)).clip(1e-9)
+    area, place = weight * area / length, xp.concat([place, pulled / length], 0)
+    parts = (p, n, material.colour, material.glow, weight, area, place)
+    return Nodes(*(xp.take(part, kept) for part in parts))
+
+
+def on_ground(field: SolidField, stage: Stage) -> Nodes:
+    """Nodes on the ground (SIDE²), row by row along z; none without a ground."""
+    xp, like, ground = field.xp, field.network.codes, stage.ground
+    u = np.linspace(-1.0, 1.0, SIDE)
+    x = FAR * np.sinh(WARP * u) / np.sinh(WARP)
+    p = np.zeros((3, 0 if ground is None else SIDE * SIDE), np.float32)
+    n, colour = 0 * p, 0 * p
+    n[1] = 1.0
+    if ground is not None:
+        p[0], p[1], p[2] = np.tile(x, SIDE), ground.y, np.repeat(x, SIDE)
+        colour[:] = np.asarray(ground.rgb, np.float32)[:, None]
+    p, n, colour = (xp.array(part, like) for part in (p, n, colour))
+    d = near(field, p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
+    place = xp.concat([p, xp.full((5, p.shape[1]), 1.0, p)], 0)
+    return Nodes(p, n, colour, 0 * p, (d / COVERED).clip(0.0, 1.0), 0 * p[0], place)
+
+
+def ground_places(xp: Arrays, x: Array, z: Array) -> tuple[Array, Array]:
+    """The four nodes (4, K) of the ground around places (K,), numbered from 0, and their shares (4, K)."""
+    rows, parts = [], []
+    for place in (x, z):
+        scaled = place * (float(np.sinh(WARP)) / FAR)
+        size = abs(scaled)
+        u = xp.log(size + xp.sqrt(size * size + 1)) * xp.select(scaled < 0, 0 * x - 1, 0 * x + 1) / WARP
+        at = ((u + 1) * ((SIDE - 1) / 2)).clip(0.0, SIDE - 1.001)
+        low = xp.floor(at)
+        rows.append(xp.whole(low))
+        parts.append(at - low)
+    (i, j), (a, b) = rows, parts
+    first = j * SIDE + i
+    index = xp.stack([first, first + 1, first + SIDE, first + SIDE + 1], 0)
+    return index, xp.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], 0)

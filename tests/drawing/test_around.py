@@ -1,0 +1,85 @@
+"""Light from everywhere against closed forms, and how little it changes where little moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scenelang as nsg
+from scenelang.compiler.spaces import Sky, Stage
+from scenelang.drawing.solid.around import Around
+from scenelang.drawing.solid.draw import Lighting
+from tests.drawing.solids import Object, field, moved, scaled
+
+BALL = Object("sphere", (scaled(0.7),), rgb=(0.8, 0.5, 0.3))
+EVEN = Stage(lights=(), ground=None, sky=Sky(0.6, (0.5, 0.8, 1.0), (0.5, 0.8, 1.0)))
+
+
+def on_ball(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a ball about the origin and their normals (3, K)."""
+    n = np.random.default_rng(1).normal(size=(3, count))
+    n = (n / np.linalg.norm(n, axis=0)).astype(np.float32)
+    return n * np.float32(radius), n
+
+
+def received(objects: list[Object], stage: Stage, p: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """What points receive of an even sky and of each other."""
+    solids = field(objects)
+    with solids.xp.inference():
+        return Around(solids, stage, Lighting(solids, stage).received).surface(p, n)
+
+
+def test_all_of_an_even_sky_comes_to_what_is_convex() -> None:
+    """(1/π) ∫ L cos θ dω is L."""
+    light = received([BALL], EVEN, *on_ball(300, 0.7))
+    assert light == pytest.approx(np.tile([[0.3], [0.48], [0.6]], 300), rel=0.02)
+
+
+def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
+    """A black sphere of radius a at a distance d above a level point hides (a / d)² of the light."""
+    black = Object("sphere", (scaled(0.5), moved(0.0, 1.3, 0.0)), rgb=(0.0, 0.0, 0.0))
+    plate = Object("box", (scaled(5.0, 0.1, 5.0), moved(0.0, -0.1 / 3**0.5, 0.0)), rgb=(0.0, 0.0, 0.0))
+    p, n = np.zeros((3, 1), np.float32), np.array([[0.0], [1.0], [0.0]], np.float32)
+    light = received([black, plate], EVEN, p, n)
+    assert light[2, 0] == pytest.approx(0.6 * (1 - (0.5 / 1.3) ** 2), rel=0.03)
+
+
+@pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
+def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
+    """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""
+    albedo = ((int(rgb[1:3], 16) / 255 + 0.055) / 1.055) ** 2.4
+    glow = 0.3 * (1 - albedo)
+    text = f"""nsg 1; canvas(24, 24); ground(none); light(none); sky(0); camera([0, 0.1, 0.2]);
+        sphere {{ shell(0.2); scale(1.5); material diffuse {{ color({rgb}); glow(#fff, {glow}); }} }}"""
+    shown = np.asarray(nsg.render(nsg.compile(nsg.loads(text))))
+    light = ((shown + 0.055) / 1.055) ** 2.4
+    assert light == pytest.approx(np.full_like(light, 0.3), rel=0.06)
+
+
+MOVED = """nsg 1; canvas(64, 64); sky(0.6);
+    box { scale(0.6); rotate(20deg, axis = Y); translate(-0.6, -0.3, 0); material diffuse { color(#c44); } }
+    torus { scale(0.8); translate(%r, 0.2, 0.3); material diffuse { color(#4c8); glow(#fff, 0.5); } }"""
+
+
+def test_what_moves_little_changes_little() -> None:
+    """By 1e-4 world units; and any number of threads draws the same."""
+    first, second = (nsg.compile(nsg.loads(MOVED % x)) for x in (0.5, 0.5001))
+    before = np.asarray(nsg.render(first, threads=1))
+    change = abs(before - np.asarray(nsg.render(second, threads=1))).max(2)
+    assert change.mean() < 5e-4
+    assert np.percentile(change, 99) < 4e-3
+    assert (before == np.asarray(nsg.render(first, threads=2))).all()
+
+
+def test_what_is_kept_for_the_next_picture_changes_nothing() -> None:
+    """Light is kept where the camera or lamps alone move."""
+
+    def drawn(stage: str) -> np.ndarray:
+        text = (MOVED % 0.5).replace("sky(0.6);", f"sky(0.6); {stage}")
+        return np.asarray(nsg.render(nsg.compile(nsg.loads(text))))
+
+    moved_on = "light([1, 3, 2], 20); camera([1, 1, 5]);"
+    alone = drawn(moved_on)
+    for before in ("light([1, 3, 2], 20);", "light([-1, 3, 2], 20);", "light([1, 3, 2], 9, radius = 0.3);"):
+        drawn(before)
+        assert (drawn(moved_on) == alone).all()

@@ -1,0 +1,107 @@
+"""Light that media scatter, against an integral equation in float64 and states of balance."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.special import exp1
+
+from scenelang.compiler.spaces import Ground, Light, Sky, Stage
+from scenelang.drawing.solid.mist import Mist
+from tests.drawing.solids import Object, everywhere, moved, network, scaled, torch_network
+from tests.drawing.test_lamps import field_of
+
+WHITE = (1.0, 1.0, 1.0)
+EVEN = Stage(lights=(), ground=None, sky=Sky(1.0, WHITE, WHITE))  # the same from everywhere
+GREY = (0.9, 0.7, 0.4)
+
+
+def in_a_ball(sigma: float, albedo: float, r: np.ndarray, cells: int = 400) -> np.ndarray:
+    """J at distances r from the centre of a ball of radius 1 under an even sky of 1.
+
+    r J(r) = U(r) r + (albedo sigma / 2) ∫ E1(sigma |r - s|) s J(s) ds over [-1, 1], the equation of a slab.
+    """
+    edges = np.linspace(-1, 1, cells + 1)
+    middle = (edges[1:] + edges[:-1]) / 2
+    mu, weight = np.polynomial.legendre.leggauss(64)
+
+    def alone(r: np.ndarray) -> np.ndarray:
+        to_rim = -r[:, None] * mu + np.sqrt(1 - r[:, None] ** 2 * (1 - mu * mu))
+        return np.exp(-sigma * to_rim) @ weight / 2
+
+    def integral(x: np.ndarray) -> np.ndarray:  # of E1 from 0
+        x = np.maximum(x, 1e-300)
+        return 1 - np.exp(-x) + x * exp1(x)
+
+    def kernel(r: np.ndarray) -> np.ndarray:  # integrals of E1 over cells
+        ends = np.sign(edges - r[:, None]) * integral(sigma * abs(edges - r[:, None]))
+        return np.diff(ends, axis=1) * albedo / 2
+
+    known = np.linalg.solve(np.eye(cells) - kernel(middle), alone(abs(middle)) * middle)
+    return (alone(r) * r + kernel(r) @ known) / r
+
+
+@pytest.mark.parametrize(("sigma", "most"), [(0.5, 0.02), (3.0, 0.05), (12.0, 0.25)])
+def test_balls_under_an_even_sky_solve_the_integral_equation(sigma, most):
+    mist = Mist(field_of([Object("sphere", (), "volumetric", GREY)], density=(sigma,)), EVEN)
+    r = np.linspace(0.1, 0.99, 30)
+    p = np.outer(np.array([0.36, 0.48, 0.8]), r).astype(np.float32)
+    exact = np.array([in_a_ball(sigma, a, r) for a in GREY])
+    seen = np.exp(-sigma * (1 - r))  # what is deep inside tells little
+    off = abs(mist.medium(p) / exact - 1) * seen
+    assert off.max() < most
+
+
+def test_what_gives_off_as_much_as_it_takes_is_in_balance():
+    objects = [
+        Object("box", (scaled(1.1, 0.6, 0.8),), "volumetric", GREY),
+        Object("sphere", (scaled(0.6), moved(0.7, 0.2, 0.2)), "volumetric", (0.3, 0.6, 0.95)),
+        Object("torus", (scaled(0.5), moved(-0.5, 0.3, 0.0)), "diffuse", (0.2, 0.5, 0.8)),
+    ]
+    glow = [tuple(1 - c for c in o.rgb) for o in objects]
+    field = field_of(objects, density=(2.0, 15.0, 3.0), glow=glow)
+    mist = Mist(field, EVEN)
+    p = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 200)).astype(np.float32)
+    p = p[:, everywhere(field, p).register[-1] > 0.5]
+    assert abs(mist.medium(p) - 1).max() < 0.02
+    way = p / np.linalg.norm(p, axis=0)
+    light, clear = mist.along(3 * way, -way, np.full(len(way.T), 3.0, np.float32))
+    assert abs(light + clear - 1).max() < 0.02
+
+
+def test_light_follows_objects_without_a_jump():
+    stage = Stage(lights=(Light(), Light((0.1, 0.2, 0.1), 0.5)), ground=Ground(), sky=Sky())
+    p = np.random.default_rng(0).uniform(-0.4, 0.4, (3, 500)).astype(np.float32)
+    seen = []
+    for x in np.array([0.3, 0.3001, 0.3002, 0.3003]):
+        objects = [
+            Object("sphere", (scaled(0.8),), "volumetric", GREY),
+            Object("cone", (scaled(0.5), moved(float(x), 0.4, 0.0)), "volumetric", (0.5, 0.9, 0.9)),
+            Object("box", (scaled(0.3), moved(float(x), -0.4, 0.5)), "diffuse", (0.5, 0.5, 0.9)),
+        ]
+        seen.append(Mist(field_of(objects, density=(2.0, 10.0, 3.0)), stage).medium(p))
+    assert max(abs(a - b).mean() for a, b in pairwise(seen)) < 5e-4
+
+
+def test_media_let_through_what_their_depth_says():
+    mist = Mist(field_of([Object("sphere", (), "volumetric", GREY)], density=(1.5,)), EVEN)
+    p = np.array([[0.0], [0.1], [3.0]], np.float32)
+    way = np.array([[0.0], [0.0], [-1.0]], np.float32)
+    for reach, inside in ((10.0, 2.0), (3.0, 1.0), (1.5, 0.0)):
+        _, clear = mist.along(p, way, np.array([reach], np.float32))
+        assert clear[0] == pytest.approx(np.exp(-1.5 * inside * 0.995), rel=0.05)
+
+
+def test_both_libraries_find_the_same_light():
+    objects = [Object("torus", (), "volumetric", GREY), Object("box", (scaled(0.3),), "diffuse", GREY)]
+    stage = Stage(lights=(Light(),), ground=Ground(), sky=Sky())
+    p = np.random.default_rng(0).uniform(-0.8, 0.8, (3, 50)).astype(np.float32)
+    seen = []
+    for net in (network(), torch_network()):
+        field = field_of(objects, density=(20.0, 3.0), net=net)
+        with field.xp.inference():
+            light = Mist(field, stage).medium(field.xp.array(p, net.codes))
+            seen.append(np.asarray(field.xp.to_numpy(light)))
+    np.testing.assert_allclose(*seen, atol=1e-4)
