@@ -32,6 +32,7 @@ from scenelang.web.export import PagePayload, control_rows, viewed
 from scenelang.web.export import page as page_of
 
 ROOT = Path(__file__).parents[1]
+STILL = re.compile(r"^sky\(", re.MULTILINE)  # whose light takes seconds to make, and so stay pictures
 CODE_PAGES = "scenelang/language/pages"
 ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 COMMANDS_PAGE = "commands.md"
@@ -74,6 +75,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for target, path in made.items():
         files.append(File.generated(config, target, content=path.read_bytes()))
     for name, scene in live_scenes().items():
+        if STILL.search(scene if isinstance(scene, str) else scene.read_text("utf-8")):
+            continue
         view = view_of_scene(scene)
         width, height = view.data["canvas"]
         LIVE[name] = f"data-rows={control_rows(view)} data-aspect={height / width:.4f}"
