@@ -7,6 +7,7 @@ them.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -17,7 +18,7 @@ from scenelang.assets.gradient import HARD
 from scenelang.compiler.graph import LUMA
 from scenelang.compiler.program import STEPS, ProgramError
 from scenelang.drawing.neural import field
-from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, FramedArrays
+from scenelang.drawing.neural.network import EMPTY, EXTENT, RADIUS, Cell, FramedArrays
 from scenelang.language.words import TOKENS
 from scenelang.web.arrays import ArrayStore, web
 
@@ -41,8 +42,11 @@ class LeafDecoder(NamedTuple):
     inner: float  # radius of a disc within the shape, 0 where none is known
 
 
-def shader(network: FramedArrays, store: ArrayStore) -> dict[str, Any]:
-    """The parts ``shader`` and ``network`` of a view; `ProgramError` if it knows more than distances."""
+def shader(network: FramedArrays, store: ArrayStore, skinned: Set[int] = frozenset()) -> dict[str, Any]:
+    """The parts ``shader`` and ``network`` of a view, ``skinned`` the geometries with `grow` or `shell`.
+
+    Raises `ProgramError` if the network knows more than distances.
+    """
     config = network.config
     if not config.features == config.state == 1:
         raise ProgramError("a network that knows more than distances, which no page draws")
@@ -53,6 +57,8 @@ def shader(network: FramedArrays, store: ArrayStore) -> dict[str, Any]:
     table = np.zeros((len(lines), config.paint_lines + 2, 4), np.float32)
     table[:, :-1, :3], table[:, -1, :2] = lines, ends
     unit = float(np.linalg.norm(cells[2][TOKENS["union"], 0]))
+    levels = network.levels() if skinned else {}
+    short = [levels.get(code.tobytes()) if i in skinned else None for i, code in enumerate(network.codes)]
     sizes = {
         **{name.upper(): token for name, token in TOKENS.items()},
         "KINDS": len(lines),
@@ -86,11 +92,19 @@ def shader(network: FramedArrays, store: ArrayStore) -> dict[str, Any]:
                     "far": leaf.far,
                     "bounds": leaf.bounds,
                     "inner": leaf.inner,
+                    **({} if grid is None else _level(grid, store)),
                 }
-                for leaf in leaves(network)
+                for leaf, grid in zip(leaves(network), short, strict=True)
             ],
         },
     }
+
+
+def _level(grid: npt.NDArray[np.float32], store: ArrayStore) -> dict[str, Any]:
+    """The entry of a decoder's grid (n, n), which is added where its leaf has a skin."""
+    step = float(abs(grid).max()) / 127 or 1.0
+    values = store.add(np.round(grid / step).astype(np.int8).reshape(-1))
+    return {"level": {"values": values, "side": len(grid), "step": step, "extent": EXTENT}}
 
 
 @lru_cache(maxsize=8)

@@ -40,13 +40,19 @@ function literal(x) {
 }
 
 /** The fragment shader for shapes in use, with names defined. */
-function fragmentText(view, shapes, defines) {
+function fragmentText(view, leaves, shapes, defines) {
   const head = ["#version 300 es", ...defines.map((name) => `#define ${name}`), view.shader.fragment];
   const used = shapes.filter((shape) => shape < view.network.decoders.length);
   for (const shape of used) head.push(decoderText(`decoder${shape}`, view.network.decoders[shape]));
   head.push("float learned(int shape, vec2 q) {", "  switch (shape) {");
   for (const shape of used) head.push(`    case ${shape}: return decoder${shape}(q);`);
   head.push("    default: return FAR;", "  }", "}");
+  head.push("float shortOf(int shape, vec2 q) {", "  switch (shape) {");
+  for (const shape of used.filter((shape) => leaves[shape].level)) {
+    const { first, level: { side, extent } } = leaves[shape];
+    head.push(`    case ${shape}: return lattice(clamp(q / ${literal(extent)}, -1.0, 1.0), ${first}, ${side});`);
+  }
+  head.push("    default: return 0.0;", "  }", "}");
   return head.join("\n");
 }
 
@@ -79,12 +85,12 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     const { steps, scale } = row;
     const paint = joins[i].draws ? row.paint : -1; // the others leave colours as they are
     begins.push(numbers.length / 4);
-    const { bounds, far, first, side } = leaves[row.shape];
+    const { bounds, far, first, side, off } = leaves[row.shape];
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
     numbers.push(scale, narrow(joins[i]), flagsOf(joins[i], row), steps.length + (1 - row.opacity) / 2);
-    const more = skinned ? skinReach(row) / Math.min(far, 1) : 0;
+    const more = skinned ? (skinReach(row) + off) / Math.min(far, 1) : 0;
     numbers.push(...bounds.map((bound) => bound + more), Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : head + moves, 0);
     numbers.push(...colour, Math.min(far, 1) * scale);
@@ -127,7 +133,9 @@ const hides = ({ operator, around, seen }, { opacity }) => (
 );
 
 /** Radius of a disc within an object whose leaf has one of a radius, 0 where none is known. */
-const filled = (inner, { skin = [0, 0, 0] }) => (skin[1] > 0 || !inner ? 0 : Math.max(inner + skin[0] + skin[2], 0));
+const filled = ({ inner, off }, { skin = [0, 0, 0] }) => (
+  skin[1] > 0 || !inner ? 0 : Math.max(inner - off + skin[0] + skin[2], 0)
+);
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
 function listed({ starts, objects }, begins) {
@@ -163,17 +171,21 @@ export function planeDrawer(gl, view) {
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
   const brought = view.shapes.slice(network.decoders.length);
-  const [nodes, ofShape] = joined(brought.map(nodesOf), Float32Array);
+  const levels = network.decoders.map(({ level }) => Float32Array.from(level?.values ?? [], (n) => n * level.step));
+  const [nodes, ofShape] = joined([...levels, ...brought.map(nodesOf)], Float32Array);
+  const most = (values) => values.reduce((found, value) => Math.max(found, Math.abs(value)), 0);
   const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
-    ...network.decoders.map((decoder) => ({ ...decoder, side: 0 })),
-    ...brought.map(({ bounds, finest }, i) => ({ bounds, inner: 0, far: 1, side: finest ?? -1, first: ofShape[i] })),
+    ...network.decoders.map((decoder, i) => ({ ...decoder, side: 0, first: ofShape[i], off: most(levels[i]) })),
+    ...brought.map(({ bounds, finest }, i) => (
+      { bounds, inner: 0, far: 1, side: finest ?? -1, first: ofShape[levels.length + i], off: 0 }
+    )),
   ];
   const pictures = view.paints.map((paint, i) => ({ ...paint, first: ofPicture[i] / 3 }));
-  if (brought.length) {
+  if (nodes.length) {
     kinds.push("NODES");
     if (brought.some(isOutline)) kinds.push("OUTLINES");
-    if (!brought.every(isOutline)) kinds.push("GRIDS");
+    if (!brought.every(isOutline) || levels.some((level) => level.length)) kinds.push("GRIDS");
     held.nodes = sheet(gl, nodes, [gl.R32F, gl.RED, gl.FLOAT], 1);
   }
   if (pictures.length) {
@@ -191,7 +203,7 @@ export function planeDrawer(gl, view) {
     defines.push(...(skinned ? ["SKINS"] : []), ...(clear ? ["CLEAR"] : []), ...(define ? [define] : []));
     const key = [...defines, ...used].join();
     if (!programs.has(key)) {
-      const found = linked(gl, fragmentText(view, used, defines));
+      const found = linked(gl, fragmentText(view, leaves, used, defines));
       const place = (name) => gl.getUniformLocation(found, name);
       gl.useProgram(found);
       textures.forEach((name, unit) => gl.uniform1i(place(name), unit));
@@ -206,7 +218,7 @@ export function planeDrawer(gl, view) {
     const px = 2 / Math.min(width, height);
     const reach = reaches(program.rows, joins, network);
     const widest = program.rows.reduce((most, { blend }) => Math.max(most, blend), network.blend);
-    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? filled(leaves[row.shape].inner, row) : 0));
+    const inner = program.rows.map((row, i) => (hides(joins[i], row) ? filled(leaves[row.shape], row) : 0));
     const { numbers, begins } = packed(view, leaves, pictures, program, joins, reach, skinned);
     const wanted = 8 * Math.ceil(Math.min(width, height) / 400); // few enough for JavaScript
     const lists = define === "POINTS"
