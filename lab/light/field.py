@@ -116,7 +116,7 @@ def world_of(graph: Graph) -> World:
         row[23:33] = len(back), *np.pad(np.ravel([_own(step) for step in body.own]), (0, 9))[:9]
         rough = material.roughness
         row[33] = VOLUMETRIC if body.medium else DIFFUSE if not rough else GLOSSY if rough > 0.0 else METAL
-        row[34] = (material.density or EXTINCTION) * body.medium
+        row[34] = (material.density or EXTINCTION) * (body.medium > 0)
         look[i] = *material.colour(), *material.glow, abs(rough)
         worn[i] = -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0
         if material.element is not None:

@@ -41,7 +41,8 @@ FIRST = 1e-2  # and where the ground's light is not known
 SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
 DARK = 1e-30
 ALBEDO, WHITEST = 0.99, 0.98  # colours of media and of surfaces count as no more
-OWN, FAR = 0.62, 6.0  # cells: radius of a ball like one, and of those that surfaces tell apart
+FAR = 6.0  # cells: radius of the balls that surfaces tell apart
+NEAR, SPLIT = 3, 6  # cells around a lamp in which its light is uneven, and parts along their sides
 HALF_UP = 0.135  # share of the zenith's colour in directions about the horizontal: the sky's mean is right
 STEPS = 8  # through media of light for surfaces
 GAP = 0.03  # world units, as of `MarchSettings`
@@ -126,11 +127,14 @@ class Mist:
             clear = self._reached(light, self.p.reshape(3, -1)[:, active])
             sent[active] = np.where(clear > 0, clear.clip(DARK) ** self.thin.reshape(-1)[active], 0.0)
             at, rgb = np.reshape((light.position, light.rgb), (2, 3, 1, 1, 1)).astype(np.float32)
-            r = np.linalg.norm(self.p - at, axis=0)
-            rim = np.sqrt((1 - (light.radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
-            sent = sent.reshape(self.sides) * (r > light.radius) / (2 + 2 * rim)
-            own, far = (sent * _spread(r, radius * self.h) for radius in (OWN, FAR))
-            self.lamps.append((own, far, light.power * rgb))
+            r, sent = np.linalg.norm(self.p - at, axis=0), sent.reshape(self.sides)
+            own, far = sent * _received(r, light.radius), sent * _spread(r, FAR * self.h) / 4
+            uneven = r < light.radius + NEAR * self.h  # there cells have the mean
+            if uneven.any():
+                parts = (np.stack(np.mgrid[:SPLIT, :SPLIT, :SPLIT]).reshape(3, -1, 1) + 0.5) / SPLIT - 0.5
+                away = self.p[:, None, uneven] - at.reshape(3, 1, 1) + self.h * parts
+                own[uneven] = sent[uneven] * _received(np.linalg.norm(away, axis=0), light.radius).mean(0)
+            self.lamps.append((own, far, uneven, light.power * rgb))
             facing = (self.slopes * (at - self.p)).sum(0).clip(0.0) / r.clip(1e-6)
             self.received += 4 * light.power * rgb * own * facing
 
@@ -141,7 +145,8 @@ class Mist:
         with xp.inference():
             way = xp.array(p, like) - at[:, None]
             r = xp.length(list(way)).clip(1e-6)
-            trail = march(self.field, at, way / r, r, 0, GAP, True)
+            begin = xp.minimum(r, 0 * r + light.radius)
+            trail = march(self.field, at, way / r, r, 0, GAP, True, start=begin)
             return np.asarray(xp.to_numpy((trail.hit == INF) * xp.exp(-trail.depth)))
 
     def _segments(self) -> None:
@@ -165,12 +170,14 @@ class Mist:
             parts[:, *to] = np.stack([e0 - following, following]) * (m0 | m1)
             base = self.glow * parts[0]
             base[:, *to] += self.glow[:, *on] * parts[1][to]
-            for sent, _, rgb in self.lamps:
+            for sent, _, uneven, rgb in self.lamps:
                 first = sent[to].clip(DARK)
                 last = np.where(stop, first, sent[on].clip(DARK))
                 x = (1 + (np.log(first / last) / t).clip(-8.0, 50.0)) * t
                 x = np.where(abs(x) < 1e-4, 1e-4, x)
                 along = np.where(m0 | m1, first * t * (1 - np.exp(-x)) / x, 0.0)
+                evenly = parts[0][to] * sent[to] + parts[1][to] * sent[on]
+                along = np.where(uneven[to] | uneven[on], evenly, along)
                 base[:, *to] += self.albedo[:, *to] * rgb * along
             through, surface = np.zeros(sides, np.float32), None
             if self.opaque.any():
@@ -206,7 +213,7 @@ class Mist:
         self._solve(base, FIRST if floor is None else ENOUGH)
         light = np.where(self.opaque, 0.0, self.light).astype(np.float32)
         sends = self.albedo * light + self.glow
-        for _, sent, rgb in self.lamps:
+        for _, sent, _, rgb in self.lamps:
             sends += self.albedo * sent * rgb
         dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0) * ~self.opaque
         rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
@@ -301,6 +308,12 @@ def pair_of(sides: tuple[int, ...], shift: Shift) -> tuple[Slices, Slices]:
     ends = list(zip(sides, shift, strict=True))
     to = tuple(slice(max(0, -s), n - max(0, s)) for n, s in ends)
     return to, tuple(slice(max(0, s), n - max(0, -s)) for n, s in ends)
+
+
+def _received(r: np.ndarray, radius: float) -> np.ndarray:
+    """What media receive of a lamp of power 1 that nothing hides, at distances of its middle."""
+    rim = np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
+    return (r > radius) / (2 * (1 + rim) * r.clip(1e-6) ** 2)
 
 
 def _spread(r: np.ndarray, radius: float) -> np.ndarray:
