@@ -63,6 +63,7 @@ def test_what_gives_off_as_much_as_it_takes_is_in_balance():
     glow = [tuple(1 - c for c in o.rgb) for o in objects]
     field = field_of(objects, density=(2.0, 15.0, 3.0), glow=glow)
     mist = Mist(field, EVEN)
+    mist.relight(np.ones_like)
     p = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 200)).astype(np.float32)
     p = p[:, everywhere(field, p).register[-1] > 0.5]
     assert abs(mist.medium(p) - 1).max() < 0.02

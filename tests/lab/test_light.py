@@ -89,6 +89,16 @@ def test_mist_lets_through_what_its_depth_says() -> None:
     assert through[0, 0] == pytest.approx(math.exp(-3), rel=0.02)
 
 
+def test_each_medium_has_its_own_density() -> None:
+    """Where two overlap, the later one's holds."""
+    mist = "material volumetric { color(#000); density(%s); }"
+    first, second = (
+        "sphere { scale(0.5); translate(0, %s, 0); " % y + mist % s + " }" for y, s in ((-0.2, 1), (0.2, 3))
+    )
+    through = light(world(EVEN + "light(none);" + first + second), 3 * UP, -UP, 16384)
+    assert through[0, 0] == pytest.approx(math.exp(-0.4 - 3), rel=0.03)
+
+
 def test_lamps_in_mist_by_angle_and_by_chance() -> None:
     """Points by the angle at a lamp change the noise alone."""
     ball = "sphere { scale(0.8); material volumetric { color([0.8, 0.5, 0.9]); density(4); } }"

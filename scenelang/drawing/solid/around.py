@@ -29,8 +29,9 @@ from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.nodes import Nodes, ground_places, on_ground, on_objects, turned
 from scenelang.drawing.solid.passes import INF
 
-RAYS, GROUND_RAYS = 16, 16  # of nodes on objects and on the ground
+RAYS = 8  # of nodes
 GAP = 0.01  # world units, as of `MarchSettings`
+RARE = 5e-3  # of rays may be given up
 DOME = 64  # directions to the sky alone
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
@@ -56,7 +57,7 @@ ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 NEXT = (0, 0), (1, 0), (0, 1), (1, 1)
 AROUND = tuple((x, y) for x in range(-1, 3) for y in range(-1, 3))  # of those corners
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
-CELLS = 10  # of the grid of nodes, along its longest side
+CELLS = 8  # of the grid of nodes, along its longest side
 
 
 def disc(r: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -173,9 +174,8 @@ class Around:
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
         n, numbers = self.nodes, np.arange(self.count)
-        rays = np.where(numbers < self.first, RAYS, GROUND_RAYS)
         with xp.inference():
-            matrix, less = self._row(numbers, rays)
+            matrix, less = self._row(numbers, np.full(self.count, RAYS))
             self.exchange = matrix, self._dome(n.n) + less
         self.light(lamps)
 
@@ -259,7 +259,7 @@ class Around:
         way = turned(xp, xp.take(n, node), local)
         p = xp.take(nodes.p[:, index] + LIFT * n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit, through = march(self.field, p, way, limit, 0, GAP, True).hit, share
+        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=RARE).hit, share
         if self.mist is not None:
             light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
             xp.add(escaped, node, light * share)
@@ -388,7 +388,7 @@ class Around:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far."""
         xp = self.xp
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit = march(self.field, p, way, limit, 0, GAP).hit
+        hit = march(self.field, p, way, limit, 0, GAP, few=RARE).hit
         met, floor = xp.where(hit < INF), xp.where((hit == INF) & (limit < INF))
         light = self.sky(way)
         if len(floor):

@@ -17,7 +17,8 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.solid.around import ELSEWHERE, arriving, to_ground
+from scenelang.drawing.solid.around import ELSEWHERE, RARE, arriving, to_ground
+from scenelang.drawing.solid.centres import Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
 from scenelang.drawing.solid.march import (
@@ -49,6 +50,7 @@ THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
+DISTANT = 6.0  # radii of a lamp: points in media so far from it see the same through media all over its disc
 STEEP = 1.2  # how much more light the last node may get than the first
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
 CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
@@ -117,9 +119,10 @@ class Lighting:
             for light in stage.lights
         ]
 
-    def shade(self, way: Array, px: float = 0.0) -> Shade:
+    def shade(self, way: Array, px: float = 0.0, centres: Centres | None = None) -> Shade:
         """Light along rays from the eye, whose unit directions are (3, M). Textures are looked up four times
-        for pixels of a side px, of a picture that is 2 wide; once for 0.
+        for pixels of a side px, of a picture that is 2 wide; once for 0. Rays to centres of pixels tell what
+        arrives there, of which other rays take theirs.
         """
         xp, stage = self.xp, self.stage
         high, limit = (way[1] * 2).clip(0.0, 1.0), self.limit(way)
@@ -130,11 +133,10 @@ class Lighting:
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         both, result = xp.concat([surface, floor], 0), []
+        beside = None if centres is None else (centres, both)
         work = trail.work + Work(rays=way.shape[1], met=len(surface))
-        if len(surface):
-            result.append(self._reflecting(*self.surface(xp.take(way, surface), surface, trail, px)))
-        if len(floor):
-            result.append(self._reflecting(*self._ground(xp.take(way, floor), xp.take(limit, floor))))
+        if len(both):
+            result.append(self._reflecting(self._met(way, trail, limit, (surface, floor), px), beside))
         mist = None
         if trail.pieces:
             pieces = trail.pieces[0] if self.field.sigma is None else parted(self.field, trail, True)
@@ -145,7 +147,7 @@ class Lighting:
         if not result:
             return Shade(seen[:3], seen[-3:], alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
-        light, free, more = self._lit(points, xp.take(trail.soft, surface), trail)
+        light, free, more = self._lit(points, xp.take(trail.soft, surface), trail, beside=beside)
         work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
@@ -200,28 +202,55 @@ class Lighting:
         xp = self.xp
         way = xp.array(directions(self.stage.camera, canvas, x, y).reshape(3, -1), self.eye)
         limit = self.limit(way)
-        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True)
+        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True, few=2 * RARE)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-        p, n = 0 * way + ELSEWHERE, 0 * way
-        for index, result in (
-            (surface, self.surface(xp.take(way, surface), surface, trail) if len(surface) else None),
-            (floor, self._ground(xp.take(way, floor), xp.take(limit, floor)) if len(floor) else None),
-        ):
-            if result is not None:
-                xp.put(p, index, result[0])
-                xp.put(n, index, result[1])
+        p, n, both = 0 * way + ELSEWHERE, 0 * way, xp.concat([surface, floor], 0)
+        if len(both):
+            met = self._met(way, trail, limit, (surface, floor))
+            xp.put(p, both, met[0])
+            xp.put(n, both, met[1])
         return p, n
 
     def limit(self, way: Array) -> Array:
         """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
         return to_ground(self.xp, self.stage.ground, self.stage.camera.eye[1], way)
 
+    def _met(
+        self,
+        way: Array,
+        trail: Trail,
+        limit: Array,
+        index: tuple[Array, Array],
+        px: float = 0.0,
+        origin: Array = None,
+    ) -> list[Array]:
+        """What `surface` tells of the rays that met solids, then of those that met the ground."""
+        xp, parts = self.xp, []
+        for some, on_ground in zip(index, (False, True), strict=True):
+            if len(some):
+                ways = xp.take(way, some)
+                start = self.eye[:, None] if origin is None else xp.take(origin, some)
+                if on_ground:
+                    parts.append(self._ground(ways, xp.take(limit, some), start, origin is None))
+                else:
+                    parts.append(self.surface(ways, some, trail, px, start))
+        return [xp.concat(list(each), 1) for each in zip(*parts, strict=True)]
+
     def _reflecting(
-        self, p: Array, n: Array, colour: Array, haze: Array, coat: Array, mirrors: int = MIRRORS
+        self,
+        met: list[Array],
+        beside: tuple[Centres, Array] | None = None,
+        mirrors: int = MIRRORS,
     ) -> Points:
-        """Surface points (3, K) with unit normals and colours, light that joins in before, and coats."""
-        ambient = AMBIENT[0] + AMBIENT[1] * n[1]
-        received = ambient if self.around is None else self._twice(self.around.surface(p, n))
+        """Points that light, of `_met`; with ``beside`` as of `_lit`."""
+        p, n, colour, haze, coat = met
+        if self.around is None:
+            received = AMBIENT[0] + AMBIENT[1] * n[1]
+        elif beside is None:
+            received = self._twice(self.around.surface(p, n))
+        else:
+            centres, rays = beside
+            received = self._twice(centres.received(rays, p, n, self.around.surface))
         base = colour * received + haze
         if len(coat):
             base = base + reflected(self, p, n, coat, received, mirrors)
@@ -259,10 +288,18 @@ class Lighting:
             base = base + self._twice(self.field.glow(register) * weight.reshape(-1))
         return Points(p, way[:, :0], base, colour, self._bare * p[:1, :0]), weight.sum(0)
 
-    def _lit(self, points: Points, soft: Array, seen: Trail, wide: bool = True) -> tuple[Array, Array, Work]:
+    def _lit(
+        self,
+        points: Points,
+        soft: Array,
+        seen: Trail,
+        wide: bool = True,
+        beside: tuple[Centres, Array] | None = None,
+    ) -> tuple[Array, Array, Work]:
         """Light (R, K) from points, a number (K,) that tells by which lamps they are reached, and what it
         took. Of the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there;
         ``seen`` is the eye's trail. Unless ``wide``, what hides a lamp's middle hides all of it.
+        With ``beside`` points on surfaces are those that rays (F,) met.
         """
         xp, p, light, work = self.xp, points.p, points.base, Work()
         free, edge = 0 * p[0], 0 * p[0]
@@ -274,13 +311,33 @@ class Lighting:
             more = self._sent(points, lamp)
             lit = xp.where(abs(more).sum(0) > 0)
             if lamp.light.radius and wide:
-                clear, took = self._shared(lamp, xp.take(off, lit), xp.take(normals, lit))
+                clear, took = self._softly(number, lit, off, normals, beside)
             else:
-                clear, took = self._reached(lamp, xp.take(off, lit), xp.take(edge, lit) > 0, seen)
+                clear, took = self._reached(lamp, xp.take(off, lit), xp.take(edge, lit) > 0, seen, wide)
             xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
             xp.put(free, lit, xp.take(free, lit) + (clear > 0) * 2.0**number)
             work += took
         return light, free, work
+
+    def _softly(
+        self, number: int, lit: Array, p: Array, n: Array, beside: tuple[Centres, Array] | None
+    ) -> tuple[Array, Work]:
+        """As `_shared`, of some points (k,) of those that `_lit` has."""
+        xp, work, lamp = self.xp, Work(), self.lamps[number]
+
+        def ask(index: Array) -> Array:
+            nonlocal work
+            clear, took = self._shared(lamp, xp.take(p, index), xp.take(n, index))
+            work += took
+            return clear
+
+        if beside is None:
+            return ask(lit), work
+        centres, rays = beside
+        on, rest = xp.take(lit, xp.where(lit < len(rays))), xp.take(lit, xp.where(lit >= len(rays)))
+        ray, at, up = (xp.take(part, on) for part in (rays, p, n))
+        share = centres.shares(number, ray, at, up, lambda index: ask(xp.take(on, index)))
+        return xp.concat([share, ask(rest)], 0) if len(rest) else share, work
 
     def _sent(self, points: Points, lamp: Lamp) -> Array:
         """What points send to the eye (R, K) of a lamp's light if nothing is in its way."""
@@ -308,27 +365,44 @@ class Lighting:
         part, work = shown(self.opaque, lamp.at, radius, p, n)
         some = xp.where(part > 0)
         if self.field.media and len(some):
-            p, clear = xp.take(p, some), 0.0
-            for off in BEAMS * radius:
-                start = xp.array(off, p)
-                way = p - (lamp.at + start)[:, None]
-                r = _length(xp, way)
-                way, along = way / r, start @ way / r
-                rim = xp.sqrt(along * along + (radius * radius - start @ start)) - along  # of the lamp
-                trail = march(self.hazy, lamp.at + start, way, r - CLEAR, 0, self.pace.gap, True, start=rim)
-                clear, work = clear + xp.exp(-trail.depth) / len(BEAMS), work + trail.work
+            clear, took = self._hazed(lamp, xp.take(p, some), xp.take(n, some))
             xp.put(part, some, xp.take(part, some) * clear)
+            work += took
         return part, work + Work(lights=len(part))
 
-    def _reached(self, lamp: Lamp, p: Array, edge: Array, seen: Trail) -> tuple[Array, Work]:
+    def _hazed(self, lamp: Lamp, p: Array, n: Array) -> tuple[Array, Work]:
+        """Parts of a lamp's light (K,) that media let through to points as of `_shared`, along `BEAMS`; from
+        the middle alone to points in media that are far from it.
+        """
+        xp, radius, count = self.xp, lamp.light.radius, len(BEAMS)
+        single = (_dot(n, n) < 0.5) & (_length(xp, p - lamp.at[:, None]) > DISTANT * radius)
+        near, far = xp.where(~single), xp.where(single)
+        starts = np.repeat(
+            radius * np.concatenate([BEAMS, 0 * BEAMS[:1]]).T, [len(near)] * count + [len(far)], 1
+        )
+        start = xp.array(starts.astype(np.float32), p)
+        way = xp.take(p, xp.concat([near] * count + [far], 0)) - (start + lamp.at[:, None])
+        r = _length(xp, way)
+        way, along = way / r, _dot(start, way) / r
+        rim = xp.sqrt(along * along + (radius * radius - _dot(start, start))) - along  # of the lamp
+        begin = start + lamp.at[:, None]
+        trail = march(self.hazy, begin, way, r - CLEAR, 0, self.pace.gap, True, start=rim, few=RARE)
+        clear, passed = xp.exp(-trail.depth), 0 * p[0]
+        beams = count * len(near)
+        xp.put(passed, near, clear[:beams].reshape(count, -1).mean(0))
+        xp.put(passed, far, clear[beams:])
+        return passed, trail.work
+
+    def _reached(self, lamp: Lamp, p: Array, edge: Array, seen: Trail, exact: bool) -> tuple[Array, Work]:
         """Parts of a lamp's light (K,) that arrive at points (3, K), and what it took; of ``edge`` as `_lit`
-        of ``soft``.
+        of ``soft``. Few rays are given up unless it is to be ``exact``.
         """
         xp, way = self.xp, p - lamp.at[:, None]
         r = _length(xp, way)
         limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
         ways, begin = way / r.clip(1e-9), lamp.light.radius
-        trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin)
+        few = 0.0 if exact else 3 * RARE
+        trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)
         clear = (trail.hit == INF) * xp.exp(-trail.depth)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
         if len(inside):  # rays may have ended before they met what is opaque there
@@ -337,9 +411,7 @@ class Lighting:
             xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
         return clear, trail.work + Work(lights=len(r))
 
-    def surface(
-        self, way: Array, index: Array, trail: Trail, px: float = 0.0, origin: Array = None
-    ) -> tuple[Array, ...]:
+    def surface(self, way: Array, index: Array, trail: Trail, px: float, origin: Array) -> tuple[Array, ...]:
         """Points where rays meet solids, normals (3, K), colours, light from before them (R, K), coats."""
         xp = self.xp
         t = xp.take(trail.hit, index)
@@ -358,7 +430,7 @@ class Lighting:
         g = result.gradient
         towards = _dot(g, way)
         t = t + sharp * (INTO + self._ahead(result, way, None))
-        p = (self.eye[:, None] if origin is None else origin) + way * t
+        p = origin + way * t
         n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
         colour = result.register[: self.field.hues]
         glow = self._twice(self.field.glow(result.register)) if self.field.glowing else 0 * colour
@@ -382,12 +454,12 @@ class Lighting:
         # along a surface, at a cosine over -0.02, the distance says nothing of how far ahead it is
         return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
 
-    def _ground(self, way: Array, t: Array, origin: Array = None) -> tuple[Array, ...]:
-        """As `surface`, of the ground at t (K,)."""
+    def _ground(self, way: Array, t: Array, origin: Array, seen: bool) -> tuple[Array, ...]:
+        """As `surface`, of the ground at t (K,), as the eye has seen it or other light meets it."""
         xp, ground = self.xp, self.stage.ground
         assert ground is not None
-        horizon = self.horizon[:, None] if origin is None else self._twice(self.around.horizon)
-        p = (self.eye[:, None] if origin is None else origin) + way * t
+        horizon = self.horizon[:, None] if seen else self._twice(self.around.horizon)
+        p = origin + way * t
         n = p * 0
         n[1] = 1.0
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
@@ -544,31 +616,45 @@ def _band(
         result, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
         return result[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
-        near = range(max(rows.start - 1, 0), min(rows.stop + 1, height))
+        # from an even row to an even row, as all bands tell the same of rows that they share
+        near = range(max((rows.start - 2) // 2 * 2, 0), min((rows.stop + 2) // 2 * 2 + 1, height))
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
-        once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas))
+        xp, like = lighting.xp, lighting.field.network.codes
+        useful = lighting.around is not None or any(lamp.light.radius for lamp in lighting.lamps)
+        centres = Centres(xp, like, (len(near), width)) if useful else None
+        once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas), centres)
         band = slice(rows.start - near.start, rows.stop - near.start)
         picture = np.ascontiguousarray(once[:4, band])
         shown = once[3:] if lighting.stage.transparent else once[4:]
         y, x = np.nonzero(rough(shown, lighting.pace.contrast)[band])
     else:
-        picture, work = np.empty((4, len(rows), width), np.float32), Work()
+        centres, picture, work = None, np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
         across, down = sample_places(count)
-        every, more = _shade(lighting, canvas, x[:, None] + across, y[:, None] + rows.start + down)
+        y_samples = y[:, None] + rows.start + down
+        if centres is not None:
+            aside = [np.tile(np.where(part < 0.5, -1, 1), len(x)) for part in (down, across)]
+            at = [np.repeat(y + rows.start - near.start, count), np.repeat(x, count), *aside]
+            centres.pixels = [lighting.xp.array(part, like) for part in at]
+        every, more = _shade(lighting, canvas, x[:, None] + across, y_samples, centres=centres)
         picture[:, y, x] = every[:4].mean(2)
         work += more + Work(refined=len(x))
     return picture, work
 
 
 def _shade(
-    lighting: Lighting, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray, px: float = 0.0
+    lighting: Lighting,
+    canvas: tuple[int, int],
+    x: np.ndarray,
+    y: np.ndarray,
+    px: float = 0.0,
+    centres: Centres | None = None,
 ) -> tuple[np.ndarray, Work]:
-    """Radiance, alpha and plain radiance (7, …) at places of the picture; px as of `Lighting.shade`."""
+    """Radiance, alpha and plain radiance (7, …) at places of the picture; the rest as of `Lighting.shade`."""
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
     with xp.inference():
-        shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px)
+        shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px, centres)
         result = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
     return result.reshape(7, *way.shape[1:]), shade.work
 
@@ -650,7 +736,7 @@ def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
         solid = xp.where(trail.hit < INF)
         if len(solid):
             to = xp.take(way, solid)
-            p, n, *_ = lighting.surface(to, solid, trail)
+            p, n, *_ = lighting.surface(to, solid, trail, 0.0, lighting.eye[:, None])
             away = p - lighting.eye[:, None]
             out[0, solid], out[1:4, solid] = forward @ away, n
             t = xp.length(list(away)) + INTO

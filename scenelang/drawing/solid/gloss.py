@@ -130,17 +130,14 @@ def _ways(xp: Arrays, n: Array, coat: Array, u: Array, turn: Array) -> tuple[Arr
 
 def arriving(lighting: Any, p: Array, way: Array, mirrors: int) -> Array:
     """The light (R, K) that comes to points (3, K) from unit directions, and is mirrored so often at most."""
-    xp, around, result = lighting.xp, lighting.around, []
+    xp, around = lighting.xp, lighting.around
     light, limit = lighting._twice(around.sky(way)), to_ground(xp, lighting.stage.ground, p[1], way)
     trail = march(lighting.field, p, way, limit, 0, STEP)
-    met, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-    if len(met):
-        result.append(lighting.surface(xp.take(way, met), met, trail, origin=xp.take(p, met)))
-    if len(floor):
-        result.append(lighting._ground(xp.take(way, floor), xp.take(limit, floor), xp.take(p, floor)))
-    if result:
-        points = lighting._reflecting(*(xp.concat(list(x), 1) for x in zip(*result, strict=True)), mirrors)
-        xp.put(light, xp.concat([met, floor], 0), lighting._lit(points, p[0, :0], trail)[0])
+    index = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+    both = xp.concat(list(index), 0)
+    if len(both):
+        points = lighting._reflecting(lighting._met(way, trail, limit, index, origin=p), None, mirrors)
+        xp.put(light, both, lighting._lit(points, p[0, :0], trail)[0])
     if around.mist is not None:
         mist = around.mist.along(p, way, xp.minimum(trail.hit, limit))[0]
         light = light * xp.exp(-trail.depth) + lighting._twice(mist)

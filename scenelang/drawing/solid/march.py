@@ -116,12 +116,18 @@ class Rays:
         self.batches = [_Batch(every[:0], rows[:, :0], every[:0] < 0) for _ in range(2)]
         self._go_on(every, rows, passes)
 
-    def run(self, halvings: int, most: int = STEPS) -> None:
-        """Follow the rays to their ends, or for as many steps; what they have not met by then, they miss."""
+    def run(self, halvings: int, most: int = STEPS, few: float = 0.0) -> None:
+        """Follow the rays to their ends, or for as many steps, or until as small a part of them is under way;
+        what they have not met by then, they miss.
+        """
         xp = self.xp
         for _ in range(most):
             under_way = sum(batch.left + batch.more for batch in self.batches)
-            if _enough(sum(len(place) for place, _ in self.between), under_way):
+            between = sum(len(place) for place, _ in self.between)
+            if under_way + between < few * len(self.ids):
+                self._give_up()
+                break
+            if _enough(between, under_way):
                 places, rows = zip(*self.between, strict=True)
                 place, self.between = xp.concat(places, 0), []
                 self._go_on(place, xp.concat(rows, 1), self.passes.at(xp, place))
@@ -142,6 +148,15 @@ class Rays:
             xp.put(self.trail.hit, xp.take(self.ids, xp.concat(places, 0)), hit)
         if self.ended:
             self._finish(halvings)
+
+    def _give_up(self) -> None:
+        """End the ways through media of rays that are under way."""
+        for batch in self.batches if self.solids.media else ():
+            index = self.xp.where(batch.alive & (batch.rows[WITHIN] > 0))
+            if len(index):
+                ray = self.xp.take(self.ids, self.xp.take(batch.place, index))
+                row = self.xp.take(batch.rows, index)
+                self._close(ray, row, row[T])
 
     def _join(self) -> None:
         """Let few rays that meet one object alone go along with as many or more that meet several."""
@@ -494,9 +509,10 @@ def march(
     whole: bool = False,
     steps: int = STEPS,
     start: Array | float = 0.0,
+    few: float = 0.0,
 ) -> Trail:
     """Follow rays from an origin (3,), or one each (3, M), along unit directions (3, M), from ``start`` (M,)
-    up to a limit (M,), in ``steps`` at most.
+    up to a limit (M,), in ``steps`` at most; as few of them may be given up.
 
     ``halvings`` of the interval find where a medium gives way to a solid; ``gap`` is that of
     `MarchSettings`. If ``whole``, nobody asks where media begin and end, so that the network for segments may
@@ -515,7 +531,7 @@ def march(
             xp.put(trail.depth, xp.take(ids, some), answers)
         ids, passes = xp.take(ids, rest), passes.at(xp, rest)
     if len(ids):
-        Rays(solids, trail, ids, passes, gap).run(halvings, steps)
+        Rays(solids, trail, ids, passes, gap).run(halvings, steps, few)
     if trail.pieces and solids.sigma is None:
         trail.pieces = [parted(solids, trail, not whole)]
     elif trail.pieces:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,11 +33,11 @@ Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
 Slices = tuple[slice, ...]
 
-NODES = 22**3  # of a lattice, about
+NODES = 20**3  # of a lattice, about
 DEEPEST = 2.5  # optical depth from a node to the next; denser media are drawn thinner
 DEEP = 3.0  # cells by which points move inwards at most, where these are
-ENOUGH = 2e-3  # of the most light there is, by which the last sweep changes it,
-FIRST = 1e-2  # and where the ground's light is not known
+ENOUGH = 4e-3  # of the most light there is, by which the last sweep changes it,
+FIRST = 5e-2  # and where the ground's light is not known
 SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
 DARK = 1e-30
 ALBEDO, WHITEST = 0.99, 0.98  # colours of media and of surfaces count as no more
@@ -120,7 +120,7 @@ class Mist:
         active = np.flatnonzero(((count > 0) | self.mist) & ~self.opaque)
         self.slopes = np.array(np.gradient(d, self.h))
         # what arrives (n…,), the same as surfaces see it, and colours with their power
-        self.lamps: list[tuple[Floats, ...]] = []
+        self.lamps: list[tuple[Any, ...]] = []
         self.received = 0 * self.albedo  # from lamps, by surfaces next to nodes
         for light in self.stage.lights:
             sent = np.zeros(d.size, np.float32)
@@ -131,7 +131,7 @@ class Mist:
             own, far = sent * _received(r, light.radius), sent * _spread(r, FAR * self.h) / 4
             uneven = r < light.radius + NEAR * self.h  # there cells have the mean
             if uneven.any():
-                parts = (np.stack(np.mgrid[:SPLIT, :SPLIT, :SPLIT]).reshape(3, -1, 1) + 0.5) / SPLIT - 0.5
+                parts = (np.mgrid[:SPLIT, :SPLIT, :SPLIT].reshape(3, -1, 1) + 0.5) / SPLIT - 0.5
                 away = self.p[:, None, uneven] - at.reshape(3, 1, 1) + self.h * parts
                 own[uneven] = sent[uneven] * _received(np.linalg.norm(away, axis=0), light.radius).mean(0)
             self.lamps.append((own, far, uneven, light.power * rgb))
@@ -313,7 +313,8 @@ def pair_of(sides: tuple[int, ...], shift: Shift) -> tuple[Slices, Slices]:
 def _received(r: np.ndarray, radius: float) -> np.ndarray:
     """What media receive of a lamp of power 1 that nothing hides, at distances of its middle."""
     rim = np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
-    return (r > radius) / (2 * (1 + rim) * r.clip(1e-6) ** 2)
+    result: np.ndarray = (r > radius) / (2 * (1 + rim) * r.clip(1e-6) ** 2)
+    return result
 
 
 def _spread(r: np.ndarray, radius: float) -> np.ndarray:

@@ -23,14 +23,14 @@ from scenelang.drawing.solid.network import Wanted
 ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
 COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
 CHORDS, GLOWING = 1500, 400  # of those that glow, and nodes of the light on each
-NODES, LEAST, MOST = 300, 20, 400  # on all objects, on one at least and at most
+NODES, LEAST, MOST = 200, 20, 400  # on all objects, on one at least and at most
 HOLLOW = 3  # times as many where something may be hollow
 COVERED = 0.06  # world units by which a surface is covered where its nodes have faded
 NEWTON = 2
 INSIDE = 1e-3  # world units behind a surface where its material is asked for
 FLAT = 0.01  # of distances; less is none
 BEFORE = 0.02  # world units before a surface where nothing must be, lest a node fades
-SIDE = 24  # nodes of the ground along one axis
+SIDE = 18  # nodes of the ground along one axis
 FAR, WARP = 20.0, 4.5  # world units to the last ones; they lie at FAR sinh(WARP u) / sinh(WARP)
 
 

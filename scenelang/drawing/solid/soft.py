@@ -14,7 +14,7 @@ import numpy as np
 
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import LAST, PACE, STATE, STEPS, UNTIL, Rays, T, Trail, Work, _Batch
+from scenelang.drawing.solid.march import LAST, PACE, STATE, UNTIL, Rays, T, Trail, Work, _Batch
 from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import Passes
 
@@ -103,7 +103,7 @@ def shown(solids: SolidField, at: Array, radius: float, p: Array, n: Array) -> t
     if not len(ids):
         return part, trail.work
     axes = Cones(solids, trail, xp.take(spread, ids), xp.take(far, ids))
-    axes.run(0, STEPS)
+    axes.run(0)
     least = xp.minimum(axes.told[0], axes.told[2])
     xp.put(part, ids, 0 * least + (least > -1))
     half = xp.where((least > -1) & (least < 1))

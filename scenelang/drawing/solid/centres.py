@@ -1,0 +1,153 @@
+"""Light at the centres of pixels, from which pixels between them and samples near them take theirs.
+
+Light and shares of soft lamps change slowly along a surface: every second pixel of every second row asks for
+its own, and others take the mean of neighbours where these lie on the same surface and agree. Samples of a
+pixel take what its centre has where they lie on its surface.
+
+Letters: K points, M pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.solid.passes import INF
+
+EVEN, STEADY = 0.2, 0.2  # differences of shares between neighbours, in passing over two pixels and over one
+APART = 0.35  # sine: so far off each other's planes lie points of one surface at most
+ALIGNED = 0.8  # cosine of their normals
+UNKNOWN = -1.0
+# of pixels around a sample, steps towards it down and across, and weights; those on other surfaces count less
+AROUND = (0, 0, 9 / 16), (0, 1, 3 / 16), (1, 0, 3 / 16), (1, 1, 1 / 16)
+FARTHER = tuple((down, right, 1.0) for down in range(-1, 3) for right in range(-1, 3))
+ALMOST = 1e-4
+
+
+class Centres:
+    """The centres of rows of pixels, numbered row by row."""
+
+    def __init__(self, xp: Arrays, like: Array, shape: tuple[int, int]) -> None:
+        self.xp, self.shape, count = xp, shape, shape[0] * shape[1]
+        # of samples, once all centres are known: row and column of the pixel, and the next to each (K,)
+        self.pixels: Any = None
+        self.p, self.n, self.light = (xp.full((3, count), 0.0, like) for _ in range(3))
+        self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and whether they are steady
+
+    def received(self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array]) -> Array:
+        """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met."""
+        xp = self.xp
+        if self.pixels is None:
+            xp.put(self.p, rays, p)
+            xp.put(self.n, rays, n)
+            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), INF)
+            xp.put(self.light, rays, xp.take(light, rays))
+            return xp.take(self.light, rays)
+        return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))
+
+    def shares(self, lamp: int, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]) -> Array:
+        """Shares (K,) of a lamp at such points, of which some are asked by their indices."""
+        xp = self.xp
+        if self.pixels is None:
+            share = self._spread(rays, 1, lambda index: ask(index)[None], EVEN)[0]
+            self.lit[lamp] = share, self._steady(share.reshape(self.shape))
+            return xp.take(share, rays)
+        if lamp not in self.lit:
+            return ask(xp.where(rays >= 0))
+        share, steady = self.lit[lamp]
+        return self._mixed(share[None], steady, rays, p, n, lambda rest: ask(rest)[None])[0]
+
+    def _mixed(
+        self,
+        values: Array,
+        steady: Array | None,
+        rays: Array,
+        p: Array,
+        n: Array,
+        ask: Callable[[Array], Array],
+    ) -> Array:
+        """Values (R, K) of samples from those (R, M) of pixels on the same surfaces: their own where these
+        are ``steady``, else of those around them. Where nothing is known around, they are asked by their
+        indices.
+        """
+        xp, (rows, columns) = self.xp, self.shape
+        at = [xp.take(part, rays) for part in self.pixels]
+        index = at[0] * columns + at[1]
+        own = _same(xp.take(self.p, index) - p, xp.take(self.n, index), n) & (xp.take(values[0], index) >= 0)
+        if steady is not None:
+            own = own & xp.take(steady, index)
+        result, rest = xp.take(values, index), xp.where(~own)
+        if not len(rest):
+            return result
+        for ring in (
+            AROUND,
+            FARTHER,
+        ):  # what is thinner than a pixel takes of what is farther, or else of others
+            row, column, down, right = (xp.take(part, rest) for part in at)
+            here, up = xp.take(p, rest), xp.take(n, rest)
+            total: Any = 0.0
+            mean: Any = 0.0
+            for one, other, weight in ring:
+                index = (row + one * down).clip(0, rows - 1) * columns
+                index = index + (column + other * right).clip(0, columns - 1)
+                value = xp.take(values, index)
+                alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
+                weight = weight * (alike + ALMOST) * (value[0] >= 0)
+                total, mean = total + weight, mean + weight * value
+            xp.put(result, rest, mean / xp.maximum(total, 0 * total + ALMOST * ALMOST))
+            unknown = xp.take(rest, xp.where(total == 0))
+            rest = xp.take(rest, xp.where(total < 30 * ALMOST))
+            if not len(rest):
+                return result
+        if len(unknown):
+            xp.put(result, unknown, ask(unknown))
+        return result
+
+    def _spread(self, rays: Array, count: int, ask: Callable[[Array], Array], most: float) -> Array:
+        """Values (count, M) that rays (K,) want; between others' where these differ by no more."""
+        xp, (rows, columns) = self.xp, self.shape
+        result = xp.full((count, rows * columns), UNKNOWN, self.p)
+        wanted = 1 * result[0]
+        wanted[rays] = 1.0
+        first = xp.where((rays // columns % 2 == 0) & (rays % columns % 2 == 0))
+        if len(first):
+            xp.put(result, xp.take(rays, first), ask(first))
+        grids = [part.reshape(-1, rows, columns) for part in (result, self.p, self.n)]
+        _fill(xp, *(part[:, ::2] for part in grids), most=most)
+        _fill(xp, *(part.swapaxes(1, 2) for part in grids), most=most)
+        result = xp.select(wanted > 0, result, wanted)
+        rest = xp.where(xp.take(result[0], rays) < 0)
+        if len(rest):
+            xp.put(result, xp.take(rays, rest), ask(rest))
+        return result
+
+    def _steady(self, share: Array) -> Array:
+        """Pixels (M,) whose neighbours have about the same shares (R, C), or none."""
+        uneven = share < 0
+        for here, there, one, other in (
+            (share[1:], share[:-1], uneven[1:], uneven[:-1]),
+            (share[:, 1:], share[:, :-1], uneven[:, 1:], uneven[:, :-1]),
+        ):
+            differs = (abs(here - there) > STEADY) & (here >= 0) & (there >= 0)
+            one |= differs
+            other |= differs
+        return ~uneven.reshape(-1)
+
+
+def _same(off: Array, n: Array, other: Array) -> Array:
+    """Whether points that are so far (3, …) apart, with unit normals, lie on one surface."""
+    above = (off * (n + other)).sum(0)
+    square = (off * off).sum(0)
+    return ((n * other).sum(0) > ALIGNED) & (above * above < 4 * APART * APART * square + 1e-12)
+
+
+def _fill(xp: Arrays, values: Array, p: Array, n: Array, most: float) -> None:
+    """Set every second value (…, R, C) of rows to the mean of those beside it, where both lie on its surface
+    and differ by no more.
+    """
+    a, b, here, up = values[:, :, :-2:2], values[:, :, 2::2], p[:, :, 1:-1:2], n[:, :, 1:-1:2]
+    agree = (abs(a[0] - b[0]) < most) & (a[0] >= 0) & (b[0] >= 0)
+    for side in (slice(None, -2, 2), slice(2, None, 2)):
+        agree = agree & _same(p[:, :, side] - here, n[:, :, side], up)
+    values[:, :, 1:-1:2] = xp.select(agree, (a + b) / 2, 0 * a + UNKNOWN)
