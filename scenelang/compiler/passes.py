@@ -32,7 +32,7 @@ from scenelang.compiler.graph import (
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.rewrites import Context, cover_of, covered
-from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
+from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space, Stage
 from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span
 from scenelang.language.scene import Scene
@@ -127,6 +127,9 @@ _SUBJECTS = {
 """Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
+THIN_WALL: Final = 0.05  # world units; light of a sky leaks through thinner walls
+SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
+CROWD: Final = 100  # objects; light between more of them is less exact
 _TOLERANCE = 1e-9
 
 
@@ -170,7 +173,54 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
         _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
+    if graph.stage is not None and graph.stage.sky is not None and context.whole:
+        _check_light(rows, measures, graph, graph.stage, context)
     return graph
+
+
+def _check_light(
+    rows: list[Row], measures: Callable[[Leaf], Measures], graph: Graph, stage: Stage, context: Context
+) -> None:
+    """Warn once of all that measurements say light under a sky may be wrong of, at the first object.
+
+    Walls count where something opens the hollow, or the eye is in it: closed ones are drawn as solids are.
+    """
+    space, found = graph.space, list[tuple[Leaf, str]]()
+    hollow = [row.leaf for row in rows if not row.cuts and Skin.of(row.leaf.steps).shell]
+    walls = [(dict(leaf.noted("measures", measures)).get("thickness", inf), leaf) for leaf in hollow]
+    thin = [(thick, leaf) for thick, leaf in walls if thick < THIN_WALL]
+    cuts = [row for row in rows if row.cuts or row.op == "intersect"]
+    for thick, leaf in thin if len(thin) * len(cuts) <= _TESTS else ():
+        box = leaf_box(leaf, 0.0, space)
+        opened = any(not row.cuts or overlap(leaf_box(row.leaf, 0.0, space), box) for row in cuts)
+        if opened or _within(box, stage.camera.eye):
+            fact = f"the wall of this hollow `{leaf.geometry}` is {thick:.3g} thick, and light leaks through"
+            found.append((leaf, f"{fact} what is thinner than {THIN_WALL:g}"))
+            break
+    mist = [row.leaf for row in rows if not row.cuts and row.leaf.look.material == "volumetric"]
+    lamps = [lamp for lamp in stage.lights if lamp.radius < SMALL_LAMP and lamp.power]
+    for lamp in lamps if len(lamps) * len(rows) <= _TESTS else ():
+        if not (boxed := [leaf for leaf in mist if _within(leaf_box(leaf, 0.0, space), lamp.position)]):
+            continue
+        depth, holder = _folded(graph.root, lamp.position, space)
+        if depth >= 0.0:
+            holder = next((leaf for leaf in boxed if leaf.geometry not in GEOMETRIES), None)
+        if holder is not None and holder.look.material == "volumetric":
+            at = ", ".join(f"{v:g}" for v in lamp.position)
+            fact = f"the lamp at [{at}] is in the mist of this `{holder.geometry}`, and its radius of "
+            found.append((holder, f"{fact}{lamp.radius:g} is below {SMALL_LAMP:g}"))
+            break
+    if len(rows) > CROWD:
+        found.append((rows[CROWD].leaf, f"there are {len(rows):,} objects, and it was measured to {CROWD}"))
+    if found:
+        fact = f"light under a `sky` may be wrong: {'; '.join(fact for _, fact in found)}"
+        help = "compare with `render --backend reference`, which traces the light"
+        context.diagnostics.add("W0514", fact, min(found, key=lambda at: at[0].number)[0].span, help=help)
+
+
+def _within(box: Box, p: Point) -> bool:
+    x, y, z = p
+    return overlap(box, (x, y, x, y, z, z))
 
 
 def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
@@ -344,7 +394,7 @@ def _distance(geometry: str, chain: Sequence[Step], p: Point) -> float:
 _FAR: Final = 8.0
 """World units; larger coordinates and sizes were most likely meant as pixels."""
 _TESTS: Final = 20_000
-"""The most comparisons of boxes, beyond which nothing is reported, so that no scene takes long."""
+"""The most comparisons, as of boxes, beyond which nothing is reported, so that no scene takes long."""
 
 
 def check_seen(graph: Graph, context: Context) -> Graph:

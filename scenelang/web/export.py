@@ -41,7 +41,7 @@ from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
 from scenelang.web.arrays import ArrayStore, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
-from scenelang.web.volume import volume
+from scenelang.web.volume import FULL, Detail, volume
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -157,10 +157,12 @@ def view_of(
     source: Sequence[tuple[str, str]] = (),
     form: PageProgram | None = None,
     animation: Animation | None = None,
+    draft: Detail | None = None,
 ) -> PagePayload:
     """The view of a Program of a shipped model, with names and texts of its files and the form of its scene.
 
-    Without a form its numbers never change. Raises `ProgramError` for other weights, or where no page can
+    Without a form its numbers never change. In a ``draft`` light from everywhere is of less
+    detail, and what reflects is matte. Raises `ProgramError` for other weights, or where no page can
     draw the model, `SceneError` for materials that none draws.
     """
     manifest, store = load_manifest(program.model), ArrayStore()
@@ -168,7 +170,7 @@ def view_of(
         raise ProgramError(f"model `{manifest.name}` draws whole pictures, which no page does")
     if not manifest.framed:
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
-    if beyond_pages(program):
+    if beyond_pages(program) and not draft:
         fact, help = "`glossy` or `metal`, which no page draws", "draw a picture or a video of it"
         raise SceneError([Diagnostic("E0560", fact, None, help=help)])
     network, digest = load_arrays(program.model, program.weights)
@@ -218,7 +220,7 @@ def view_of(
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
         if has_sky(program):
-            data["around"] = volume(program, network, store)
+            data["around"] = volume(program, network, store, draft or FULL)
     data["alt"] = alternative(data)
     return PagePayload(data, store.bytes())
 
@@ -384,13 +386,18 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[PagePayload, P
 
 
 def scene_view(
-    program: Program, scene: Scene | None, evaluation: Evaluation | None, *, title: str = ""
+    program: Program,
+    scene: Scene | None,
+    evaluation: Evaluation | None,
+    *,
+    title: str = "",
+    draft: Detail | None = None,
 ) -> PagePayload:
     """The view of a compiled scene, None for a Program from a file; the evaluation is that of its text."""
     source: list[tuple[str, str]] = []
     form = None
     if evaluation is not None:
-        form = form_of(evaluation, load_manifest(program.model), worn_of(program))
+        form = form_of(evaluation, load_manifest(program.model), worn_of(program), draft=draft is not None)
         folder = os.path.dirname(evaluation.sources[0].name)
         for text in evaluation.sources:
             if not library.holds(text):  # a file outside the folder is shown without its path
@@ -399,7 +406,7 @@ def scene_view(
     elif scene is not None and len(written := scene.to_nsg()) <= _MOST_TEXT:
         source = [(f"{title or 'scene'}.nsg", written)]
     animation = None if scene is None else scene.animation
-    return view_of(program, title=title, source=source, form=form, animation=animation)
+    return view_of(program, title=title, source=source, form=form, animation=animation, draft=draft)
 
 
 def still(program: Program) -> bytes:

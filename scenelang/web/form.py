@@ -96,7 +96,9 @@ class Lacking(Exception):
 class Writer:
     """Writes statements of a scene's files as forms; ``elements`` come first in `shapes` and `paints`."""
 
-    def __init__(self, context: FileContext, manifest: Manifest, elements: Iterable[Worn]) -> None:
+    def __init__(
+        self, context: FileContext, manifest: Manifest, elements: Iterable[Worn], draft: bool = False
+    ) -> None:
         self.slots = 0  # of all files
         self.calls: list[Json] = []  # forms of the fns and modules that are called
         self.uses: list[Bound] = []
@@ -104,7 +106,7 @@ class Writer:
         self.params: list[tuple[str, nodes.Param, FileContext, Bound]] = []
         # names of files that these settings use
         self.lengths: dict[str, list[Bound]] = {"canvas": [], "animate": []}
-        self.manifest, listed = manifest, list(elements)
+        self.manifest, listed, self.draft = manifest, list(elements), draft
         self.files = {file.name: file.zoo for file in context.session.elements.values()}
         self.brought = Brought.of(tuple(context.session.elements.values()))
         self.textures = load_textures()
@@ -312,6 +314,8 @@ class Writer:
         """Indices of a material's shading and of its paint, -1 for none."""
         lit = name if element is None else shading or self.manifest.materials[0]
         paint = -1 if element is None else self._element(element, self.paints, name)
+        if lit in words.REFLECTING and self.draft:
+            lit = self.manifest.materials[0]
         if lit in words.REFLECTING:
             raise Lacking(f"pages do not draw `{lit}`")
         if lit not in self.manifest.materials:
@@ -373,7 +377,8 @@ class Writer:
         bound = None if name in words.LANGUAGE else scope.find(name)
         head = head_of(stmt, bound, kind)
         if head == "move" and name == "roughness":
-            return ["no", f"pages do not draw `{name}`"]
+            self._move(stmt, scope, True)  # for the names that it uses
+            return None if self.draft else ["no", f"pages do not draw `{name}`"]
         if head == "setting":
             args = self.given(bind(words.SETTINGS[name].params, stmt.args), scope)
             if name in words.STAGE and self.manifest.dimension == 2:
@@ -492,12 +497,15 @@ class PageProgram(Record):
     paints: tuple[Worn, ...]
 
 
-def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Worn] = ()) -> PageProgram:
+def form_of(
+    evaluation: Evaluation, manifest: Manifest, elements: Iterable[Worn] = (), *, draft: bool = False
+) -> PageProgram:
     """The form of a scene that was evaluated without errors; params start from the values of that run.
 
-    The Program's elements come first among shapes and paints, in their order.
+    The Program's elements come first among shapes and paints, in their order. In a ``draft`` what reflects is
+    matte.
     """
-    writer, reasons = Writer(evaluation.context, manifest, elements), dict[str, str]()
+    writer, reasons = Writer(evaluation.context, manifest, elements, draft), dict[str, str]()
     with deep_stack():
         lines = writer.file(evaluation.context, evaluation.file, PageScope(), imported=False)
         needed = writer.reached(one for _, bound, uses in lines if bound is None for one in uses)

@@ -33,12 +33,15 @@ from scenelang.language.reports import SceneError
 from scenelang.output.animate import Progress, make
 from scenelang.output.frames import Clip, Drawable, Shot, find_target, frame_key
 from scenelang.output.painting import Painter
-from scenelang.web.export import PagePayload, has_sky, page, scene_view, still
+from scenelang.web.export import PagePayload, page, scene_view, still
 from scenelang.web.folder import Answer, JobFailed
+from scenelang.web.volume import DRAFT, OPEN
 
 MOST_PIXELS: Final = 1 << 24
 MOST_ROWS: Final = 5000
 """Objects of a scene that a page is given: so many take 1 MB and most of a second."""
+MOST_LIT: Final = 200
+"""Objects of a scene under a sky whose light a page is given a draft of."""
 MOST_TOLD: Final = 100  # problems of a scene
 _BY_NUMPY: Final = ("framed", "solid")  # renderers
 _CACHE: Final = TileCache()
@@ -90,8 +93,9 @@ def _view(job: Job, tell: Tell) -> Answer:
         "problems": [*map(_problem, result.items[:MOST_TOLD]), *lacking],
         "ms": _since(started),
     }
-    head = {"wanted": [str(path) for path in evaluation.wanted]}
+    head: dict[str, Any] = {"wanted": [str(path) for path in evaluation.wanted]}
     if shown is not None:
+        head["lit"] = "around" in shown.data and len(shown.data["program"]["rows"]) <= MOST_LIT
         head["angles"] = [param["name"] for param in shown.data["params"] if param["kind"] == "angle"]
     return Answer(_json(data), head)
 
@@ -103,9 +107,8 @@ def _viewed(job: Job, evaluation: Evaluation, diagnostics: Diagnostics) -> tuple
     program = compile_scene(scene, spans=spans, diagnostics=diagnostics)
     if len(program) > MOST_ROWS:
         raise ProgramError(f"more than {MOST_ROWS:,} objects, which no page draws by itself")
-    if job["do"] == "view" and has_sky(program):
-        raise ProgramError("light from everywhere, which the machine draws")
-    return scene_view(program, scene, evaluation, title=Path(job["name"]).stem), program
+    title, draft = Path(job["name"]).stem, {"view": OPEN, "light": DRAFT}.get(job["do"])
+    return scene_view(program, scene, evaluation, title=title, draft=draft), program
 
 
 def _problem(diagnostic: Diagnostic) -> dict[str, Any]:
@@ -266,6 +269,7 @@ def _since(started: float) -> float:
 
 DO: Final[dict[str, Callable[[Job, Tell], Answer]]] = {
     "view": _view,
+    "light": _view,
     "network": _network,
     "reference": _reference,
     "difference": _difference,

@@ -122,7 +122,10 @@ class Play:
 
 FILES: Final = {kind: f"image/{kind}" for kind in ("png", "gif", "webp", "apng")}
 FILES.update(html="text/html", nsg="text/plain")
-LIMITS_S: Final = {"view": 20.0, "network": 60.0, "reference": 300.0, "difference": 300.0, "figures": 300.0}
+LIMITS_S: Final = {
+    **{"view": 20.0, "light": 20.0, "network": 60.0},
+    **{"reference": 300.0, "difference": 300.0, "figures": 300.0},
+}
 FILE_S: Final = 3600.0
 KEEP_S: Final = 0.5  # between two times that an unsaved text is stored
 MOST_WAITING: Final = 1 << 26  # characters for a page that does not read
@@ -336,13 +339,17 @@ class Live:
             if known is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
                 known.angles = frozenset(answer.head.get("angles", known.angles))
+                if answer.head.get("lit"):  # the same with a draft of its light, which takes longer
+                    lit = {"do": "light", "message": {**message, "again": True}}
+                    with contextlib.suppress(Denied):
+                        self._start(("light", name), None, name, lit, self._play.views)
 
         message = {"kind": "view", "file": name, "version": version}
         self._start(("view", name), None, name, {"do": "view", "message": message}, self._play.views, viewed)
 
     async def _draw(self, message: Json) -> None:
         name, known = self._known(message)
-        id, by = id_of(message), choice_of(message, "by", LIMITS_S.keys() - {"view"})
+        id, by = id_of(message), choice_of(message, "by", LIMITS_S.keys() - {"view", "light"})
         said = {"kind": "figures" if by == "figures" else "picture", "id": id, "file": name}
         said |= {"version": known.version, "by": by}
         job = {"do": by, "message": said, **wishes(message)}
@@ -411,6 +418,8 @@ class Live:
             limit = LIMITS_S.get(job["do"], FILE_S)
             answer = await pool.run(job, limit, said if job["do"] == "file" else None)
         except JobFailed as error:
+            if job["do"] == "light":
+                return
             if job["do"] == "view":
                 problem = {"code": "", "severity": "error", "message": str(error), "line": 1, "column": 1}
                 self.tell({**job["message"], "view": None, "problems": [problem], "ms": None})

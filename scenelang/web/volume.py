@@ -8,11 +8,13 @@ The ground has a map of its own, finer about the objects. Letters: n nodes, K so
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from types import SimpleNamespace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from scenelang.compiler.program import Program
+from scenelang.compiler.spaces import Sky
 from scenelang.drawing.solid.around import BATCH, GOLDEN, TURNS, Around, arriving, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
@@ -22,47 +24,83 @@ from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import SolidArrays, Wanted
 from scenelang.web.arrays import ArrayStore
 
-NODES = 14_000  # of the lattice, about
-FLOOR, SPREAD = 80, 3.0  # nodes along a side of the ground's map, at s sinh(SPREAD u)
-RAYS, EVERY = 64, 4  # of a node, and of how many things that glow one is asked for
-NOISE, MORE = 0.02, 128  # of the light, above which there are more rays, and how many
+SPREAD = 3.0  # nodes along a side of the ground's map stand at s sinh(SPREAD u)
+EVERY = 4  # of how many things that glow one is asked for
+NOISE = 0.02  # of the light, above which there are more rays
 UNLIKE = 0.15  # of the light of both, by which neighbours differ that are not mixed
 FILLED = 3  # nodes in solids that a surface may be next to, behind each other
 OFF, GAP = 1e-3, 0.01  # world units off the ground where rays begin, and as of `MarchSettings`
 PAIRS: Final = ((0, 1), (1, 2), (2, 0), (0, 0), (1, 1))
 
+
+class Detail(NamedTuple):
+    """How many nodes the lattice has, about, the ground's map along a side, and how many rays a node has."""
+
+    nodes: int = 14_000
+    floor: int = 80
+    rays: int = 64
+    more: int = 128  # where light is noisy
+
+
+FULL: Final = Detail()
+DRAFT: Final = Detail(1000, 24, 16, 0)
+OPEN: Final = Detail(8, 8, 64, 0)
+"""Light as if nothing stood in its way, which takes no time."""
+
 Counts = Callable[[Floats], list[Any]]  # of directions (3, …): by what light from there is multiplied
 
 
-def volume(program: Program, network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
+def volume(
+    program: Program, network: SolidArrays, store: ArrayStore, detail: Detail = FULL
+) -> dict[str, Any]:
     """The part ``around`` of a view, of a Program whose stage has a sky."""
     brought, paints, stage = program.brought(), program.paints(), program.stage
     assert stage is not None
     ground = stage.ground
     with np.errstate(all="ignore"):
         field = SolidField(network, program.vectors, program.tokens, brought, paints)
-        around = arriving(Lighting(field, stage, MARCH_SETTINGS["adaptive"]))
+        lighting = Lighting(field, stage, MARCH_SETTINGS["adaptive"])
+        around = _open(lighting) if detail is OPEN else arriving(lighting)
         low, high = box_of(field, np.ones(len(field.solids)))
         if ground is not None:
             low[1] = min(max(low[1], ground.y), high[1])
         sizes = (high - low).clip(1e-3)
-        h = float(np.cbrt((sizes + sizes.max() / 12).prod() / NODES))  # with a node more at each end
+        h = float(np.cbrt((sizes + sizes.max() / 12).prod() / detail.nodes))  # with a node more at each end
         sides = (np.ceil(sizes / h).astype(int) + 2).tolist()
         middle, half = (low + high) / 2, h * (np.array(sides) - 1) / 2
-        p, light, free = _light(around, list(map(np.linspace, middle - half, middle + half, sides)), _moments)
-        means = light[:3] if around.mist is None else np.concatenate([light[:3], around.medium(p)])
+        axes = list(map(np.linspace, middle - half, middle + half, sides))
+        p, light, free = _light(around, axes, _moments, detail)
+        means = light[:3]
+        if field.media:
+            means = np.concatenate([means, means if around.mist is None else around.medium(p)])
         ratios = (light[3:] / np.tile(light[:3], (8, 1)).clip(1e-9)).clip(-1.0, 1.0)
         data = {"low": (middle - half).tolist(), "side": h, "sides": sides, "floor": None}
         data |= {"free": store.add(free.astype(np.uint8)), **_roots(means, store)}
         data["ratios"] = store.add(np.rint(128 + 127 * ratios).astype(np.uint8))
         if ground is not None:
             scale = float(max(half[0], half[2]) / np.sinh(SPREAD / 2))
-            x = scale * np.sinh(SPREAD * np.linspace(-1.0, 1.0, FLOOR))
+            x = scale * np.sinh(SPREAD * np.linspace(-1.0, 1.0, detail.floor))
             axes = [middle[0] + x, np.array([ground.y + OFF]), middle[2] + x]
-            light = _light(around, axes, lambda way: [4 * way[1].clip(0.0)])[1]
+            light = _light(around, axes, lambda way: [4 * way[1].clip(0.0)], detail)[1]
             plane = [*middle[[0, 2]].tolist(), scale, SPREAD]
-            data["floor"] = {"plane": plane, "side": FLOOR, **_roots(light, store)}
+            data["floor"] = {"plane": plane, "side": detail.floor, **_roots(light, store)}
     return data
+
+
+def _open(lighting: Lighting) -> Any:
+    """Light of a sky over the bare ground, asked as `Around` is."""
+    stage = lighting.stage
+    sky, ground = stage.sky or Sky(power=0.0), stage.ground
+    horizon, zenith = (sky.power * np.array([rgb], np.float32).T for rgb in (sky.horizon, sky.zenith))
+    floor = horizon * np.array(ground.rgb if ground else (1.0, 1.0, 1.0), np.float32)[:, None]
+
+    def arriving(p: Floats, way: Floats) -> tuple[Floats, Floats]:
+        high = (2 * way[1]).clip(0.0, 1.0)
+        light = np.where(way[1] < 0, floor, horizon)
+        return light + (zenith - horizon) * high, 0 * high
+
+    bare = {"mist": None, "emitters": SimpleNamespace(there=False)}
+    return SimpleNamespace(field=lighting.field, arriving=arriving, **bare)
 
 
 def _roots(light: Floats, store: ArrayStore) -> dict[str, Any]:
@@ -75,7 +113,9 @@ def _moments(way: Floats) -> list[Any]:
     return [1.0 + 0 * way[0], *way, *(way[i] * way[j] for i, j in PAIRS)]
 
 
-def _light(around: Around, axes: list[np.ndarray], counts: Counts) -> tuple[Floats, Floats, np.ndarray]:
+def _light(
+    around: Around, axes: list[np.ndarray], counts: Counts, detail: Detail
+) -> tuple[Floats, Floats, np.ndarray]:
     """Nodes (3, n) of a lattice, light that comes there by what it counts (…, n), and which are outside of
     solids; the others have light of their neighbours.
     """
@@ -84,11 +124,11 @@ def _light(around: Around, axes: list[np.ndarray], counts: Counts) -> tuple[Floa
     met = near(around.field, p, 0 * p[0] + GAP, Wanted.ALL)
     free = ~((met.distance < 0) & ~around.field.material(met).medium).reshape(sides)
     glow = _glowing(around, p, counts)
-    light = (glow + _gathered(around, p, 0, RAYS, counts)).reshape(-1, *sides)
+    light = (glow + _gathered(around, p, 0, detail.rays, counts)).reshape(-1, *sides)
     noise = abs(_evened(light, free) - light)[:3, free].sum() / light[:3, free].sum().clip(1e-9)
-    if more := round(min(max(float(noise) / NOISE - 1, 0.0), 1.0) * MORE):
-        rest = (glow + _gathered(around, p, RAYS, more, counts)).reshape(-1, *sides)
-        light = _evened(_evened((RAYS * light + more * rest) / (RAYS + more), free), free)
+    if more := round(min(max(float(noise) / NOISE - 1, 0.0), 1.0) * detail.more):
+        rest = (glow + _gathered(around, p, detail.rays, more, counts)).reshape(-1, *sides)
+        light = _evened(_evened((detail.rays * light + more * rest) / (detail.rays + more), free), free)
     filled = free
     for _ in range(FILLED):
         even = _evened(light, filled)

@@ -293,3 +293,43 @@ def test_frames_share_the_limits_of_one(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.undo()
     monkeypatch.setattr(evaluate, "MAX_STEPS", 1)
     assert look(text, every=True) == ([], (1, 40))
+
+
+SHELL = "sky(); light(none); subtract { box { shell(%g); scale(%g); } sphere { %s } }"
+IN_MIST = "sky(); light([0, %g, 0], radius = %g); %s { material volumetric; }"
+MEASURED = {
+    SHELL % (0.06, 0.8, "scale(0.6); translate(0, 0, 1);"): "of this hollow `box` is 0.048 thick",
+    SHELL % (0.06, 0.9, "scale(0.6); translate(0, 0, 1);"): None,
+    SHELL % (0.02, 0.9, "scale(0.6); translate(0, 0, 3);"): None,  # nothing opens it
+    "light(none); subtract { box { shell(0.04); } sphere { scale(0.6); translate(0, 0, 1); } }": None,
+    "sky(); box { shell(0.04); }": None,
+    "sky(); box { shell(0.04); material volumetric; } subtract sphere": None,
+    "sky(); camera([0, 0, 0.1]); box { shell(0.04); }": "leaks through",
+    "sky(); intersect { sphere { shell(0.04); } box; } sphere;": "hollow `sphere` is 0.04 thick",
+    IN_MIST % (0, 0, "sphere"): "the lamp at [0, 0, 0] is in the mist of this `sphere`, and its radius of 0",
+    IN_MIST % (0, 0.03, "sphere"): None,
+    IN_MIST % (1.01, 0, "sphere"): None,
+    IN_MIST % (0, 0, "torus"): None,  # the lamp is in its hole
+    IN_MIST.replace("sky();", "") % (0, 0, "sphere"): None,
+    'import "std/meshes" as z; ' + IN_MIST % (0, 0, "z.bunny"): "in the mist of this `z.bunny`",
+    "sky(); subtract { sphere { material volumetric; } sphere { scale(0.3); } } light([0, 0, 0]);": None,
+    "sky(); for (i in 1..100) { sphere { scale(0.1); translate(i / 9, 0, 0); } }": None,
+    "sky(); for (i in 1..101) { sphere { scale(0.1); translate(i / 9, 0, 0); } }": "there are 101 objects",
+}
+
+
+def test_light_that_may_be_wrong() -> None:
+    for text, words in MEASURED.items():
+        found = [d.message for d in nsg.check_text(text) if d.code == "W0514"]
+        assert [words is not None and words in message for message in found] == [True] * bool(words), text
+
+
+def test_light_that_may_be_wrong_is_told_once() -> None:
+    text = "animate(1, 4); sky(); light([0, 0, 0]);\n"
+    text += "for (i in 1..101) { sphere { scale(0.1); translate(i / 9, 3 + u, 0); } }\n"
+    text += "module ball() { sphere { material volumetric; } }\nball(); ball();"  # of which one is hidden
+    (found,) = (d for d in nsg.check_text(text) if d.code == "W0514")
+    assert "in the mist" in found.message
+    assert "there are 102 objects" in found.message
+    assert found.span is not None
+    assert found.span.locate()[0][0] == 2  # of the 101st object

@@ -563,3 +563,27 @@ def test_what_was_read_before_a_save_is_not_told_behind_it(tmp_path: Path) -> No
 
     assert asyncio.run(both()) == ["square;\n", "star;\n"]
     assert (tmp_path / "a.nsg").read_text() == "star;\n"
+
+
+SKY = "canvas(32, 24); param r = 0.4 in 0.1..1; sky(); sphere { scale(r); %s }"
+
+
+def test_a_view_under_a_sky_is_a_draft_and_then_has_light(page: Page, folder: Path) -> None:
+    """The first has light of the bare sky, the second light that objects hide; what reflects is matte."""
+    (folder / "sky.nsg").write_text(SKY % "material metal { roughness(r); }")
+    page.say("open", file="sky.nsg")
+    first, second = page.until("view", file="sky.nsg"), page.until("view", file="sky.nsg")
+    assert ("again" in first, second["again"], first["problems"], second["problems"]) == (False, True, [], [])
+    views = [json.loads(each["view"]) for each in (first, second)]
+    assert [view["params"][0]["name"] for view in views] == ["r", "r"]
+    nodes = [np.prod(view["around"]["sides"]) for view in views]
+    assert nodes[0] < 100 < nodes[1] < 4000
+    assert [view.pop("around") and view.pop("blob") for view in views]
+    assert views[0] == views[1]
+    page.say("edit", file="sky.nsg", text=SKY % "material", version=1)  # a mistake
+    assert page.until("view", version=1)["view"] is None
+    page.say("edit", file="sky.nsg", text="sphere;", version=2)
+    page.until("view", version=2)
+    page.draw(1, "sky.nsg")
+    page.until("picture", id=1)
+    assert [m["kind"] for m in page.told if m.get("version") == 2] == ["view", "picture"]

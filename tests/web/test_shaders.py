@@ -32,7 +32,7 @@ from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted
 from scenelang.web.arrays import ArrayStore, script, shapes_of
 from scenelang.web.export import has_sky, view_of
 from scenelang.web.plane import leaves
-from scenelang.web.volume import volume
+from scenelang.web.volume import DRAFT, OPEN, Detail, volume
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.browser import watched
 from tests.drawing.test_bounds import of_sets, rng_of, wild
@@ -57,8 +57,12 @@ globalThis.opened = async (message, width, height) => {
   };
   return { gl, view, drawer, close };
 };
-globalThis.pictured = async (message, width, height) => {
-  const { gl, view, drawer, close } = await opened(message, width, height);
+globalThis.pictured = async (message, width, height, before = message) => {
+  const { gl, view, drawer, close } = await opened(before, width, height);
+  if (before !== message) {
+    drawer.draw(view.program, { width, height, scale: 1 });
+    drawer.relight((await readView(message)).around);
+  }
   const pixels = new Uint8Array(4 * width * height);
   drawer.draw(view.program, { width, height, scale: 1 });
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -80,8 +84,8 @@ def page(chromium: Any) -> Iterator[Any]:
         yield page
 
 
-def called(page: Any, name: str, program: Program, *arguments: Any) -> bytes:
-    message = json.loads(view_of(program).message())
+def called(page: Any, name: str, program: Program, *arguments: Any, draft: Detail | None = None) -> bytes:
+    message = json.loads(view_of(program, draft=draft).message())
     return base64.b64decode(page.evaluate(f"(given) => {name}(...given)", [message, *arguments]))
 
 
@@ -91,20 +95,20 @@ def answered(page: Any, program: Program, points: np.ndarray) -> np.ndarray:
     return np.frombuffer(data, np.float32).reshape(len(points), -1)
 
 
-def pictured(page: Any, program: Program) -> np.ndarray:
-    """The shader's picture (H, W, 4), premultiplied, in [0, 1]."""
+def pictured(page: Any, program: Program, *before: Any, draft: Detail | None = None) -> np.ndarray:
+    """The shader's picture (H, W, 4), premultiplied, in [0, 1]; perhaps that ``before`` was shown."""
     w, h = program.canvas
-    pixels = np.frombuffer(called(page, "pictured", program, w, h), np.uint8).reshape(h, w, 4)
-    return pixels[::-1] / 255.0
+    pixels = np.frombuffer(called(page, "pictured", program, w, h, *before, draft=draft), np.uint8)
+    return pixels.reshape(h, w, 4)[::-1] / 255.0
 
 
-def compared(page: Any, program: Program) -> float:
+def compared(page: Any, program: Program, draft: Detail | None = None) -> float:
     """PSNR of the shader's picture from the network's, dB."""
     if program.stage is None:
         network = premultiplied(draw_small(program).image)
     else:
         network = premultiplied(draw_objects(solids(), program, threads=1, split=1).image)
-    picture = pictured(page, program)
+    picture = pictured(page, program, draft=draft)
     if network.shape[2] == 3:
         assert (picture[..., 3] == 1).all()
     return psnr_db(picture[..., : network.shape[2]], network)
@@ -454,6 +458,17 @@ SKIES = {  # and how near their pages are, dB: the light of nodes is mixed, and 
 def test_light_from_everywhere_is_near_the_networks(page: Any, name: str) -> None:
     least, text = SKIES[name]
     assert compared(page, nsg.compile(nsg.loads(text))) > least
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", ["room", "clouds"])
+def test_drafts_of_light_give_way_to_better_ones(page: Any, name: str) -> None:
+    least, text = SKIES[name]
+    program = nsg.compile(nsg.loads(text))
+    first = json.loads(view_of(program, draft=OPEN).message())
+    assert np.array_equal(pictured(page, program, first), pictured(page, program))
+    assert compared(page, program, OPEN) > 20
+    assert compared(page, program, DRAFT) > least
 
 
 @pytest.mark.browser

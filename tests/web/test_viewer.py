@@ -48,6 +48,9 @@ planeDrawer = solidDrawer = (gl, view) => {
       globalThis.drawn = { program, width, height, scale };
       for (const end = performance.now() + (globalThis.slow ?? 0); performance.now() < end;);
     },
+    relight(part) {
+      globalThis.light = part;
+    },
     dispose() {},
   };
 };
@@ -203,6 +206,9 @@ def test_another_view_keeps_what_was_moved(shown: Any) -> None:
     assert ask(page, "[made, viewer.params.k, viewer.frame]") == [1, True, 0]
     ask(page, "void (viewer.view = { ...view, shader: { other: 1 } })")
     assert ask(page, "[made, viewer.params.k]") == [2, 1]
+    for at, (light, made) in enumerate((({"top": 1}, 3), ({"top": 2}, 3), (None, 4))):
+        ask(page, f"void (viewer.view = {{ ...viewer.view, around: {json.dumps(light)} }})")
+        assert ask(page, "[made, globalThis.light?.top]") == [made, None if at == 0 else 2]
 
 
 def test_orbits_zooms_and_pans(shown: Any) -> None:

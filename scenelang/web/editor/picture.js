@@ -143,7 +143,8 @@ export function makePicture(at, { send, oncamera }) {
   function showShader() {
     if (drawn || unable || !viewer) return;
     show("live");
-    at.told.textContent = `shader${isByHand() ? ", camera moved by hand" : ""}`;
+    const draft = viewer.view.around ? ", a draft of the light" : "";
+    at.told.textContent = `shader${draft}${isByHand() ? ", camera moved by hand" : ""}`;
   }
 
   function touched({ kind }) {
@@ -274,7 +275,7 @@ export function makePicture(at, { send, oncamera }) {
       figuresSoon();
       expected = true;
     },
-    onview({ file: of, version, view, problems }) {
+    onview({ file: of, version, view, problems, again }) {
       if (of !== file) return;
       faulty = view === null && problems.some(({ severity }) => severity === "error");
       if (faulty) {  // the language server counts them, of all the text
@@ -283,8 +284,10 @@ export function makePicture(at, { send, oncamera }) {
       }
       unable = view === null ? (problems.at(-1)?.message ?? "no page draws it") : null;
       note(null);
-      if (!expected) rest(0);
-      expected = false;
+      if (!again) {
+        if (!expected) rest(0);
+        expected = false;
+      }
       if (unable) forget();
       else apply(version, view);
     },

@@ -159,7 +159,8 @@ function setUniforms(gl, at, name, value) {
 /** Draws a view of solids; docs/architecture.md has what drawers do. */
 export function solidDrawer(gl, view) {
   const { network } = view, shaders = new Map(), table = gl.createTexture(), lists = gl.createTexture();
-  const elements = solidElements(gl, view), around = aroundOf(gl, view.around);
+  const elements = solidElements(gl, view);
+  let around = aroundOf(gl, view.around);
   const features = new Set(); // and slots only grow, so that frames of an animation share a shader
   let slots = 8, depth = 0, lamps = 1, first = null, ready = {};
 
@@ -324,6 +325,12 @@ export function solidDrawer(gl, view) {
       let met = 0;
       for (let i = 0; i < numbers.length; i += 4) met += numbers[i];
       return (met / (width * height)) * network.products;
+    },
+
+    /** Take other light from everywhere in place of what there is. */
+    relight(part) {
+      for (const texture of Object.values(around.textures)) gl.deleteTexture(texture);
+      around = aroundOf(gl, part);
     },
 
     dispose() {

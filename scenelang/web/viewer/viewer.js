@@ -78,7 +78,10 @@ export class Viewer {
   /** Show another view. Params that were moved stay where they are; a shader that can be is used again. */
   set view(next) {
     const before = this.#view;
-    if (!DRAWN_FROM.every((key) => alike(before[key], next[key]))) {
+    const others = DRAWN_FROM.filter((key) => !alike(before[key], next[key]));
+    if (others.join() === "around" && before.around && next.around) {
+      this.#drawer.relight(next.around);
+    } else if (others.length) {
       const drawer = this.#made(next);
       this.#drawer.dispose();
       this.#drawer = drawer;
