@@ -91,10 +91,8 @@ def test_mist_lets_through_what_its_depth_says() -> None:
 
 def test_each_medium_has_its_own_density() -> None:
     """Where two overlap, the later one's holds."""
-    mist = "material volumetric { color(#000); density(%s); }"
-    first, second = (
-        "sphere { scale(0.5); translate(0, %s, 0); " % y + mist % s + " }" for y, s in ((-0.2, 1), (0.2, 3))
-    )
+    ball = "sphere {{ scale(0.5); translate(0, {}, 0); material volumetric {{ color(#000); density({}); }} }}"
+    first, second = ball.format(-0.2, 1), ball.format(0.2, 3)
     through = light(world(EVEN + "light(none);" + first + second), 3 * UP, -UP, 16384)
     assert through[0, 0] == pytest.approx(math.exp(-0.4 - 3), rel=0.03)
 

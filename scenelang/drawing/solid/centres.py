@@ -114,8 +114,8 @@ class Centres:
         if len(first):
             xp.put(result, xp.take(rays, first), ask(first))
         grids = [part.reshape(-1, rows, columns) for part in (result, self.p, self.n)]
-        _fill(xp, *(part[:, ::2] for part in grids), most=most)
-        _fill(xp, *(part.swapaxes(1, 2) for part in grids), most=most)
+        _fill(xp, [part[:, ::2] for part in grids], most)
+        _fill(xp, [part.swapaxes(1, 2) for part in grids], most)
         result = xp.select(wanted > 0, result, wanted)
         rest = xp.where(xp.take(result[0], rays) < 0)
         if len(rest):
@@ -142,10 +142,11 @@ def _same(off: Array, n: Array, other: Array) -> Array:
     return ((n * other).sum(0) > ALIGNED) & (above * above < 4 * APART * APART * square + 1e-12)
 
 
-def _fill(xp: Arrays, values: Array, p: Array, n: Array, most: float) -> None:
+def _fill(xp: Arrays, grids: list[Array], most: float) -> None:
     """Set every second value (…, R, C) of rows to the mean of those beside it, where both lie on its surface
-    and differ by no more.
+    and differ by no more; of grids of values, points and normals.
     """
+    values, p, n = grids
     a, b, here, up = values[:, :, :-2:2], values[:, :, 2::2], p[:, :, 1:-1:2], n[:, :, 1:-1:2]
     agree = (abs(a[0] - b[0]) < most) & (a[0] >= 0) & (b[0] >= 0)
     for side in (slice(None, -2, 2), slice(2, None, 2)):
