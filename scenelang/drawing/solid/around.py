@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from math import isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,10 +27,10 @@ from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.mist import Mist
 from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.nodes import Nodes, ground_places, on_ground, on_objects, turned
+from scenelang.drawing.solid.nodes import Nodes, ground_places, hollow, on_ground, on_objects, turned
 from scenelang.drawing.solid.passes import INF
 
-RAYS = 8  # of nodes
+RAYS = 8, 16  # of nodes, and where something may be hollow
 GAP = 0.01  # world units, as of `MarchSettings`
 RARE = 5e-3  # of rays may be given up
 DOME = 64  # directions to the sky alone
@@ -41,7 +42,8 @@ NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearb
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
-LATTICE = 40  # of points along the picture's shorter side
+APART, BETWEEN = 0.02, (0.25, 0.5, 0.75)  # world units before surfaces, and where walls are looked for
+LATTICE = 40, 64  # of points along the picture's shorter side, and where something may be hollow
 LATTICE_RAYS, PIXEL_RAYS, MISTY = 32, 8, 4  # of each, of pixels that are asked themselves, and through media
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
@@ -102,6 +104,7 @@ class Lookup:
             chosen = np.argpartition(off + AWAY * (along > -TURNED), count - 1, 1)[:, :count]
             found.append(np.take_along_axis(close, chosen, 1))
         self.index = xp.array(np.concatenate(found).astype(np.int64), nodes.p)  # (6 cells, k)
+        self.split: Any = None  # cells with walls between their nodes (6 cells,)
         # what places ask, cell by cell: positions, normals and weights of its nodes (cells, 7, k)
         self.about = self.rows(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0))
         self.room = float(self.side / 4) ** 2  # the square of how near is near
@@ -173,9 +176,14 @@ class Around:
         self.lookup: Any = Lookup(xp, own) if self.first else None
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
+        self.hollow = hollow(field)
         n, numbers = self.nodes, np.arange(self.count)
         with xp.inference():
-            matrix, less = self._row(numbers, np.full(self.count, RAYS))
+            if self.hollow and self.lookup is not None:
+                index = self.lookup.index
+                to = xp.take(self.nodes.p + APART * self.nodes.n, index[:, 0])
+                self.lookup.split = ~self._open(xp.stack([to] * index.shape[1], 2), index).all(1)
+            matrix, less = self._row(numbers, np.full(self.count, RAYS[self.hollow]))
             self.exchange = matrix, self._dome(n.n) + less
         self.light(lamps)
 
@@ -197,7 +205,7 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE))
+        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[self.hollow]))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
@@ -294,12 +302,35 @@ class Around:
         g = g * (xp.select(against, 0 * at[0] + 1, 0 * at[0] - 1) / xp.length(list(g)).clip(1e-9))
         way = WAY * way + g
         lookup: Lookup = self.lookup
-        return lookup.near(at, way / xp.length(list(way)).clip(1e-9))
+        cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
+        some = xp.where(lookup.split[cell]) if self.hollow else cell[:0]
+        if len(some):
+            nodes = lookup.index[xp.take(cell, some)]  # (k, m)
+            own, near_by = (xp.take(part, some) for part in (at - APART * g, shares.T))
+            free = self._open(xp.stack([own] * nodes.shape[1], 2), nodes).T * near_by
+            total = free.sum(0)
+            shares[some] = xp.select(total > 1e-3, free / total.clip(1e-9), near_by).T
+        return cell, shares
+
+    def _open(self, p: Array, nodes: Array) -> Array:
+        """Whether no wall stands between points (3, k, m) and nodes (k, m)."""
+        xp, n = self.xp, self.nodes
+        to = (xp.take(n.p + APART * n.n, nodes.reshape(-1))).reshape(p.shape)
+        free = nodes >= 0
+        for t in BETWEEN:
+            at = (p + (to - p) * t).reshape(3, -1)
+            wanted = Wanted.KIND if self.field.mixed else Wanted.DISTANCE
+            met = near(self.field, at, 0 * at[0] + GAP, wanted)
+            walled = met.distance < 0
+            if self.field.mixed:
+                walled = walled & (met.register[0] < 0.5)
+            free = free & ~walled.reshape(nodes.shape)
+        return free
 
     def _on_floor(self, at: Array) -> tuple[Array, Array, Array]:
         """Nodes (4, K) around points on the ground, their shares, and how much is kept in the fade."""
         xp = self.xp
-        index, shares = ground_places(xp, at[0], at[2])
+        index, shares = ground_places(xp, at[0], at[2], isqrt(self.count - self.first))
         index = index + self.first
         shares = shares * (xp.take(self.nodes.weight, index.reshape(-1)).reshape(index.shape) + 1e-4)
         return index, shares / shares.sum(0), xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / FADE))

@@ -30,7 +30,7 @@ NEWTON = 2
 INSIDE = 1e-3  # world units behind a surface where its material is asked for
 FLAT = 0.01  # of distances; less is none
 BEFORE = 0.02  # world units before a surface where nothing must be, lest a node fades
-SIDE = 18  # nodes of the ground along one axis
+SIDES = 24, 40  # nodes of the ground along one axis, and where something may be hollow
 FAR, WARP = 20.0, 4.5  # world units to the last ones; they lie at FAR sinh(WARP u) / sinh(WARP)
 
 
@@ -79,12 +79,17 @@ def chords(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(r) * radius * off - way * half, 2 * half * way
 
 
+def hollow(field: SolidField) -> bool:
+    """Whether there may be hollows, which take more to light."""
+    return bool(field.skinned.any()) or not field.draws
+
+
 def on_objects(field: SolidField, stage: Stage) -> Nodes:
     """Nodes on objects; many chords find even the thin ones that glow."""
     xp, like = field.xp, field.network.codes
     sizes = np.array([solid.extent for solid in field.solids])
     glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
-    more = HOLLOW if field.skinned.any() or not field.draws else 1
+    more = HOLLOW if hollow(field) else 1
     shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
     counts = np.ceil(shares.clip(LEAST, more * MOST)).astype(int)
     balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
@@ -164,15 +169,16 @@ def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Arra
 
 
 def on_ground(field: SolidField, stage: Stage) -> Nodes:
-    """Nodes on the ground (SIDE²), row by row along z; none without a ground."""
+    """Nodes on the ground (`SIDES`²), row by row along z; none without a ground."""
+    side = SIDES[hollow(field)]
     xp, like, ground = field.xp, field.network.codes, stage.ground
-    u = np.linspace(-1.0, 1.0, SIDE)
+    u = np.linspace(-1.0, 1.0, side)
     x = FAR * np.sinh(WARP * u) / np.sinh(WARP)
-    p = np.zeros((3, 0 if ground is None else SIDE * SIDE), np.float32)
+    p = np.zeros((3, 0 if ground is None else side * side), np.float32)
     n, colour = 0 * p, 0 * p
     n[1] = 1.0
     if ground is not None:
-        p[0], p[1], p[2] = np.tile(x, SIDE), ground.y, np.repeat(x, SIDE)
+        p[0], p[1], p[2] = np.tile(x, side), ground.y, np.repeat(x, side)
         colour[:] = np.asarray(ground.rgb, np.float32)[:, None]
     p, n, colour = (xp.array(part, like) for part in (p, n, colour))
     d = near(field, p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
@@ -180,18 +186,18 @@ def on_ground(field: SolidField, stage: Stage) -> Nodes:
     return Nodes(p, n, colour, 0 * p, (d / COVERED).clip(0.0, 1.0), 0 * p[0], place)
 
 
-def ground_places(xp: Arrays, x: Array, z: Array) -> tuple[Array, Array]:
-    """The four nodes (4, K) of the ground around places (K,), numbered from 0, and their shares (4, K)."""
+def ground_places(xp: Arrays, x: Array, z: Array, side: int) -> tuple[Array, Array]:
+    """The four of side² nodes of the ground (4, K) around places (K,), from 0, and their shares (4, K)."""
     rows, parts = [], []
     for place in (x, z):
         scaled = place * (float(np.sinh(WARP)) / FAR)
         size = abs(scaled)
         u = xp.log(size + xp.sqrt(size * size + 1)) * xp.select(scaled < 0, 0 * x - 1, 0 * x + 1) / WARP
-        at = ((u + 1) * ((SIDE - 1) / 2)).clip(0.0, SIDE - 1.001)
+        at = ((u + 1) * ((side - 1) / 2)).clip(0.0, side - 1.001)
         low = xp.floor(at)
         rows.append(xp.whole(low))
         parts.append(at - low)
     (i, j), (a, b) = rows, parts
-    first = j * SIDE + i
-    index = xp.stack([first, first + 1, first + SIDE, first + SIDE + 1], 0)
+    first = j * side + i
+    index = xp.stack([first, first + 1, first + side, first + side + 1], 0)
     return index, xp.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], 0)
