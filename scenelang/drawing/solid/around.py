@@ -42,6 +42,7 @@ NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearb
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
+OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 APART, BETWEEN = 0.02, (0.25, 0.5, 0.75)  # world units before surfaces, and where walls are looked for
 LATTICE = 40, 64  # of points along the picture's shorter side, and where something may be hollow
 LATTICE_RAYS, PIXEL_RAYS, MISTY = 32, 8, 4  # of each, of pixels that are asked themselves, and through media
@@ -308,8 +309,7 @@ class Around:
             nodes = lookup.index[xp.take(cell, some)]  # (k, m)
             own, near_by = (xp.take(part, some) for part in (at - APART * g, shares.T))
             free = self._open(xp.stack([own] * nodes.shape[1], 2), nodes).T * near_by
-            total = free.sum(0)
-            shares[some] = xp.select(total > 1e-3, free / total.clip(1e-9), near_by).T
+            shares[some] = (free / free.sum(0).clip(OPEN)).T
         return cell, shares
 
     def _open(self, p: Array, nodes: Array) -> Array:
