@@ -24,6 +24,7 @@ ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572
 COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
 CHORDS, GLOWING = 1500, 400  # of those that glow, and nodes of the light on each
 NODES, LEAST, MOST = 200, 20, 400  # on all objects, on one at least and at most
+ALL = 2400  # at most
 HOLLOW = 3  # times as many where something may be hollow
 COVERED = 0.06  # world units by which a surface is covered where its nodes have faded
 NEWTON = 2
@@ -91,22 +92,29 @@ def on_objects(field: SolidField, stage: Stage) -> Nodes:
     glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
     more = HOLLOW if hollow(field) else 1
     shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
-    counts = np.ceil(shares.clip(LEAST, more * MOST)).astype(int)
+    counts = _bounded(np.ceil(shares.clip(LEAST, more * MOST)), ALL)
     balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
-    tried = np.where(glows, CHORDS, counts)
-    parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True)]
+    tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
+    parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
     lines = np.concatenate([np.zeros((6, 0)), *parts], 1).astype(np.float32)
     objects = np.repeat(np.arange(len(sizes)), tried)
     line, at = _crossings(field, objects, lines[:3], lines[3:], np.where(glows, FINE, COARSE))
     owner = objects[line]
     # each stands for as much of the surface behind the map
-    area = (2 * np.pi * balls**2 / tried)[owner].astype(np.float32)
+    area = (2 * np.pi * balls**2 / tried.clip(1))[owner].astype(np.float32)
     found = np.bincount(owner, minlength=len(sizes))
     rank = np.arange(len(owner)) - np.repeat(np.cumsum(found) - found, found)
     kept = ~glows[owner] | (rank % (found // GLOWING).clip(1)[owner] == 0)
     place = xp.array(np.concatenate([at, owner[None], kept[None]]).astype(np.float32), like)
     owner, at, area = (xp.array(part, like) for part in (owner, at, area))
     return _settled(field, stage, field.before(owner, at), owner, area, place)
+
+
+def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
+    """Whole numbers like these whose sum is no more; of very many some are 0."""
+    sums = np.cumsum(counts)
+    whole: np.ndarray = np.diff(np.floor(sums * min(1.0, most / max(float(sums[-1]), 1.0))), prepend=0.0)
+    return whole.astype(int)
 
 
 def _crossings(
