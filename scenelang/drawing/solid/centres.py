@@ -1,7 +1,7 @@
 """Light at the centres of pixels, from which pixels between them and samples near them take theirs.
 
-Light and shares of soft lamps change slowly along a surface: every second pixel of every second row asks for
-its own, and others take the mean of neighbours where these lie on the same surface and agree. Samples of a
+Light and shares of soft lamps change slowly along a surface: one in `EACH` pixels of as many rows asks for
+its own, and those between take from both sides where these lie on the same surface and agree. Samples of a
 pixel take what its centre has where they lie on its surface.
 
 Letters: K points, M pixels.
@@ -15,6 +15,7 @@ from typing import Any
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.passes import INF
 
+EACH = 3  # pixels, along both sides, from one that asks to the next
 EVEN, STEADY = 0.2, 0.2  # differences of shares between neighbours, in passing over two pixels and over one
 APART = 0.35  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
@@ -110,11 +111,11 @@ class Centres:
         result = xp.full((count, rows * columns), UNKNOWN, self.p)
         wanted = 1 * result[0]
         wanted[rays] = 1.0
-        first = xp.where((rays // columns % 2 == 0) & (rays % columns % 2 == 0))
+        first = xp.where((rays // columns % EACH == 0) & (rays % columns % EACH == 0))
         if len(first):
             xp.put(result, xp.take(rays, first), ask(first))
         grids = [part.reshape(-1, rows, columns) for part in (result, self.p, self.n)]
-        _fill(xp, [part[:, ::2] for part in grids], most)
+        _fill(xp, [part[:, ::EACH] for part in grids], most)
         _fill(xp, [part.swapaxes(1, 2) for part in grids], most)
         result = xp.select(wanted > 0, result, wanted)
         rest = xp.where(xp.take(result[0], rays) < 0)
@@ -143,12 +144,20 @@ def _same(off: Array, n: Array, other: Array) -> Array:
 
 
 def _fill(xp: Arrays, grids: list[Array], most: float) -> None:
-    """Set every second value (…, R, C) of rows to the mean of those beside it, where both lie on its surface
-    and differ by no more; of grids of values, points and normals.
+    """Set values (…, R, C) of rows between two that asked, linearly, where both lie on the same surface and
+    differ by no more; of grids of values, points and normals.
     """
     values, p, n = grids
-    a, b, here, up = values[:, :, :-2:2], values[:, :, 2::2], p[:, :, 1:-1:2], n[:, :, 1:-1:2]
+    count = (values.shape[2] - 1) // EACH  # of gaps between
+    if not count:
+        return
+    last = EACH * count
+    a, b = values[:, :, :last:EACH], values[:, :, EACH : last + 1 : EACH]
     agree = (abs(a[0] - b[0]) < most) & (a[0] >= 0) & (b[0] >= 0)
-    for side in (slice(None, -2, 2), slice(2, None, 2)):
-        agree = agree & _same(p[:, :, side] - here, n[:, :, side], up)
-    values[:, :, 1:-1:2] = xp.select(agree, (a + b) / 2, 0 * a + UNKNOWN)
+    for step in range(1, EACH):
+        here, up = (part[:, :, step:last:EACH] for part in (p, n))
+        fits = agree
+        for side in (slice(None, last, EACH), slice(EACH, last + 1, EACH)):
+            fits = fits & _same(p[:, :, side] - here, n[:, :, side], up)
+        between = a + (b - a) * (step / EACH)
+        values[:, :, step:last:EACH] = xp.select(fits, between, 0 * a + UNKNOWN)

@@ -18,7 +18,7 @@ from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Ligh
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
 from scenelang.drawing.solid.around import ELSEWHERE, RARE, arriving, to_ground
-from scenelang.drawing.solid.centres import Centres
+from scenelang.drawing.solid.centres import EACH, Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
 from scenelang.drawing.solid.march import (
@@ -616,8 +616,10 @@ def _band(
         result, work = _shade(lighting, canvas, np.arange(width) + 0.5, every)
         return result[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
-        # from an even row to an even row, as all bands tell the same of rows that they share
-        near = range(max((rows.start - 2) // 2 * 2, 0), min((rows.stop + 2) // 2 * 2 + 1, height))
+        # from a row that `Centres` asks to another, as bands tell the same of rows that they share
+        near = range(
+            max((rows.start - 2) // EACH * EACH, 0), min(-(-(rows.stop + 1) // EACH) * EACH + 1, height)
+        )
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
         xp, like = lighting.xp, lighting.field.network.codes
         useful = lighting.around is not None or any(lamp.light.radius for lamp in lighting.lamps)
