@@ -199,19 +199,14 @@ def graph_data(graph: Graph) -> dict[str, Any]:
 def _node(node: Node) -> dict[str, Any]:
     moves = [_move(move) for move in node.moves]
     if isinstance(node, Leaf):
-        look: dict[str, Any] = {
-            "geometry": node.geometry,
-            "material": node.look.shading,
-            "rgb": list(node.look.colour()),
-        }
+        look: dict[str, Any] = {"geometry": node.geometry, "material": node.look.shading}
+        look["rgb"] = list(node.look.colour())
         look |= {n: numbers if len(numbers) > 1 else numbers[0] for n, *numbers in _properties(node.look)}
         if (element := node.look.element) is not None:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
         return {"kind": "leaf", **look, "moves": moves}
-    links = [
-        {"op": link.op, **({"k": link.k} if link.k else {}), "node": _node(link.node)} for link in node.links
-    ]
+    links = [{"op": one.op, **({"k": one.k} if one.k else {}), "node": _node(one.node)} for one in node.links]
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
@@ -377,9 +372,8 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> list[Box]:
         rgb = hex_text(graph.space.written(node.look.colour()))
         return Box((node.geometry, *texture, *moves), rgb, leaf=True), []
 
-    return _draw_tree(
-        ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
-    )
+    head = ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage))
+    return _draw_tree(head, links(graph.root), look, most)
 
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> list[Box]:

@@ -113,9 +113,8 @@ def rename(
     if not versioned:
         return types.WorkspaceEdit(changes=edits)
     name, versions = types.OptionalVersionedTextDocumentIdentifier, {d.uri: d.version for d, _ in places}
-    return types.WorkspaceEdit(
-        document_changes=[types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
-    )
+    changes = [types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
+    return types.WorkspaceEdit(document_changes=changes)
 
 
 def _check_owner(where: Document, use: Use) -> None:

@@ -235,9 +235,8 @@ class Server(LanguageServer):
         """Send all current diagnostics: those of syntax, and those of the last check, moved."""
         result = [*document.syntax, *document.semantic]
         shown = [d for d in (to_diagnostic(item, document) for item in result) if d is not None]
-        self.text_document_publish_diagnostics(
-            types.PublishDiagnosticsParams(document.uri, shown, document.version)
-        )
+        params = types.PublishDiagnosticsParams(document.uri, shown, document.version)
+        self.text_document_publish_diagnostics(params)
 
     def schedule(self, document: Document, delay_s: float | None = None) -> None:
         """Check a document once nothing has changed for a while."""

@@ -203,9 +203,7 @@ class Fit:
             said = ""
             if shares and not any(map(math.isnan, shares)):
                 most = max(shares)
-                said = (
-                    "  not seen" if math.isinf(most) else f"  ± {most:.2%} of its range changes it by 1/255"
-                )
+                said = f"  ± {most:.2%} of its range changes it by 1/255" if most < math.inf else "  not seen"
             lines.append(f"  {name} = {text}{said}")
         lines += [f"`{a}` and `{b}` explain each other here (correlation {r:.2f})" for a, b, r in self.tied]
         for other in self.others:
@@ -378,9 +376,7 @@ def fit(
         notes=hindrances(space, best, numbers, soft_db, done, last.worst(soft), last.noise(best, blur)),
         numbers=numbers,
         tied=ties(space, slopes),
-        others=tuple(
-            literals for place, literals in zip(places[1:], every[1:], strict=True) if place.cost <= alike
-        ),
+        others=tuple(own for place, own in zip(places[1:], every[1:], strict=True) if place.cost <= alike),
         frames=sum(problem.frames for problem in (*problems, lens.finer)),
         before=_image(after if before is None else before),
         after=_image(after),

@@ -142,9 +142,7 @@ def fit(
     best: tuple[Rung, Element] | None = None
     tried: list[Rung] = []
     ended = "steps"
-    while best is None or (
-        len(tried) < steps if steps is not None else time.monotonic() - started < budget_s
-    ):
+    while best is None or (time.monotonic() - started < budget_s if steps is None else len(tried) < steps):
         pyramid = min(growing, key=lambda p: p.next_side)
         if pyramid.next_side > MOST_SIDE[shape.dimension]:
             ended = "largest grid"

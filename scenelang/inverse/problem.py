@@ -157,10 +157,8 @@ class FitProblem:
         A few compilations and one soft picture of each frame give them, however many params there are.
         Elements, textures, trees, solids, and axes along which objects come or go are left to differences.
         """
-        rows, known = [], np.ones(len(u), bool)
-        for program, given, root in zip(
-            self.programs(u) if self.soft else (), self._rates, self.roots, strict=False
-        ):
+        rows, known, programs = [], np.ones(len(u), bool), self.programs(u) if self.soft else ()
+        for program, given, root in zip(programs, self._rates, self.roots, strict=False):
             if program is None or not len(program) or program.elements or program.palette or program.extended:
                 return None
             rates, axes = given.at(u, program)

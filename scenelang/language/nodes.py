@@ -468,8 +468,7 @@ class Camera(Frozen):
 
     @model_validator(mode="after")
     def _sees(self) -> Self:
-        fault = camera_fault(self.eye, self.target, self.fov)
-        if fault is not None:
+        if (fault := camera_fault(self.eye, self.target, self.fov)) is not None:
             raise ValueError(fault[1])
         return self
 
@@ -497,7 +496,7 @@ Lights = Annotated[
     | Annotated[tuple[Light, ...], Field(max_length=LAMPS), Tag("several")]
     | Unsaid,
     Discriminator(
-        lambda value: {str: "unsaid", list: "several", tuple: "several"}.get(type(value), "stated")
+        lambda given: {str: "unsaid", list: "several", tuple: "several"}.get(type(given), "stated")
     ),
     Field(description="3D; null: without one"),
 ]

@@ -290,7 +290,5 @@ def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[
     """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
     cache = _local.__dict__.setdefault("kept", TileCache())
     started = time.process_time()  # others on this machine do not make batches smaller
-    result = [
-        {file.name: data for file, data in errand.run(program, cache).items()} for program, errand in batch
-    ]
+    result = [{p.name: data for p, data in errand.run(program, cache).items()} for program, errand in batch]
     return time.process_time() - started, result

@@ -360,9 +360,8 @@ class Variants(Clip):
                 for into, path in files.items():
                     store.adopt(into, path)
         elif old.digest:
-            raise TableError(
-                f"`{self.file}` is of another scene, model, size or version: row {frame.number} differs"
-            )
+            fact = "of another scene, model, size or version"
+            raise TableError(f"`{self.file}` is {fact}: row {frame.number} differs")
         self._note(frame.number, TableRow(line.picture, line.values, frame.key))
         result = {}
         if "scene" in self._asked:

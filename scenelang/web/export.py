@@ -96,9 +96,8 @@ def alternative(data: dict[str, Any]) -> str:
         said += f", on {colour_name(background)}"
     said += "."
     if animation:
-        said += (
-            f" It moves for {animation['seconds']:g} seconds{', over and over' * bool(animation['loop'])}."
-        )
+        again = ", over and over" * bool(animation["loop"])
+        said += f" It moves for {animation['seconds']:g} seconds{again}."
     return said
 
 
@@ -179,17 +178,13 @@ def view_of(
     figures = manifest.measured.get("sets", {}).get(manifest.set)  # errors on the scenes of its own set
     measured = {} if figures is None else {"cap": manifest.measured.get("psnr_cap_db")}
     measured |= {} if figures is None else {key: figures[key] for key in ("scenes", "psnr", "flip")}
+    about = {"name": manifest.name, "summary": manifest.summary, "weights": digest, "measured": measured}
     data: dict[str, Any] = {
         "format": FORMAT,
         "title": title,
         "canvas": program.canvas,
         "dimension": manifest.dimension,
-        "model": {
-            "name": manifest.name,
-            "summary": manifest.summary,
-            "weights": digest,
-            "measured": measured,
-        },
+        "model": about,
         "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [
             {"name": name, "albedo": row[:3].tolist(), "medium": float(row[3]) if len(row) > 3 else 0.0}

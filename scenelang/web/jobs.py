@@ -84,12 +84,8 @@ def _view(job: Job, tell: Tell) -> Answer:
     except (ProgramError, FileNotFoundError) as error:
         problem = {"code": "", "severity": "warning", "message": str(error), "line": 1, "column": 1}
         lacking.append(problem)
-    data = {
-        **job["message"],
-        "view": shown and shown.message(),
-        "problems": [*map(_problem, result.items[:MOST_TOLD]), *lacking],
-        "ms": _since(started),
-    }
+    problems = [*map(_problem, result.items[:MOST_TOLD]), *lacking]
+    data = {**job["message"], "view": shown and shown.message(), "problems": problems, "ms": _since(started)}
     head = {"wanted": [str(path) for path in evaluation.wanted]}
     if shown is not None:
         head["angles"] = [param["name"] for param in shown.data["params"] if param["kind"] == "angle"]

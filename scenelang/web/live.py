@@ -293,9 +293,8 @@ class Live:
         known = self.open.get(name)
         if known is not None:
             known.keeping = None
-            self._play.later(
-                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
-            )
+            work = asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
+            self._play.later(work)
 
     def _keep(self, name: str) -> None:
         """Store the unsaved text of a file now."""
@@ -379,9 +378,8 @@ class Live:
             if key in known.angles and isinstance(value, int | float) and not isinstance(value, bool):
                 job["params"] = {**job["params"], key: f"{value!r}rad"}
         job["path"], job["root"] = str(known.path), None if root is None else str(root)
-        job["texts"] = {
-            str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
-        }
+        others = (other for other in self.open.values() if other is not known and other.version)
+        job["texts"] = {str(other.path.resolve()): other.text for other in others}
         if slot in self._jobs:
             self._jobs[slot][0].cancel()
         elif len(self._jobs) >= MOST_JOBS:

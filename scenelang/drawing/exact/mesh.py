@@ -321,15 +321,9 @@ def mesh_of(
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
     rule = "normals" if by_normals else "winding numbers"
     notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {rule}"]
-    return Mesh(
-        np.ascontiguousarray(mesh.vertices, float),
-        np.ascontiguousarray(mesh.faces, np.int64),
-        by_normals,
-        (float(centre[0]), float(centre[1]), float(centre[2])),
-        size,
-        tuple(notes),
-        look,
-    )
+    vertices, faces = np.ascontiguousarray(mesh.vertices, float), np.ascontiguousarray(mesh.faces, np.int64)
+    x, y, z = centre.tolist()
+    return Mesh(vertices, faces, by_normals, (x, y, z), size, tuple(notes), look)
 
 
 MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file

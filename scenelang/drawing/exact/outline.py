@@ -510,9 +510,8 @@ def _seen(paint: Any, shape: Any) -> Painted | None:
     alpha = paint.alpha / 255 * _share(str(shape.values.get("opacity", "1")))
     if alpha == 0:
         return None
-    red, green, blue = (
-        round(1 - alpha * (1 - channel / 255), 4) for channel in (paint.red, paint.green, paint.blue)
-    )
+    channels = (paint.red, paint.green, paint.blue)
+    red, green, blue = (round(1 - alpha * (1 - channel / 255), 4) for channel in channels)
     return red, green, blue
 
 

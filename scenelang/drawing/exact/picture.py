@@ -90,9 +90,8 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
             p = sample_points(graph.canvas, rows, 1, columns)
             d, owner = evaluate(node, p, owners=True, brought=brought)
             result[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
-            d, owner = evaluate(
-                node, sample_points(graph.canvas, rows, side, columns), owners=True, brought=brought
-            )
+            p = sample_points(graph.canvas, rows, side, columns)
+            d, owner = evaluate(node, p, owners=True, brought=brought)
             covered = np.where(d < 0, owner[:, 2], 0.0).reshape(len(rows), side, len(columns), side)
             result[5][part] = covered.mean((1, 3))
         return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
@@ -101,19 +100,14 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
-        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))
+        view = seen_along(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))[1]
+        alpha = 1.0 - (view.last != OPAQUE) * np.exp(-view.total)  # the share that objects hide
         result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         result[5, rows.start : rows.stop] = alpha.reshape(len(rows), side, width, side).mean((1, 3))
     depth, normal, owner, alpha = result[0], np.moveaxis(result[1:4], 0, 2), result[4], result[5]
     return Outputs(
         depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
     )
-
-
-def _covered(field: ExactField, stage: Stage, d: Array) -> Array:
-    """Share of the background (M,) that objects hide along unit directions d (3, M)."""
-    view = seen_along(field, stage, d)[1]
-    return 1.0 - (view.last != OPAQUE) * np.exp(-view.total)
 
 
 def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
