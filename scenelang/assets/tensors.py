@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.assets.files import read_json
+from scenelang.assets.records import Record
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,8 +27,7 @@ class TensorError(ValueError):
     """A damaged or foreign file of tensors; the message says where."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tensor:
+class Tensor(Record):
     """One tensor of a file."""
 
     type: str  # as safetensors calls it, `F32`
@@ -38,8 +37,7 @@ class Tensor:
     last: int
 
 
-@dataclass(frozen=True, slots=True)
-class TensorFile:
+class TensorFile(Record):
     """A file whose layout was checked."""
 
     header: dict[str, Any]  # our own

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
+from scenelang.assets.records import Record
 from scenelang.compiler import graph, steps
 from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
@@ -130,8 +131,7 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
 Composite = Scene | schema.Group | schema.Boolean | schema.Chain
 
 
-@dataclass(slots=True)
-class _OpenComposite:
+class _OpenComposite(Record, frozen=False):
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
     op: Combine
@@ -157,8 +157,7 @@ def _width(node: schema.Boolean | schema.Link) -> float:
     return 0.0 if node.k is None or (node.op == "smooth" and node.k == words.BLEND) else node.k
 
 
-@dataclass(slots=True)
-class _Lowering:
+class _Lowering(Record, frozen=False):
     manifest: Manifest
     space: Space
     spans: Spans | None

@@ -21,7 +21,6 @@ turns each point by an angle that is bounded over any sector about the origin, i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
 from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
@@ -545,8 +544,7 @@ def _grown(box: tuple[float, float, float, float]) -> Box:
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
 
 
-@dataclass(slots=True)
-class _Sector:
+class _Sector(Record, frozen=False):
     """Points about the origin: radii ``near``..``far``, angles ``first``..``last`` (a full turn: all)."""
 
     near: float

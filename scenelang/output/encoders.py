@@ -14,7 +14,7 @@ import os
 import shutil
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import GifImagePlugin, Image
 
+from scenelang.assets.records import Record
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import SIGNATURE, chunk
 from scenelang.output.frames import VIDEOS, Film, Pixels, changed, delays, runs
@@ -110,8 +111,7 @@ def unpacked(numbers: npt.NDArray[np.uint32]) -> Colours:
     return np.stack([numbers >> 16, (numbers >> 8) & 255, numbers & 255], axis=-1).astype(np.uint8)
 
 
-@dataclass(slots=True)
-class Census:
+class Census(Record, frozen=False):
     """Counts of colours over all pictures, added one picture at a time."""
 
     most: int  # colours of a palette; `crowded` is true once a single picture has more

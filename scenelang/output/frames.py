@@ -13,7 +13,6 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +23,7 @@ import numpy.typing as npt
 from PIL import Image as pillow
 
 from scenelang.assets.files import lock, open_own, write_whole
+from scenelang.assets.records import Record
 from scenelang.compiler.lower import Memory
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
@@ -43,8 +43,7 @@ class FramesError(ValueError):
     """Not a range of frames, or one that an animation does not have."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameRange:
+class FrameRange(Record):
     first: int = 0  # from 0
     last: int | None = None  # the last one; None for that of the animation
 
@@ -120,8 +119,7 @@ class TargetError(ValueError):
     """A name that says nothing about the format, or cannot be written."""
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(Record):
     """Files of an animation."""
 
     kind: Kind  # format
@@ -287,8 +285,7 @@ def put_frame(files: Mapping[Path, bytes]) -> None:
         write_whole(file, data, flush=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Film:
+class Film(Record):
     """Finished frames in the order in which they are shown; read from the disk one at a time."""
 
     files: Sequence[Path]  # one for each frame; equal frames have the same
@@ -322,15 +319,13 @@ STILL = Animation(seconds=1.0, fps=1.0)
 """Animation of a scene without ``animate``: one frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shot:
+class Shot(Record):
     number: int  # from 0
     scene: Scene  # evaluated
     spans: SpanMap  # where its nodes were written
 
 
-@dataclass(frozen=True, slots=True)
-class Drawable:
+class Drawable(Record):
     number: int  # from 0
     key: str  # digest of all that determines its pixels
     shot: Shot  # the frame

@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.drawing.image import decoded, encoded
 from scenelang.language.diagnostics import plural
 
@@ -29,8 +30,7 @@ Points = npt.NDArray[np.float64]  # (M, 3)
 Rows = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tints:
+class Tints(Record, frozen=False):
     """The colours of F triangles."""
 
     tint: npt.NDArray[np.float32]  # (F, 3, 3), at corners; of a texture what multiplies it

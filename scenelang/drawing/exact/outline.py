@@ -13,7 +13,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
@@ -27,6 +26,7 @@ from scenelang.assets.element import TEXELS, Element, Facts, Painted
 from scenelang.assets.element_file import load_element_file
 from scenelang.assets.font import Font, FontError
 from scenelang.assets.picture import frame_of, painted, texels
+from scenelang.assets.records import Record
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
 from scenelang.language import library
 from scenelang.language.diagnostics import plural
@@ -177,8 +177,7 @@ Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Layer:
+class Layer(Record, frozen=False):
     """The area on one side of edges, or near them."""
 
     edges: Edges

@@ -10,13 +10,13 @@ thinner than that along the ray.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Sky, Stage
@@ -226,8 +226,7 @@ _MARGIN = 2e-2
 """Balls are this much larger than what they hold, in world units: more than the least step of a ray."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExactState:
+class ExactState(Record):
     """State of a fold, and optional values."""
 
     d: Any  # distance (M,)

@@ -14,10 +14,11 @@ where they do whatever the tiles are, so that tiles and threads change nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from scenelang.assets.records import Record
 from scenelang.compiler.groups import SMOOTH, UNION
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import sample_places
@@ -129,8 +130,7 @@ MANY = 2  # objects a pixel above which it is asked which of them matter to its 
 FLAT = 1e-4  # of a channel: a block that is known so well has one colour
 
 
-@dataclass(slots=True)
-class Tile:
+class Tile(Record, frozen=False):
     """Some rows of pixels."""
 
     # (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4)
