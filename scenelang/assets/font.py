@@ -138,8 +138,7 @@ def read_font(columns: int, about: Facts, tensors: Mapping[str, Tensor], body: m
     """The font of a file of tensors; raises `TensorError`."""
     tables: dict[str, Any] = {}
     for name, (kind, code) in TENSORS.items():
-        tensor = tensors.get(name)
-        if tensor is None or tensor.type != kind or len(tensor.shape) != 1:
+        if (tensor := tensors.get(name)) is None or tensor.type != kind or len(tensor.shape) != 1:
             raise TensorError(f"a font without its table `{name}`")
         table = array(code, bytes(body[tensor.first : tensor.last]))
         if sys.byteorder == "big":

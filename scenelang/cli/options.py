@@ -127,8 +127,7 @@ def several(*names: str, of: tuple[str, ...], help: str) -> Option:
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
     if value is None:
         return None
-    result = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
-    if result is None:
+    if (result := re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)) is None:
         raise click.BadParameter(f"`{value}` is not a size such as 320x192", ctx, param)
     width, height = int(result[1]), int(result[2])
     if not (1 <= width <= 8192 and 1 <= height <= 8192):

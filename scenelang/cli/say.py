@@ -44,8 +44,7 @@ def width_of(stream: IO[Any]) -> int:
 
 def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics for people, with carets, to standard error."""
-    text = render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr))
-    if text:
+    if text := render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr)):
         click.echo(text, err=True, nl=False, color=True)
 
 

@@ -177,8 +177,7 @@ class _Lowering(Record, frozen=False):
         self.origin = scene if scene.model else None
         while True:
             here = stack[-1]
-            item = next(here.todo, None)
-            if item is None:
+            if (item := next(here.todo, None)) is None:
                 stack.pop()
                 if isinstance(here.node, Scene):
                     return Fold("scene", tuple(here.links))
@@ -267,8 +266,7 @@ class _Lowering(Record, frozen=False):
         return tuple(result)
 
     def look(self, material: schema.Material) -> Look:
-        known = self.looks.get(id(material))
-        if known is not None:
+        if (known := self.looks.get(id(material))) is not None:
             return known
         name, manifest = material.name, self.manifest
         element: Element | Gradient | None = None
@@ -389,8 +387,7 @@ class _Lowering(Record, frozen=False):
         self, code: str, message: str, node: object, help: str | None = None, labels: tuple[Label, ...] = ()
     ) -> None:
         """Add a diagnostic; without a place each message is said once."""
-        span = self.place(node)
-        if span is None:
+        if (span := self.place(node)) is None:
             if (code, message) in self.said:
                 return
             self.said.add((code, message))

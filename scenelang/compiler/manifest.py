@@ -124,8 +124,7 @@ def load_manifest(name: str) -> Manifest:
     path = ROOT / name / MANIFEST
     stat = path.stat()
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
-    known = _READ.get(path)
-    if known is None or known[0] != stamp:
+    if (known := _READ.get(path)) is None or known[0] != stamp:
         result = Manifest.from_json(path.read_bytes())
         if result.name != name:
             raise ValueError(f"the manifest of `{name}` calls itself `{result.name}`")

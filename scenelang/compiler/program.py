@@ -220,10 +220,8 @@ class Program:
         if self.elements:
             settings = (*settings, *[element and element.digest for element in self.brought()])
         if self.palette:
-            settings = (
-                *settings,
-                *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
-            )
+            worn = [paint and (paint.element.digest, paint.steps) for paint in self.paints()]
+            settings = (*settings, *worn)
         if self.samples != 4:
             settings = (*settings, "samples", self.samples)
         total = hashlib.sha256(repr(settings).encode())
@@ -246,8 +244,7 @@ class Program:
         """True where it has groups, or cuts with a width, as chains of sharp cuts and blends do not."""
         if (self.tokens > OPERATOR).any():
             return True
-        layout = self._layout()
-        if layout is None:
+        if (layout := self._layout()) is None:
             return False
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
@@ -276,10 +273,8 @@ class Program:
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
         if self.weights != digest:
-            raise ProgramError(
-                f"the program was compiled for weights {self.weights[:12]}… of model `{self.model}`, "
-                f"these are {digest[:12]}…: compile the scene again"
-            )
+            fact = f"weights {self.weights[:12]}… of model `{self.model}`, these are {digest[:12]}…"
+            raise ProgramError(f"the program was compiled for {fact}: compile the scene again")
 
     def save(self, path: str | Path) -> None:
         """Write to a file, whole or not at all, equal bytes for equal Programs; raises OSError."""
@@ -465,9 +460,8 @@ def parse_program(data: bytes) -> Program:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
     newer = {"samples"} if header["format"] == NEWEST else set()
-    if header.keys() - {"stage", "elements", *newer} != _HEADER.keys() or not all(
-        isinstance(header[k], _HEADER[k]) for k in _HEADER
-    ):
+    complete = header.keys() - {"stage", "elements", *newer} == _HEADER.keys()
+    if not complete or not all(isinstance(header[k], _HEADER[k]) for k in _HEADER):
         raise ProgramError("the header has missing, unknown or damaged fields")
     geometries, files = header["geometries"], header["files"]
     if not all(isinstance(name, str) for name in (*geometries, *files)):

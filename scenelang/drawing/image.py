@@ -349,8 +349,7 @@ def image_format(path: str | os.PathLike[str]) -> str:
     pillow.preinit()  # the common formats; loading all takes as long as loading Pillow
     if pillow.EXTENSION.get(suffix) not in pillow.SAVE:
         pillow.init()
-    kind = pillow.EXTENSION.get(suffix)
-    if kind is None or kind not in pillow.SAVE:
+    if (kind := pillow.EXTENSION.get(suffix)) is None or kind not in pillow.SAVE:
         raise ValueError(f"no image format has the suffix `{suffix}`")
     return kind
 

@@ -25,8 +25,7 @@ class RenameRefused(Exception):
 
 def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
     """The definition of the name at an offset; for an import's path the file."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return None
     if use.role == "path":
         library = docs.imported(document, use.text)
@@ -53,8 +52,7 @@ def references(docs: Workspace, document: Document, offset: int, declaration: bo
 
 def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
     """The uses in this file of the definition that the name at an offset means."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return []
     result = docs.definition(document, use)
 
@@ -72,11 +70,9 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
 
 def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
     """The name at an offset; raises `RenameRefused` where it belongs to the language or to a model."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return None
-    result = docs.definition(document, use)
-    if result is None:
+    if (result := docs.definition(document, use)) is None:
         raise RenameRefused(f"`{use.text}` is not defined in a scene file")
     _check_owner(result[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
@@ -156,8 +152,7 @@ def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
     """Links of imports whose files there are."""
     result = []
     for path in (stmt.path for stmt in document.file.statements if isinstance(stmt, tree.Import)):
-        library = docs.imported(document, path.value)
-        if library is not None and library.path is not None:
+        if (library := docs.imported(document, path.value)) is not None and library.path is not None:
             place = document.lines.range(path.span.start + 1, max(path.span.end - 1, 0))
             result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
     return result
@@ -182,8 +177,7 @@ def symbols(document: Document, statements: Iterable[tree.Stmt]) -> Iterator[typ
         word = ""
         if isinstance(stmt, tree.Combined):
             word, stmt = f"{stmt.op} ", stmt.child
-        entry = _entry(stmt)
-        if entry is None:
+        if (entry := _entry(stmt)) is None:
             continue
         name, kind, selection, inner, detail = entry
         yield types.DocumentSymbol(
@@ -274,8 +268,7 @@ def folding(document: Document) -> list[types.FoldingRange]:
 def selection(document: Document, offset: int) -> types.SelectionRange:
     """The nodes around an offset, innermost first, each within the next."""
     spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.file, offset))]
-    use = document.names.at(offset)
-    if use is not None:
+    if (use := document.names.at(offset)) is not None:
         spans.append((use.start, use.end))
     result: types.SelectionRange | None = None
     last = (-1, -1)

@@ -254,8 +254,7 @@ class Server(LanguageServer):
 
     def _start(self, uri: str) -> None:
         self._timers.pop(uri, None)
-        document = self.docs.open.get(uri)
-        if document is None:
+        if (document := self.docs.open.get(uri)) is None:
             return
         stop = self._running[uri] = threading.Event()
         loop = asyncio.get_running_loop()
@@ -330,8 +329,7 @@ def _opened(server: Server, params: types.DidOpenTextDocumentParams) -> None:
 
 
 def _changed(server: Server, params: types.DidChangeTextDocumentParams) -> None:
-    document = server.docs.open.get(params.text_document.uri)
-    if document is None:
+    if (document := server.docs.open.get(params.text_document.uri)) is None:
         log.warning("change of a document that is not open: %s", params.text_document.uri)
         return
     for change in params.content_changes:
@@ -468,8 +466,7 @@ _OPTIONS: Final = {
 def _answer(server: Server, method: str, params: Any) -> Any:
     if method in _SESSION:
         return _SESSION[method](server, params)
-    document = server.docs.get(params.text_document.uri)
-    if document is None:
+    if (document := server.docs.get(params.text_document.uri)) is None:
         return [] if method in _LISTS else None
     if method in _AT_PLACE:
         return _AT_PLACE[method](server, document, document.lines.offset(params.position))

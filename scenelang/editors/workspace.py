@@ -395,8 +395,7 @@ class Workspace:
         try:
             stat = path.stat()
             stamp = (stat.st_mtime_ns, stat.st_size)
-            known = self._closed.get(path)
-            if known is not None and known[0] == stamp:
+            if (known := self._closed.get(path)) is not None and known[0] == stamp:
                 return known[1]
             if not path.is_file():
                 return None
@@ -420,8 +419,7 @@ class Workspace:
             for path in map(Path.resolve, scenes_below(folder, MAX_FILES * 10)):
                 if path not in seen:
                     seen.add(path)
-                    document = self.by_path(path)
-                    if document is not None:
+                    if (document := self.by_path(path)) is not None:
                         yield document
 
     def imported(self, document: Document, text: str) -> Document | None:
@@ -472,10 +470,9 @@ class Workspace:
         others = (other for other in (self.known() if abroad else ()) if other.uri != document.uri)
         for other in chain((document,), others):
             for use in other.names.uses if symbol.name in other.text else ():
-                if use.text == symbol.name and (other is document or use.role in ("member", "argument")):
-                    target = self.definition(other, use)
-                    if target is not None and target[1] is symbol:
-                        yield other, use
+                near = use.text == symbol.name and (other is document or use.role in ("member", "argument"))
+                if near and (target := self.definition(other, use)) is not None and target[1] is symbol:
+                    yield other, use
 
 
 def scenes_below(folder: Path, most: int) -> Iterator[Path]:

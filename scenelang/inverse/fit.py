@@ -76,8 +76,7 @@ def problems_of(
 
 def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
     """Return whether a scene is of solids; raises `FitError` where its pictures cannot be compared."""
-    program = moment.program(values, canvas)
-    if program is None:
+    if (program := moment.program(values, canvas)) is None:
         raise SceneError(moment.trouble)
     manifest = load_manifest(program.model)
     if manifest.renderer not in ("framed", "solid"):

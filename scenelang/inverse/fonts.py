@@ -95,8 +95,7 @@ def ranges_of(text: str) -> list[range]:
     """Code points of ranges as style sheets have them: ``U+20-7E, U+2190-2193``; raises `ValueError`."""
     result = []
     for part in text.replace(" ", "").split(","):
-        match = re.fullmatch(r"[Uu]\+([0-9A-Fa-f]{1,6})(?:-([0-9A-Fa-f]{1,6}))?", part)
-        if match is None:
+        if (match := re.fullmatch(r"[Uu]\+([0-9A-Fa-f]{1,6})(?:-([0-9A-Fa-f]{1,6}))?", part)) is None:
             raise ValueError(f"`{part[:40]}` is not a range of letters such as U+20-7E")
         result.append(range(int(match[1], 16), int(match[2] or match[1], 16) + 1))
     return result

@@ -294,8 +294,7 @@ class Rates:
             moved = u.copy()
             moved[axes] += way * np.where((u[axes] + way * STEP > 1.0) & ~self.space.wraps[axes], -STEP, STEP)
             end = self.space.inside(moved)
-            program = self.program(end)
-            if program is not None and alike(here, program):
+            if (program := self.program(end)) is not None and alike(here, program):
                 width = end - self.space.inside(u)
                 change = numbers_of(program) - base
                 return change, np.where(self.space.wraps, (width + 0.5) % 1.0 - 0.5, width)

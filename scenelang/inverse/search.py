@@ -318,8 +318,7 @@ def descend(
     Differences take a ``step`` in shares of a range; ``fine`` ones are central: twice the pictures, but they
     follow a narrow valley that others lose. The first step of less relative gain than ``enough`` is the last.
     """
-    at = residuals(u)
-    if at is None:
+    if (at := residuals(u)) is None:
         return None
     cost, damping = float(at @ at), 1e-2
     way: list[Point] = []
@@ -342,8 +341,7 @@ def descend(
             move[free] = -np.linalg.solve(square + scale, pull[free])
             move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))  # at most 0.3 of a range
             moved = space.inside(u + move)
-            there = residuals(moved)
-            if there is not None and (lower := float(there @ there)) < cost:
+            if (there := residuals(moved)) is not None and (lower := float(there @ there)) < cost:
                 way.append(u)
                 u, at, cost, damping = moved, there, lower, max(1e-6, damping / 5)
                 break

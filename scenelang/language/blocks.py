@@ -525,8 +525,7 @@ def prepare_combined(stmt: tree.Combined, place: Site) -> Action | None:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
         return None
-    act = prepare_statement(child, place)
-    if act is None:
+    if (act := prepare_statement(child, place)) is None:
         return None
 
     def action(env: Env, out: Builder) -> None:
@@ -548,8 +547,7 @@ def prepare_module_call(stmt: tree.Call, definition: Definition, place: Site) ->
     fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
     given = expressions.prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
-    enter = expressions.entering(stmt.name, given, definition, place)
-    if enter is None or not fits:
+    if (enter := expressions.entering(stmt.name, given, definition, place)) is None or not fits:
         return None
     place.file.weight += MODULE_CALL
 

@@ -251,8 +251,7 @@ class Braced:
             head = [Comments(opened, inside=True), plain(self.opening, after=True)]
         elif opened := [*opened, *after_of(self.opening)]:
             first = [Comments(own_after_first(opened))]
-        inside = entries(self.statements, before_of(self.closing))
-        if not inside and not opened:
+        if not (inside := entries(self.statements, before_of(self.closing))) and not opened:
             return [self.flat or "{}"]
         return [*head, Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
 
@@ -288,8 +287,7 @@ class FileLayout:
 
     def word(self, token: int) -> Part:
         text = self.text[self.starts[token] : self.ends[token]]
-        note = self.notes.get(token)
-        if note is None:
+        if (note := self.notes.get(token)) is None:
             return text
         if note.leading or note.trailing:
             gap = "" if text in ("(", "[") else " "

@@ -250,8 +250,7 @@ def prepare_move(stmt: tree.Call, place: Site) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     name, report = stmt.name.text, place.report
     given = expressions.prepare_arguments(stmt.args, place, name)
-    spec = _spec(stmt, place)
-    if spec is None:
+    if (spec := _spec(stmt, place)) is None:
         return None
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
@@ -385,8 +384,7 @@ def _stands(place: Site, span: Span, what: str, help: str, inside: str | None = 
 def prepare_use(stmt: tree.MaterialUse, place: Site) -> Action | None:
     word = Span(stmt.span.source, stmt.span.start, stmt.name.span.end)
     stands = _stands(place, word, "a material", "put it into the block of an object or a group")
-    make_material = _prepare(stmt, place)
-    if make_material is None or not stands:
+    if (make_material := _prepare(stmt, place)) is None or not stands:
         return None
     session = place.session
 
@@ -427,8 +425,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Call
 
 def _check_stops(material: Material, where: Written, session: Session) -> None:
     """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
-    fault = material_fault(material.name, material.ops)
-    if fault is None:
+    if (fault := material_fault(material.name, material.ops)) is None:
         return
     stop, message = fault
     statement, report = where.statement, session.report

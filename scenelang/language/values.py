@@ -183,8 +183,7 @@ def pack(number: float, unit: str) -> Any:
 def describe(value: Any) -> str:
     """Kind of a value, for messages."""
     if value.__class__ is Vec:
-        count = len(value.items)
-        return f"a vector of {plural(count, 'item')}"
+        return f"a vector of {plural(len(value.items), 'item')}"
     return _KINDS.get(value.__class__, "another value")
 
 
@@ -289,11 +288,8 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
             return ua
         if ua == "number" and ub == "time":
             return "number"
-    raise Problem(
-        "E0303",
-        f"cannot {_VERBS[op]} {NAMED[ua]} {_PREPOSITIONS[op]} {NAMED[ub]}",
-        "divide an angle by 1rad, or a time by 1s, for a bare number",
-    )
+    help = "divide an angle by 1rad, or a time by 1s, for a bare number"
+    raise Problem("E0303", f"cannot {_VERBS[op]} {NAMED[ua]} {_PREPOSITIONS[op]} {NAMED[ub]}", help)
 
 
 def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> Problem:

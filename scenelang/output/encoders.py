@@ -273,8 +273,7 @@ def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
 
     It is the one on the PATH, or the one that imageio-ffmpeg brings.
     """
-    ffmpeg = shutil.which("ffmpeg")
-    if ffmpeg is None:
+    if (ffmpeg := shutil.which("ffmpeg")) is None:
         try:
             import imageio_ffmpeg
 

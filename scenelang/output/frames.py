@@ -50,8 +50,7 @@ class FrameRange(Record):
     @classmethod
     def parse(cls, text: str) -> FrameRange:
         """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a``; else `FramesError`."""
-        match = _RANGE.fullmatch(text)
-        if match is None or (match[2] and match[3] is None):
+        if (match := _RANGE.fullmatch(text)) is None or (match[2] and match[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
         first, last = int(match[1]), int(match[3]) - bool(match[2]) if match[3] else None
         if ".." not in text:

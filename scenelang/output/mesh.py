@@ -67,8 +67,7 @@ class TriangleMesh(NamedTuple):
 
         Raises `ValueError` for another suffix, OSError where it cannot be written.
         """
-        write = WRITERS.get(Path(path).suffix.lower())
-        if write is None:
+        if (write := WRITERS.get(Path(path).suffix.lower())) is None:
             raise ValueError(f"not one of {', '.join(WRITERS)}")
         write_output(path, write(self))
 

@@ -190,8 +190,7 @@ def settle(paths: Collection[Path]) -> None:
         now = stamps(paths)
         if now == last:
             first = next(iter(now.values()), None)
-            whole = first is not None and first[1] > 0
-            if whole or time.monotonic() - started > PATIENCE_S:
+            if (first is not None and first[1] > 0) or time.monotonic() - started > PATIENCE_S:
                 return
         last = now
         if time.monotonic() - started > 10 * PATIENCE_S:

@@ -370,8 +370,7 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[PagePayload, P
     evaluation, scene = None, source if isinstance(source, Scene) else None
     if isinstance(source, Source):
         evaluation = source.evaluation(result := Diagnostics())
-        scene = evaluation.run(0)[0]
-        if scene is None or result.errors:
+        if (scene := evaluation.run(0)[0]) is None or result.errors:
             raise SceneError(result)
     assert scene is not None
     program = compile_scene(scene)

@@ -221,8 +221,7 @@ class Live:
         kept = await asyncio.to_thread(self._play.journal.find, path)
         async with self._play.reading:
             text, disk = await asyncio.to_thread(self._play.folder.read, name)
-        known = self.open.get(name)
-        if known is None:
+        if (known := self.open.get(name)) is None:
             known = self.open[name] = Open(path, text or "", disk)
         lost = kept is not None and kept.text != text
         unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds} if kept and lost else None
@@ -290,8 +289,7 @@ class Live:
         return name, self.open[name]
 
     def _keep_later(self, name: str) -> None:
-        known = self.open.get(name)
-        if known is not None:
+        if (known := self.open.get(name)) is not None:
             known.keeping = None
             work = asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
             self._play.later(work)
@@ -310,8 +308,7 @@ class Live:
 
     def changed(self, name: str, text: str | None, disk: str | None) -> None:
         """Send the page a file that has changed on the disk."""
-        known = self.open.get(name)
-        if known is None or known.disk == disk:
+        if (known := self.open.get(name)) is None or known.disk == disk:
             return
         clean = known.text == known.saved
         known.saved, known.disk = text or "", disk
@@ -331,8 +328,7 @@ class Live:
         version = self.open[name].version
 
         def viewed(answer: Answer) -> None:
-            known = self.open.get(name)
-            if known is not None:
+            if (known := self.open.get(name)) is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
                 known.angles = frozenset(answer.head.get("angles", known.angles))
 

@@ -156,8 +156,7 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
 
 def _picture(kind: str, text: str) -> bytes:
     """A picture of DOT text by Graphviz."""
-    dot = shutil.which("dot")
-    if dot is None:
+    if (dot := shutil.which("dot")) is None:
         raise click.UsageError(
             f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."

@@ -127,8 +127,7 @@ def command(
     request = replace(request, source=replace(request.source, fps=film.fps))
     clock, result = Clock(), None
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
-        target = film.target(files[0], out)
-        if target is not None:
+        if (target := film.target(files[0], out)) is not None:
             result = read_input(files[0], request, clock, how)
             if _moves(result, target, film, out):
                 if limits or prove:

@@ -45,8 +45,7 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
         drawn = outline.read_outline(data, suffix)
         if number == 0:
             return drawn
-        layers = [layers for _, layers in drawn.painted()][number - 1 :]
-        if layers:
+        if layers := [layers for _, layers in drawn.painted()][number - 1 :]:
             return Outline(layers[0])
     else:
         result, _ = meshes.read_solids(data, suffix)
@@ -176,8 +175,7 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
         )
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
-    shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)
-    if shape is None:
+    if (shape := _shape(path, digest, element.about.get("sign") == "closed", part, *version)) is None:
         raise FitError(f"{origin}, and `{path}` is another file of that name")
     return shape
 

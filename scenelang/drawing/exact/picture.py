@@ -70,8 +70,7 @@ def true_shapes(graph: Graph, brought: Brought | None) -> Brought:
     """
     result = dict(brought or {})
     for leaf in leaves(graph.root):
-        element = graph.elements.get(name := leaf.geometry)
-        if element is not None and name not in result:
+        if (element := graph.elements.get(name := leaf.geometry)) is not None and name not in result:
             if element.form != "outline":
                 raise ValueError(f"the exact shape of `{name}` is not known")
             result[name] = of_curves(element)

@@ -401,8 +401,7 @@ class Coverage:
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:
     """Columns in turn, as many at a time as make `PAIRS` with so many points each, and which is the first."""
-    total = len(meetings.pairs) * points
-    if not total:
+    if not (total := len(meetings.pairs) * points):
         return []
     if total <= PAIRS:
         return [(0, meetings)]

@@ -114,8 +114,7 @@ class Model:
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
     """Build the network of a weights file; `ModelError` where it does not fit the manifest or itself."""
     header, arrays = open_weights(data)
-    make = _MAKERS.get(manifest.renderer)
-    if make is None:
+    if (make := _MAKERS.get(manifest.renderer)) is None:
         raise ModelError(f"an unknown renderer `{manifest.renderer}`")
     try:
         with torch.random.fork_rng(devices=[]):
