@@ -46,11 +46,9 @@ _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backe
 @options.film()
 @options.drawing()
 @options.several(
-    "--output",
-    "outputs",
-    of=("depth", "normal", "object", "alpha", "proof"),
+    "--output", "outputs", of=("depth", "normal", "object", "alpha", "proof"),
     help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr",
-)
+)  # fmt: skip
 @click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
 @click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
 @options.positive(
