@@ -290,26 +290,15 @@ def program_bytes(program: Program) -> bytes:
     of_geometry = {name: index for index, name in enumerate(geometries)}
     of_file = {name: index for index, name in enumerate(files)}
     places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
-    header: dict[str, Any] = {
-        "background": program.background,
-        "canvas": program.canvas,
-        "files": files,
-        "format": FORMAT,
-        "geometries": geometries,
-        "model": program.model,
-        "weights": program.weights,
-    }
+    header = {name: getattr(program, name) for name in ("background", "canvas", "model", "weights")}
+    header |= {"files": files, "format": FORMAT, "geometries": geometries}
     if program.stage is not None:
         header["stage"] = stage_data(program.stage)
     if program.elements:
         header |= {"format": 2, "elements": [[e.name, entry_of(e)] for e in program.elements]}
-    tensors: dict[str, npt.NDArray[Any]] = {
-        "vectors": program.vectors,
-        "tokens": program.tokens,
-        "bounds": program.bounds,
-        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
-        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
-    }
+    tensors = {name: getattr(program, name) for name in ("vectors", "tokens", "bounds")}
+    tensors["objects"] = np.array([of_geometry[name] for name in program.objects], dtype=np.int32)
+    tensors["places"] = np.array(places, dtype=np.int32).reshape(len(program), 5)
     if program.numbers != tuple(range(1, len(program) + 1)):
         tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
     if program.elements and program.forms is not None:
@@ -407,29 +396,14 @@ _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
 MOST_PROGRAM_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
 MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
 
-_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
-    "vectors": ("F32", (WIDTH,)),
-    "tokens": ("I8", ()),
-    "bounds": ("F32", (4,)),
-    "objects": ("I32", ()),
-    "places": ("I32", (5,)),
-}
+_Columns = dict[str, tuple[str, tuple[int, ...]]]  # kinds of numbers, and the sides of each row
+_LAYOUT: _Columns = {"vectors": ("F32", (WIDTH,)), "tokens": ("I8", ()), "bounds": ("F32", (4,))}
+_LAYOUT |= {"objects": ("I32", ()), "places": ("I32", (5,))}
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
-_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {
-    "paints": ("I32", (2,)),
-    "steps": ("F32", (4,)),
-    "stops": ("F32", (5,)),
-}
+_TABLES: _Columns = {"paints": ("I32", (2,)), "steps": ("F32", (4,)), "stops": ("F32", (5,))}
 _PAINTS = {"paints", "steps"}
-_HEADER: dict[str, Any] = {
-    "background": list | None,
-    "canvas": list,
-    "files": list,
-    "format": int,
-    "geometries": list,
-    "model": str,
-    "weights": str,
-}
+_HEADER: dict[str, Any] = {"background": list | None, "format": int, "model": str, "weights": str}
+_HEADER |= dict.fromkeys(("canvas", "files", "geometries"), list)
 
 
 def load_program(path: str | Path, *, weights: str | None = None) -> Program:

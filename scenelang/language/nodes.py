@@ -147,7 +147,7 @@ Affine = Annotated[
 ]
 
 
-def _kind_is_required(schema: dict[str, Any]) -> None:
+def _kind_needed(schema: dict[str, Any]) -> None:
     """In data the kind tells nodes apart, while Python's constructors know it."""
     if "kind" in schema["properties"]:
         schema["required"] = ["kind", *schema.get("required", ())]
@@ -177,11 +177,7 @@ class Frozen(BaseModel):
 
     # Validators are built when first used: a scene evaluated from text needs none.
     model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        defer_build=True,
-        json_schema_extra=_kind_is_required,
+        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, json_schema_extra=_kind_needed
     )
 
     def __init__(self, *args: Any, **data: Any) -> None:

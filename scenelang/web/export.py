@@ -180,10 +180,7 @@ def view_of(
     measured |= {} if figures is None else {key: figures[key] for key in ("scenes", "psnr", "flip")}
     about = {"name": manifest.name, "summary": manifest.summary, "weights": digest, "measured": measured}
     data: dict[str, Any] = {
-        "format": FORMAT,
-        "title": title,
-        "canvas": program.canvas,
-        "dimension": manifest.dimension,
+        **{"format": FORMAT, "title": title, "canvas": program.canvas, "dimension": manifest.dimension},
         "model": about,
         "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [

@@ -522,13 +522,9 @@ def form_of(evaluation: Evaluation, manifest: Manifest, elements: Iterable[Worn]
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
     shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]
-    return PageProgram(
-        data,
-        [param_data(name, stmt, file) for name, stmt, file, _ in shown],
-        [{"name": name, "reason": reason} for name, reason in reasons.items()],
-        tuple(writer.shapes),
-        tuple(writer.paints),
-    )
+    params = [param_data(name, stmt, file) for name, stmt, file, _ in shown]
+    fixed = [{"name": name, "reason": reason} for name, reason in reasons.items()]
+    return PageProgram(data, params, fixed, tuple(writer.shapes), tuple(writer.paints))
 
 
 @cache

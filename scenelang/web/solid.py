@@ -24,15 +24,8 @@ from scenelang.web.arrays import ArrayStore, web
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "lamps.glsl", "light.glsl")
 """Files of ``viewer/``, in order."""
 _CONSTANTS: Final = {
-    "EMPTY": EMPTY,
-    "RADIUS": RADIUS,
-    "EXTINCTION": EXTINCTION,
-    "FADE": FADE,
-    "NEAREST": NEAREST,
-    "LIFT": LIFT,
-    "AMBIENT_EVEN": AMBIENT[0],
-    "AMBIENT_UP": AMBIENT[1],
-    "HARD": HARD,
+    **{"EMPTY": EMPTY, "RADIUS": RADIUS, "EXTINCTION": EXTINCTION, "FADE": FADE, "NEAREST": NEAREST},
+    **{"LIFT": LIFT, "AMBIENT_EVEN": AMBIENT[0], "AMBIENT_UP": AMBIENT[1], "HARD": HARD},
 }
 
 
@@ -63,11 +56,7 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
                 np.array([network.box(layers) for layers in decoders], np.float32).reshape(-1)
             ),
             "geometries": len(decoders),
-            "blend": BLEND,
-            "extinction": EXTINCTION,
-            "slack": SLACK,
-            "loose": LOOSE,
-            "far": RADIUS,
+            **{"blend": BLEND, "extinction": EXTINCTION, "slack": SLACK, "loose": LOOSE, "far": RADIUS},
             "products": max(products) + 2 * (1 + paint + kind),
         },
     }
