@@ -19,7 +19,6 @@ GRAIN: Final = 32767  # steps in a radius of an outline
 ROOM: Final = 12  # bytes of a curve
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
-
 Facts = dict[str, str | float]
 """Facts of an element from its maker: text and numbers by name."""
 

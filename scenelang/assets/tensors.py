@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-
 FORMAT: Final = 1
 MOST_HEADER: Final = 1 << 20
 _MOST_NAME, _MOST_SIDES, _MOST_SIDE = 200, 8, 1 << 31

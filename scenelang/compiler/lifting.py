@@ -45,9 +45,7 @@ Array = Any  # numpy array or torch tensor
 
 
 class Parts(NamedTuple):
-    """Parts of vectors (…, 64), each (…, its size), but ``width``, ``clear`` and what follows ``material``
-    (…,).
-    """
+    """Parts of vectors (…, 64), each (…, size), but ``width``, ``clear`` and all behind ``material`` (…,)."""
 
     code: Array
     one: Array

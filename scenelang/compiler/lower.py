@@ -66,7 +66,6 @@ ROUGHNESS: Final = 0.3  # of what reflects, where it is not written
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
 
-
 Spans = SpanMap
 Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
 """Objects, by identity, with the material around them and their leaves."""

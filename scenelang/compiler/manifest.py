@@ -96,8 +96,7 @@ class Manifest:
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
-        value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)
-        return float(value)
+        return float(self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0))
 
 
 MANIFEST: Final = "manifest.json"

@@ -47,9 +47,7 @@ _GRADED: Final = {-1: "linear", -2: "radial"}
 
 
 class Paint(NamedTuple):
-    """A gradient or an element, a picture or colours of space, and `STEPS` on its colours, clamped to [0, 1]
-    after each.
-    """
+    """A gradient, a picture or colours of space, and `STEPS` on its colours, each clamped to [0, 1]."""
 
     element: Element | Gradient
     steps: tuple[ColourStep, ...] = ()
@@ -86,8 +84,7 @@ def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, .
         graded = Gradient(_GRADED[at], tuple(stops.pop(row, ()))) if at in _GRADED else None
         if not (graded or 0 <= at < len(elements)) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
             raise TensorError("a paint of an element or of steps that are not listed")
-        own = rows[first : first + count]
-        named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
+        named = [(kinds[int(kind)], *numbers) for kind, *numbers in rows[first : first + count]]
         result.append(Paint(graded or elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
         first += count
     if first != len(rows):

@@ -47,7 +47,6 @@ from scenelang.language.nodes import LAMPS, MOST, camera_fault, light_fault
 if TYPE_CHECKING:
     from scenelang.language.scene import Scene
 
-
 Triple = tuple[float, float, float]
 
 HORIZON: Triple = (0.80, 0.86, 0.92)

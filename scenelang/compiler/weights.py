@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from scenelang.compiler.lifting import Lifting
 
-
 MOST_BYTES = 64 << 20
 REPLACED: Final = ROOT / "replaced"
 """Folders of weights that others have replaced, by digest: saved Programs still draw with them."""

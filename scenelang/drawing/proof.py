@@ -79,9 +79,7 @@ class WrittenObject(NamedTuple):
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
     def mispainted(self, reach: float, far: float) -> tuple[float, float]:
-        """Distance by which (u, v) of a texture may be off there, and a channel of its colours, apart from
-        hard edges.
-        """
+        """How far (u, v) of a texture may be off there, and a channel of its colours, hard edges apart."""
         if (element := self.look.element) is None:
             return 0.0, 0.0
         reach = min(reach, _seen(self.steps, far))
@@ -382,18 +380,13 @@ class Stream:
             if name in self.unknown:
                 length = np.hypot(*p)
                 result = Interval(length - 1, length + 1)
-            elif exactly:
-                result = Interval(*[leaf_distance(name, p)] * 2)
-            else:
-                result = self._known[name].exact(p)
+            result = Interval(*[leaf_distance(name, p)] * 2) if exactly else self._known[name].exact(p)
             low[some], high[some] = result
         bare = Interval(low, high)
         return _worn(bare, *self._skins[:, which]) if self._skins.any() else bare
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
-        """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or in regions about them, which
-        textures vary in.
-        """
+        """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or of textures around them."""
         low, high = self._plain[:, which], self._plain[:, which]
         for at in np.unique(which[self._painted[which]]).tolist():
             some, look = which == at, self._leaves[at].look

@@ -284,8 +284,7 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     if max(gone, come) > 3000:
         counts = f"{plural(gone, 'line')} became {come:,}"
         return f"--- {old}\n+++ {new}\n@@ from line {start + 1:,}: {counts} @@\n"
-    lines = difflib.unified_diff(a, b, old, new, lineterm="")
-    return "\n".join(lines) + "\n"
+    return "\n".join(difflib.unified_diff(a, b, old, new, lineterm="")) + "\n"
 
 
 MOST_BOXES: Final = 200

@@ -141,8 +141,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
             continue
         if not scope.start <= use.start < scope.end:
             continue
-        inner = where.names.scope_at(use.start)
-        meant = inner.find(new)
+        meant = where.names.scope_at(use.start).find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
             raise RenameRefused(f"`{new}` in line {line} of {where.name} would mean this")

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from difflib import SequenceMatcher
 from functools import cache
 from importlib.metadata import version
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
@@ -141,9 +142,7 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
     """Few small edits that make the text ``text``, so that cursors and folds stay where they are."""
     old, new = document.text.splitlines(keepends=True), text.splitlines(keepends=True)
-    starts = [0]
-    for line in old:
-        starts.append(starts[-1] + len(line))
+    starts = [*accumulate(map(len, old), initial=0)]
     edit = difference(old, new)
     head, inner_old, inner_new = edit.start, old[edit.start : edit.old_end], new[edit.start : edit.new_end]
     if len(inner_old) + len(inner_new) > _MOST_LINES:

@@ -66,8 +66,7 @@ def read_font(
     left_out, count = list[str](), 0
     for code, glyph in sorted(held.items()):
         advance = font.get_glyph_h_advance(glyph) / face.upem
-        curves = _contours(font, glyph) / face.upem
-        disc, outline = _outline(curves)
+        disc, outline = _outline(_contours(font, glyph) / face.upem)
         if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _closed(outline):
             left_out.append(f"U+{code:04X}")
             continue

@@ -178,9 +178,7 @@ class SoftPlane:
         return d * _scale(*maps)
 
     def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, clear: Tensor, behind: Tensor) -> Tensor:
-        """Channels (3, M) of points, by distances, colours, widths and 1 - opacities (3, N, M) and what is
-        behind (3, M).
-        """
+        """Channels (3, M) of points by distances, colours, widths, 1 - opacities (3, N, M) and ``behind``."""
         lines, bias, candidate, bump = self.cell
         state = d.new_full((3, 1, d.shape[2]), EMPTY * self.widest / BLEND)
         colour = torch.zeros_like(torch.cat([state] * (1 + self.clear), 1))  # and coverage behind it

@@ -63,8 +63,7 @@ class Moment(Record, frozen=False):
     def program(self, values: Mapping[str, Any], canvas: tuple[int, int]) -> Program | None:
         """Compile the scene of values for a canvas; None where it has errors, which `trouble` then holds."""
         try:
-            scene = self.evaluated(values)[1]
-            return compile_scene(scene.sized(canvas))
+            return compile_scene(self.evaluated(values)[1].sized(canvas))
         except SceneError as error:
             self.trouble = error.diagnostics
             return None

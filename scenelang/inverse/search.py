@@ -212,8 +212,7 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
                 raise FitError(f"a file of more than {MOST_BYTES >> 20} MiB")
             with opened(data) as file:
                 kind = "RGBA" if file.has_transparency_data else "RGB"
-                values = ImageOps.exif_transpose(file).convert(kind)
-                return np.asarray(values, np.float64) / 255
+                return np.asarray(ImageOps.exif_transpose(file).convert(kind), np.float64) / 255
         except FitError as error:
             raise FitError(f"{os.fspath(picture)}: {error}") from None
     if picture.ndim != 3 or picture.shape[2] not in (3, 4):
@@ -224,7 +223,6 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
 Residuals = Callable[[Point], Point | None]
 Report = Callable[[str, int, int], None]
 Matrix = npt.NDArray[np.float64]
-
 
 MANY: Final = 6  # numbers from which on derivatives by reverse passes cost less than differences
 APART: Final = 0.02  # least distance of two solutions, in shares of a range

@@ -30,7 +30,6 @@ Role = Literal[
     "path",
 ]
 
-
 _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
 """Roles of the language's words in an expression."""
 

@@ -212,8 +212,7 @@ def ranked(
         effort.left -= 8
         if abs(len(candidate) - len(name)) > limit + 2:  # an underscore and a final s make no slip
             continue
-        other = _plain(candidate)
-        if other == plain:
+        if _plain(candidate) == plain:
             distance = _CASE if candidate.lower() == name.lower() else _JOINT
         else:
             lower = candidate.lower()

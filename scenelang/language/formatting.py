@@ -452,8 +452,7 @@ class FileLayout:
 
     def file(self, statements: list[Item] | None = None) -> Part:
         last = self.notes.get(len(self.tokens.kinds) - 1)
-        parts = entries(statements or [], last.before if last else [])
-        return Concat(None, parts[1:])
+        return Concat(None, entries(statements or [], last.before if last else [])[1:])
 
     def following(self, items: list[Item], item: Part) -> list[Item]:
         items.append(Item(item))

@@ -88,7 +88,6 @@ _ONCE, _BOUND, _BEFORE = (
     for pattern in ("<n><++|-->;", "<n> = <LINE> <;?>", "<before>(<P>) <o>")
 )
 
-
 # ---------------------------------------------------------------- patterns over text
 
 _PIECE: Final = re.compile(

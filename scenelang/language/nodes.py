@@ -91,7 +91,6 @@ Opaque = Annotated[
     tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
 ]
 
-
 _NOT_RESERVED: Final = AfterValidator(
     lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")
 )
@@ -440,7 +439,6 @@ MaterialOp = Annotated[
 ]
 Inks = Iterable[MaterialOp] | MaterialOp | str
 
-
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
 Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
 Unsaid = Annotated[Literal["default"], Tag("unsaid")]
@@ -539,7 +537,6 @@ MAX_NODE_DEPTH = 400  # nodes within nodes
 Blend = Annotated[
     Finite, Field(gt=0, description="width of the blend; null: 0.15 of `smooth`, a sharp edge of a cut")
 ]
-
 
 SAMPLES: Final = 4, 16
 """Numbers of samples that a pixel may be the mean of, on regular grids."""

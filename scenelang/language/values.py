@@ -196,9 +196,7 @@ def unexpected(
 
 def show(number: float) -> str:
     """A number for messages: short, integers without a point."""
-    if number.is_integer() and abs(number) < 1e15:
-        return str(int(number))
-    return f"{number:.6g}"
+    return str(int(number)) if number.is_integer() and abs(number) < 1e15 else f"{number:.6g}"
 
 
 _VERBS: Final = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "divide", "^": "raise"}
@@ -442,8 +440,7 @@ def _pick(a: Any, b: Any, better: Callable[[float, float], bool]) -> Any:
         return Vec(tuple([_pick(x, y, better) for x, y in zip(left, right, strict=True)]))
     x, ua = _scalar(a, 0)
     y, ub = _scalar(b, 1)
-    unit = same_unit(x, ua, y, ub)
-    return pack(x if better(x, y) else y, unit)
+    return pack(x if better(x, y) else y, same_unit(x, ua, y, ub))
 
 
 def _whole(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -230,7 +230,6 @@ def main() -> None:
 if __name__ == "__main__":
     main()
 
-
 BATCH_S: Final = 0.25  # drawing time of a batch, against which a task's own milliseconds are small
 MOST_BATCH: Final = 64
 MOST_BYTES: Final = 4 << 20  # of the Programs in a batch; elements make them large

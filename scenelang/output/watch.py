@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from scenelang.drawing.image import Image
     from scenelang.output.frames import Target
 
-
 Stamps = dict[Path, tuple[int, int, int] | None]
 
 LOOK_S: Final = 0.03  # between two polls

@@ -25,7 +25,6 @@ from scenelang.drawing.how import RenderError, usable_cores
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-
 LOCAL: Final = "local"
 AHEAD: Final = 3  # pending tasks of each worker
 LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, with their contents

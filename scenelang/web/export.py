@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
     from scenelang.drawing.image import Image
 
-
 MOST: Final = 5  # kinds of objects, and colours, that a text names
 _HUES: Final = (
     (0.03, "red"),

@@ -117,8 +117,7 @@ def _network(job: Job, tell: Tell) -> Answer:
 
 def _reference(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
-    image = _exact(job, Clip(_source(job)))
-    return _picture(job, image, {"draw": _since(started)})
+    return _picture(job, _exact(job, Clip(_source(job))), {"draw": _since(started)})
 
 
 def _difference(job: Job, tell: Tell) -> Answer:
@@ -169,8 +168,7 @@ def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
     program = clip.program(_shot(clip, frame))
     ms = {"compile": _since(started)}
     started = time.perf_counter()
-    image = _by_network(program)
-    return image, {**ms, "draw": _since(started)}
+    return _by_network(program), {**ms, "draw": _since(started)}
 
 
 def _by_network(program: Program, tell: Tell | None = None) -> Image:

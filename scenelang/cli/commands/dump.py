@@ -22,7 +22,6 @@ from scenelang.language.words import COMBINE
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Input
 
-
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
 _DRAWN: Final = ("mmd", "dot", "svg", "png")
 STAGES: Final = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")

@@ -34,7 +34,6 @@ _SECTIONS: Final = {
     "Meshes": "--resolution",
 }
 
-
 _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backend", "strict", "verbose")
 """Parameters that shapes have too."""
 
@@ -165,8 +164,7 @@ def command(
 
             told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
-                lines = "".join(f"\n  {note}" for note in job.notes)
-                click.echo(f"{job.name} -> {path}{lines}", err=True)
+                click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
     for line in told:
         click.echo(line, err=True)
     if verbose and able:

@@ -203,8 +203,7 @@ class Layer(Record, frozen=False):
         at = np.repeat(np.arange(len(counts)), counts)
         step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
         a, b = self.edges[at, 0], self.edges[at, 1]
-        ends = [a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)]
-        result = np.stack(ends, 1)
+        result = np.stack([a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)], 1)
         if self.inside is None:
             return result
         middle, beside = result.mean(1), _BESIDE * _normals(result)

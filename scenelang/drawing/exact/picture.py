@@ -121,8 +121,7 @@ def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
     enter, leave = view.enter[first], view.leave[first]
     t = np.minimum((enter + leave) / 2.0, enter + DEEP)
     out[4, inside] = field.at(o[:, inside] + t * d[:, inside]).owner
-    p = o[:, ray] + end[ray] * d[:, ray]
-    state, out[1:4, ray] = facing(field, p, d[:, ray])
+    state, out[1:4, ray] = facing(field, o[:, ray] + end[ray] * d[:, ray], d[:, ray])
     out[4, ray] = state.owner
     out[0] = np.where(end < np.inf, (forward @ d) * np.where(end < np.inf, end, 1.0), np.inf)
     return out

@@ -79,8 +79,7 @@ def ties(field: Field, trace: Trace, reach: float) -> Array:
         shown[:, at] |= tied[:, at] & mixed
         blended[:, at] |= mixed
         tied[:, at] |= joins & (abs(margin) < 2 * reach)
-    nested = any(met.turn.ending is not None for met in trace)
-    return tied & blended if nested else shown
+    return tied & blended if any(met.turn.ending is not None for met in trace) else shown
 
 
 def add_textures(
@@ -149,9 +148,7 @@ class Tile(Record, frozen=False):
 
 
 class Coverage:
-    """Asks a field for pixels, of ``count`` samples each; ``skip`` leaves out what is out of reach or proved
-    not to matter.
-    """
+    """Asks a field for pixels of ``count`` samples; ``skip`` leaves out what is out of reach or unseen."""
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True, count: int = 4) -> None:
         self.count, self.corner = count, CORNERS[count]

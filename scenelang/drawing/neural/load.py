@@ -134,8 +134,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
-    sizes = config["student"]["streaming"]
-    known = StreamingConfig(**{**sizes, "vector": WIDTH})
+    known = StreamingConfig(**{**config["student"]["streaming"], "vector": WIDTH})
     if manifest.sizes != ((known.resolution, known.resolution),):
         raise ModelError(f"a network for {known.resolution} pixels, which the manifest does not say")
     filters = known.filters(known.resolution)
