@@ -155,7 +155,7 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame", digits: int = 4, *, film: bool = True) -> Target:
-    """The target ``out``: a ``film`` if it may be one, a pattern or a folder of ``stem``s; or `TargetError`."""
+    """The target ``out``: a ``film`` if it may be, a pattern or a folder of ``stem``s; else `TargetError`."""
     path, folder = Path(out), out.endswith(("/", "\\"))
     if not film and not is_pattern(out) and not folder:
         if path.is_file() or (path.suffix and not path.is_dir()):
