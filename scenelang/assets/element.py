@@ -205,10 +205,9 @@ def read_group(
     if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:
         raise TensorError(f"group `{name}` is not a list of 1 to {MOST_PARTS} parts")
     group: list[Part] = []
+    needed, known = {"geometry", "place", "size"}, {*Part._fields}
     for fields in entry:
-        if not isinstance(fields, dict) or not {"geometry", "place", "size"} <= fields.keys() <= {
-            *Part._fields
-        }:
+        if not isinstance(fields, dict) or not needed <= fields.keys() <= known:
             raise TensorError(f"a part of group `{name}` has missing or unknown fields")
         part = Part(**{key: _frozen(value) for key, value in fields.items()})
         shape = geometries.get(part.geometry) if isinstance(part.geometry, str) else None
