@@ -93,9 +93,8 @@ class Font:
                 raise TensorError(f"a font with a damaged letter U+{code:04X}")
             if end > first:
                 name = name_of(chr(code))
-                self.glyphs[name] = Element(
-                    name, "outline", (end - first,), "plain", data[ROOM * first : ROOM * end], about
-                )
+                curves = data[ROOM * first : ROOM * end]
+                self.glyphs[name] = Element(name, "outline", (end - first,), "plain", curves, about)
             first = end
         if ROOM * first != len(data):
             raise TensorError("a font with curves of no letter")

@@ -50,9 +50,8 @@ class TensorFile(Record):
     def _array(self, name: str, tensor: Tensor, finite: bool) -> npt.NDArray[Any]:
         import numpy as np
 
-        flat: np.ndarray[Any, Any] = np.frombuffer(
-            self.body[tensor.first : tensor.last], _TYPES[tensor.type]
-        ).copy()
+        part = self.body[tensor.first : tensor.last]
+        flat: np.ndarray[Any, Any] = np.frombuffer(part, _TYPES[tensor.type]).copy()
         if tensor.type == "BOOL" and flat.view(np.uint8).max(initial=0) > 1:
             raise TensorError(f"tensor `{name}` holds what is neither true nor false")
         if finite and tensor.type.startswith("F") and not np.isfinite(flat).all():

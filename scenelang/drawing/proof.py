@@ -427,9 +427,8 @@ class Band:
     ) -> None:
         self._stream, self._behind, self._reach, self._along = stream, behind, stream.reach, along
         width, height = canvas
-        self._grid = grid = raster(
-            (along * width, along * height), range(along * rows.start, along * rows.stop), largest=SIDES[0]
-        )
+        finer = range(along * rows.start, along * rows.stop)
+        self._grid = grid = raster((along * width, along * height), finer, largest=SIDES[0])
         self._every = np.empty((2, grid.high // along, grid.wide // along, len(behind)))
         self._every[:] = behind
         self.shown = Interval(*self._every[:, : len(rows), :width])

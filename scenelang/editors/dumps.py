@@ -252,9 +252,8 @@ def program_table(program: Program) -> str:
     lines = [f"{head}, digest {program.digest()[:12]}"]
     lines += stage_text(program.stage)
     rows = [("row", "token", "object", "bounds", "place")]
-    for at, (name, token, bounds, place) in enumerate(
-        zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
-    ):
+    columns = zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
+    for at, (name, token, bounds, place) in enumerate(columns):
         x, y, *rest = (f"{v:.4g}" for v in bounds)
         box = f"[{x} {y}; {' '.join(rest)}]" if program.stage is None else f"({x} {y} {rest[0]}; {rest[1]})"
         where = "" if place is None else f"{place.file}:{place.line}:{place.column}"

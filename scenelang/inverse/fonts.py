@@ -246,9 +246,8 @@ def _kerning(
         uharfbuzz.shape(font, buffer, plain)
         own = np.zeros(len(asked), np.int64)
         infos = [(info.cluster, info.codepoint) for info in buffer.glyph_infos]
-        for (first, left), (second, right), place in zip(
-            infos, infos[1:], buffer.glyph_positions, strict=False
-        ):
+        neighbours = zip(infos, infos[1:], buffer.glyph_positions, strict=False)
+        for (first, left), (second, right), place in neighbours:
             k, odd = divmod(first, 2)
             if not odd and second == first + 1 and (left, right) == (glyphs[at], wanted[k]):
                 own[k] = place.x_advance - advance  # others join, or become other glyphs

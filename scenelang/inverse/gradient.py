@@ -132,9 +132,8 @@ class SoftPlane:
         leaves = [part.expand(shape).clone().requires_grad_() for part in each]
         leaves.append(still.behind.expand(3, count).clone().requires_grad_())
         shown = self._fold(*leaves)
-        by_distance, by_colour, by_width, by_clear, by_behind = torch.autograd.grad(
-            shown.sum(), leaves, materialize_grads=True
-        )
+        found = torch.autograd.grad(shown.sum(), leaves, materialize_grads=True)
+        by_distance, by_colour, by_width, by_clear, by_behind = found
         slopes = by_behind[..., None] * moving.behind[:, None]
         slopes += by_colour.swapaxes(1, 2) @ moving.colours.swapaxes(0, 1)
         slopes += by_width.swapaxes(1, 2) @ moving.widths
@@ -192,9 +191,8 @@ class SoftPlane:
                 given = torch.cat([given, torch.ones_like(given)], 1) * (1 - through)
                 if self.union[i]:
                     given = given + (0.5 - state * slope).clamp(0.0, 1.0) * through * colour
-            state, colour = self.network.update(
-                levels, candidate[i, :, 0] * own, bump[i, 0] / narrow, state, colour, given
-            )
+            wanted, lowered = candidate[i, :, 0] * own, bump[i, 0] / narrow
+            state, colour = self.network.update(levels, wanted, lowered, state, colour, given)
         coverage = (0.5 - state * slope).clamp(0.0, 1.0)
         hidden = coverage * colour[:, 1:] if self.clear else coverage
         shown: Tensor = (colour * coverage)[:, 0] + (1 - hidden[:, 0]) * behind

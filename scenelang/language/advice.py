@@ -147,9 +147,8 @@ def unknown_member(
         return
     else:
         names = exported.scope.names
-        known = [n for n, b in names.items() if b.kind in kinds] or [
-            n for n, b in names.items() if b.kind != "import"
-        ]
+        fitting = [n for n, b in names.items() if b.kind in kinds]
+        known = fitting or [n for n, b in names.items() if b.kind != "import"]
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:

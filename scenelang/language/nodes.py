@@ -705,9 +705,8 @@ class Chain(Frozen):
         given = super()._arranged(args, data)
         if isinstance(given.get("children"), list | tuple):
             nodes = (Object, Group, Boolean, Chain)
-            given["children"] = tuple(
-                Link("union", child) if isinstance(child, nodes) else child for child in given["children"]
-            )
+            links = (Link("union", at) if isinstance(at, nodes) else at for at in given["children"])
+            given["children"] = tuple(links)
         return given
 
     @field_validator("children")

@@ -181,9 +181,7 @@ FOLLOWED: Final = 80
 _WINDOW: Final = 8  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 
-_REPLACEMENTS: Final = [
-    (written, meant, float(cost)) for written, meant, cost in rows("recovery", "replacements")
-]
+_REPLACEMENTS: Final = [(old, new, float(cost)) for old, new, cost in rows("recovery", "replacements")]
 _CODES: Final = dict[str, str](rows("recovery", "codes"))
 _DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip

@@ -170,9 +170,8 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         ships = library.owns(Path(folder, file).resolve())
         means = ", which `python -m lab docs meshes` of the repository makes" if ships else ""
-        raise FitError(
-            f"{origin}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
-        )
+        advice = f"`--originals FOLDER` ({FOLDER}) says where it is{means}"
+        raise FitError(f"{origin}, which is not in `{folder}`; {advice}")
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
     if (shape := _shape(path, digest, element.about.get("sign") == "closed", part, *version)) is None:

@@ -103,10 +103,8 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
         alpha = 1.0 - (view.last != OPAQUE) * np.exp(-view.total)  # the share that objects hide
         result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         result[5, rows.start : rows.stop] = alpha.reshape(len(rows), side, width, side).mean((1, 3))
-    depth, normal, owner, alpha = result[0], np.moveaxis(result[1:4], 0, 2), result[4], result[5]
-    return Outputs(
-        depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
-    )
+    depth, normal = result[0].astype(np.float32), np.moveaxis(result[1:4], 0, 2).astype(np.float32)
+    return Outputs(depth, normal, result[4].astype(np.int32), result[5].astype(np.float32))
 
 
 def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
