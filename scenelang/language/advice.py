@@ -244,9 +244,6 @@ def report_problem(
     help, fix = problem.help, None
     if problem.fix and not library.holds(place.source):
         help, fix = problem_advice(problem, operand)
-    labels = [
-        Label(other.span, note)
-        for index, note in problem.notes.items()
-        if index < len(operands) and (other := operands[index]) is not None
-    ]
+    others = ((operands[index], note) for index, note in problem.notes.items() if index < len(operands))
+    labels = [Label(other.span, note) for other, note in others if other is not None]
     report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))

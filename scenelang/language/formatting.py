@@ -641,11 +641,8 @@ def format_text(text: str, *, name: str = "<text>") -> str:
 def _significant(tokens: Tokens) -> list[str]:
     """The texts of the tokens but for commas before a closing bracket, which make no difference."""
     texts = [tokens.source.text[s:e] for s, e in zip(tokens.starts, tokens.ends, strict=True)]
-    return [
-        word
-        for word, following in zip(texts, [*texts[1:], ""], strict=True)
-        if word != "," or following not in (")", "]")
-    ]
+    pairs = zip(texts, [*texts[1:], ""], strict=True)
+    return [word for word, following in pairs if word != "," or following not in (")", "]")]
 
 
 # ---------------------------------------------------------------- parts of a text

@@ -174,11 +174,8 @@ def mapped(pixels: Pixels, colours: Colours, dither: bool) -> npt.NDArray[np.uin
 
 def write_apng(film: Film, part: Path, progress: Progress) -> None:
     """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
-    shown = [
-        (file, piece)
-        for file, count in runs(film.files, [1] * len(film.files))
-        for piece in _pieces(count, film.fps)
-    ]
+    counted = runs(film.files, [1] * len(film.files))
+    shown = [(file, piece) for file, count in counted for piece in _pieces(count, film.fps)]
     with part.open("wb") as out:
         out.write(SIGNATURE)
         sequence, before, last = 0, None, None
