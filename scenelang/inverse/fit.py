@@ -50,10 +50,8 @@ def problems_of(
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
         return FitProblem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
 
-    result = [
-        compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
-        for at, side in enumerate([side for side in SIDES if side < short] + [short])
-    ]
+    sides = enumerate([*(side for side in SIDES if side < short), short])
+    result = [compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True) for at, side in sides]
     return result if solid else [*result, compared(short, "adaptive", 1, False)]
 
 

@@ -218,10 +218,8 @@ def _kinds(names: str) -> tuple[int, ...]:
 @cache
 def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
     """Insertions to try: the tokens, the cost, and the token that has to follow if that matters."""
-    return [
-        (_kinds(names), float(cost), _kinds("".join(needed)))
-        for names, cost, *needed in rows("recovery", "insertions")
-    ]
+    known = rows("recovery", "insertions")
+    return [(_kinds(names), float(cost), _kinds("".join(needed))) for names, cost, *needed in known]
 
 
 class Recovery:

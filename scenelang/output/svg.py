@@ -395,10 +395,8 @@ class Inks:
             stops = np.concatenate([stops, np.stack(between, 1)])
             stops = stops[np.argsort(stops[:, 0], kind="stable")]
         shown = stepped(whole.xp, stops[:, 1:].T.astype(np.float32), texture.steps).T
-        listed = "".join(
-            f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>'
-            for at, rgb in zip(stops[:, 0], shown, strict=True)
-        )
+        pairs = zip(stops[:, 0], shown, strict=True)
+        listed = "".join(f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>' for at, rgb in pairs)
         ends = 'x1="-1" x2="1"' if gradient.name == "linear" else 'cx="0" cy="0" r="1"'
         form = f'id="%s" gradientUnits="userSpaceOnUse" {ends} gradientTransform="matrix({moved})"'
         return f"<{gradient.name}Gradient {form}>{listed}</{gradient.name}Gradient>"

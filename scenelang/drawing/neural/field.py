@@ -320,10 +320,8 @@ class Field:
             old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
             if turn.ending is None:
                 rows, d, own = pairs.object[which], features[..., which], colours[:, which]
-                cell, lies = (
-                    Cell(*(part[..., which] for part in every)),
-                    over if over is None else over[which],
-                )
+                cell = Cell(*(part[..., which] for part in every))
+                lies = over if over is None else over[which]
             else:  # groups that end join as objects
                 top = xp.array(turn.ending, self.like)
                 ended, rows = xp.take(stack, top), count + which
