@@ -380,7 +380,10 @@ class Stream:
             if name in self.unknown:
                 length = np.hypot(*p)
                 result = Interval(length - 1, length + 1)
-            result = Interval(*[leaf_distance(name, p)] * 2) if exactly else self._known[name].exact(p)
+            elif exactly:
+                result = Interval(*[leaf_distance(name, p)] * 2)
+            else:
+                result = self._known[name].exact(p)
             low[some], high[some] = result
         bare = Interval(low, high)
         return _worn(bare, *self._skins[:, which]) if self._skins.any() else bare
