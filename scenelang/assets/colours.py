@@ -54,8 +54,7 @@ def packed(name: str, colours: Grid, near: Mask, about: Facts, steps: int = 40) 
 def _around(near: Mask, apart: int) -> Mask:
     """Mask of every ``apart``-th node: true where a node of ``near`` is closer than that along each axis."""
     for axis in (0, 1, 2) if apart > 1 else ():
-        a = np.moveaxis(near, axis, 0)
-        padded = np.pad(a, [(apart - 1, apart - 1), (0, 0), (0, 0)])
+        padded = np.pad(np.moveaxis(near, axis, 0), [(apart - 1, apart - 1), (0, 0), (0, 0)])
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * apart - 1, axis=0)
         near = np.moveaxis(np.asarray(windows[::apart].any(-1)), 0, axis)
     return near

@@ -19,7 +19,6 @@ GRAIN: Final = 32767  # steps in a radius of an outline
 ROOM: Final = 12  # bytes of a curve
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
-
 Facts = dict[str, str | float]
 """Facts of an element from its maker: text and numbers by name."""
 
@@ -206,10 +205,9 @@ def read_group(
     if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:
         raise TensorError(f"group `{name}` is not a list of 1 to {MOST_PARTS} parts")
     group: list[Part] = []
+    needed, known = {"geometry", "place", "size"}, {*Part._fields}
     for fields in entry:
-        if not isinstance(fields, dict) or not {"geometry", "place", "size"} <= fields.keys() <= {
-            *Part._fields
-        }:
+        if not isinstance(fields, dict) or not needed <= fields.keys() <= known:
             raise TensorError(f"a part of group `{name}` has missing or unknown fields")
         part = Part(**{key: _frozen(value) for key, value in fields.items()})
         shape = geometries.get(part.geometry) if isinstance(part.geometry, str) else None

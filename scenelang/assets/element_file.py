@@ -184,11 +184,8 @@ def element_file_bytes(
     if font is not None:
         header |= {"format": 3, "font": {"about": font.about, "columns": font.columns}}
     text = json.dumps(header, sort_keys=True, separators=(",", ":"))
-    tensors = {
-        _TABLES[key] + element.name: np.frombuffer(element.data, np.uint8)
-        for key, table in tables.items()
-        for element in table.values()
-    }
+    listed = ((_TABLES[key] + e.name, e) for key, table in tables.items() for e in table.values())
+    tensors = {name: np.frombuffer(element.data, np.uint8) for name, element in listed}
     if font is not None:
         tensors |= {name: np.array(table) for name, table in font.tables.items()}
     data: bytes = save(tensors, metadata={"scenelang": text})

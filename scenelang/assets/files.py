@@ -122,8 +122,7 @@ def write_output(target: str | os.PathLike[str], data: bytes) -> None:
     """Write a file that a user named, through a link, device or pipe; otherwise as `write_whole`."""
     place = output_place(target)
     with _naming(target):
-        mode = _mode(os.stat, target)
-        if mode is None or stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+        if (mode := _mode(os.stat, target)) is None or stat.S_ISREG(mode) or stat.S_ISDIR(mode):
             _replace(place, data)
             return
         with open(target, "wb", buffering=0) as device:
@@ -186,8 +185,7 @@ def _mode(look: Callable[[Any], os.stat_result], path: str | os.PathLike[str]) -
 
 
 def _replace(place: Path, data: bytes, flush: bool = True) -> None:
-    mode = _mode(os.lstat, place)
-    if mode is not None and stat.S_ISDIR(mode):
+    if (mode := _mode(os.lstat, place)) is not None and stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if mode is not None and not stat.S_ISREG(mode):
         mode = None

@@ -93,9 +93,8 @@ class Font:
                 raise TensorError(f"a font with a damaged letter U+{code:04X}")
             if end > first:
                 name = name_of(chr(code))
-                self.glyphs[name] = Element(
-                    name, "outline", (end - first,), "plain", data[ROOM * first : ROOM * end], about
-                )
+                curves = data[ROOM * first : ROOM * end]
+                self.glyphs[name] = Element(name, "outline", (end - first,), "plain", curves, about)
             first = end
         if ROOM * first != len(data):
             raise TensorError("a font with curves of no letter")
@@ -138,8 +137,7 @@ def read_font(columns: int, about: Facts, tensors: Mapping[str, Tensor], body: m
     """The font of a file of tensors; raises `TensorError`."""
     tables: dict[str, Any] = {}
     for name, (kind, code) in TENSORS.items():
-        tensor = tensors.get(name)
-        if tensor is None or tensor.type != kind or len(tensor.shape) != 1:
+        if (tensor := tensors.get(name)) is None or tensor.type != kind or len(tensor.shape) != 1:
             raise TensorError(f"a font without its table `{name}`")
         table = array(code, bytes(body[tensor.first : tensor.last]))
         if sys.byteorder == "big":

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-
 _SEQUENCE, _FRAME, _BEGIN = b"\x0a", b"\x32", b"\x12\x00"  # headers of units that tell their size
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from scenelang.assets.files import read_json
+from scenelang.assets.records import Record
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
-
 
 FORMAT: Final = 1
 MOST_HEADER: Final = 1 << 20
@@ -27,8 +26,7 @@ class TensorError(ValueError):
     """A damaged or foreign file of tensors; the message says where."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tensor:
+class Tensor(Record):
     """One tensor of a file."""
 
     type: str  # as safetensors calls it, `F32`
@@ -38,8 +36,7 @@ class Tensor:
     last: int
 
 
-@dataclass(frozen=True, slots=True)
-class TensorFile:
+class TensorFile(Record):
     """A file whose layout was checked."""
 
     header: dict[str, Any]  # our own
@@ -53,9 +50,8 @@ class TensorFile:
     def _array(self, name: str, tensor: Tensor, finite: bool) -> npt.NDArray[Any]:
         import numpy as np
 
-        flat: np.ndarray[Any, Any] = np.frombuffer(
-            self.body[tensor.first : tensor.last], _TYPES[tensor.type]
-        ).copy()
+        part = self.body[tensor.first : tensor.last]
+        flat: np.ndarray[Any, Any] = np.frombuffer(part, _TYPES[tensor.type]).copy()
         if tensor.type == "BOOL" and flat.view(np.uint8).max(initial=0) > 1:
             raise TensorError(f"tensor `{name}` holds what is neither true nor false")
         if finite and tensor.type.startswith("F") and not np.isfinite(flat).all():

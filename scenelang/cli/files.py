@@ -48,9 +48,8 @@ def _walk(paths: Iterable[str], lost: list[OSError]) -> Iterator[str]:
             lost.append(error)
             continue
         shown = [entry for entry in shown if not (entry.name.startswith(".") or entry.is_symlink())]
-        yield from _walk(
-            [e.path for e in shown if e.is_dir() or (e.name.endswith(SCENE) and e.is_file())], lost
-        )
+        inner = [e.path for e in shown if e.is_dir() or (e.name.endswith(SCENE) and e.is_file())]
+        yield from _walk(inner, lost)
 
 
 def stem_of(name: str) -> str:

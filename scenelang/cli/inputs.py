@@ -80,8 +80,7 @@ def read_input(
     ``text`` is its text where that was read before. Raises `OSError` where it cannot be opened.
     """
     clock, result, frame = clock or Clock(), Input(name, how), request.frame or 0
-    text = text or read_text(name, result.diagnostics)
-    if text is None:
+    if (text := text or read_text(name, result.diagnostics)) is None:
         return result
     path, root = (None, ".") if name == STDIN else (name, None)
     source = replace(request.source, path=path, text=text, root=request.source.root or root)

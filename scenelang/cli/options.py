@@ -127,8 +127,7 @@ def several(*names: str, of: tuple[str, ...], help: str) -> Option:
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
     if value is None:
         return None
-    result = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)
-    if result is None:
+    if (result := re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", value)) is None:
         raise click.BadParameter(f"`{value}` is not a size such as 320x192", ctx, param)
     width, height = int(result[1]), int(result[2])
     if not (1 <= width <= 8192 and 1 <= height <= 8192):
@@ -164,13 +163,9 @@ def _originals(ctx: click.Context, param: click.Parameter, value: str | None) ->
 
 
 define = click.option(
-    "-D",
-    "defines",
-    multiple=True,
-    metavar="NAME=VALUE",
-    callback=assignments,
+    "-D", "defines", multiple=True, metavar="NAME=VALUE", callback=assignments,
     help="Set a param of the scene; may be given several times.",
-)
+)  # fmt: skip
 model = click.option("--model", metavar="NAME", help="Use this model instead of the scene's.")
 _FOLDER = click.Path(exists=True, file_okay=False)
 root = click.option("--root", type=_FOLDER, help="Folder that imports cannot leave; by default the scene's.")
@@ -186,14 +181,10 @@ color = choice(
 )
 strict = click.option("--strict", is_flag=True, help="Count warnings as errors.")
 originals = click.option(
-    "--originals",
-    type=_FOLDER,
-    metavar="FOLDER",
-    expose_value=False,
-    callback=_originals,
+    "--originals", type=_FOLDER, metavar="FOLDER", expose_value=False, callback=_originals,
     help="Folder with the files that elements were made from, which exact pictures need; by "
     "default that of the elements.",
-)
+)  # fmt: skip
 jobs = count(
     "--jobs", high=256, help="Processes that draw frames; by default one, and more where that is faster."
 )

@@ -37,15 +37,12 @@ def wants_color(stream: IO[Any], choice: str = "auto") -> bool:
 
 def width_of(stream: IO[Any]) -> int:
     """Cells of a line: the terminal's, or enough for most where there is none."""
-    if not stream.isatty():
-        return WIDTH
-    return shutil.get_terminal_size((WIDTH, 24)).columns
+    return WIDTH if not stream.isatty() else shutil.get_terminal_size((WIDTH, 24)).columns
 
 
 def say_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics for people, with carets, to standard error."""
-    text = render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr))
-    if text:
+    if text := render_text(diagnostics, wants_color(sys.stderr), width=width_of(sys.stderr)):
         click.echo(text, err=True, nl=False, color=True)
 
 

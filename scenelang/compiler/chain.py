@@ -146,9 +146,8 @@ def split_levels(steps: Sequence[Step], limits: Mapping[str, int], space: Space 
         return Levels(tuple(first[:inside]), IDENTITY, tuple(first[inside:]), last, skin)
     second = runs[1]
     if len(maps) > 2 or (len(maps) == 2 and runs[2]):
-        raise LevelsError(
-            f"{len(maps)} affine maps with deformations between them, at most one between and one after fit"
-        )
+        fact = f"{len(maps)} affine maps with deformations between them"
+        raise LevelsError(f"{fact}, at most one between and one after fit")
     while taken(first) > most_inner and (turn := space.after(maps[0], first[-1])) is not None:
         second.insert(0, turn)
         first.pop()

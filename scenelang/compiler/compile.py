@@ -58,8 +58,7 @@ def compile_scene(
         from scenelang.language.evaluation import opened
 
         scene, spans = opened(scene, result)
-    manifest = find_model(scene, result, model=model, spans=spans)
-    if manifest is not None:
+    if (manifest := find_model(scene, result, model=model, spans=spans)) is not None:
         graph = check_scene(scene, spans, result, manifest, after, without, memory)
     if manifest is None or result.errors:
         raise SceneError(result)

@@ -89,6 +89,7 @@ def _sectored(
 
 
 _SIDE: Final = 1 / math.sqrt(2)  # half of a square's
+_CORNERS: Final = (_SIDE, _SIDE), (-_SIDE, _SIDE), (-_SIDE, -_SIDE), (_SIDE, -_SIDE)
 _UP: Final = math.pi / 2
 _TINY: Final = 1e-12  # least length that something is divided by
 
@@ -232,13 +233,7 @@ def _octahedron_slopes(p: Points) -> tuple[Array, ...]:
 
 
 GEOMETRIES: Final[dict[str, Geometry]] = {
-    "square": _sectored(
-        4,
-        math.pi / 4,
-        math.cos(math.pi / 4),
-        _SIDE,
-        ((_SIDE, _SIDE), (-_SIDE, _SIDE), (-_SIDE, -_SIDE), (_SIDE, -_SIDE)),
-    ),
+    "square": _sectored(4, math.pi / 4, math.cos(math.pi / 4), _SIDE, _CORNERS),
     "triangle": _sectored(3, _UP, math.cos(math.pi / 3), 0.5),
     "star": _sectored(5, _UP, 0.381966),
     "pentagon": _sectored(5, _UP, math.cos(math.pi / 5)),

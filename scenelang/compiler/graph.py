@@ -434,8 +434,7 @@ def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | Non
     folds = [(graph.root, 0)]
     while folds:
         fold, depth = folds.pop()
-        fault = _fold_fault(fold, depth, holds) or _moves_fault(fold.moves, checked)
-        if fault is not None:
+        if (fault := _fold_fault(fold, depth, holds) or _moves_fault(fold.moves, checked)) is not None:
             return fault
         for link in fold.links:
             node = link.node
@@ -443,8 +442,7 @@ def _fault(graph: Graph, holds: frozenset[Invariant], sound: Sound) -> str | Non
                 folds.append((node, depth + 1))
             elif leaves.get(id(node)) is not node:
                 leaves[id(node)] = node
-                fault = node.noted(checked, lambda leaf: _leaf_fault(leaf, checked))
-                if fault is not None:
+                if (fault := node.noted(checked, lambda leaf: _leaf_fault(leaf, checked))) is not None:
                     return fault
     return None
 

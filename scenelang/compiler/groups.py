@@ -74,9 +74,7 @@ def token_fault(tokens: npt.NDArray[np.int8]) -> str | None:
         if bad.any():
             row = int(np.argmax(bad))
             return f"token {int(wide[row])} of object {row} {what}"
-    if open_groups[-1] > ends[-1]:
-        return "a group that does not end"
-    return None
+    return "a group that does not end" if open_groups[-1] > ends[-1] else None
 
 
 def read_groups(tokens: npt.NDArray[np.int8]) -> Groups:

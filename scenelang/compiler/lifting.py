@@ -25,13 +25,14 @@ not learned (docs/architecture.md says why).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.compiler.chain import Levels, slots
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
 
@@ -44,9 +45,7 @@ Array = Any  # numpy array or torch tensor
 
 
 class Parts(NamedTuple):
-    """Parts of vectors (…, 64), each (…, its size), but ``width``, ``clear`` and what follows ``material``
-    (…,).
-    """
+    """Parts of vectors (…, 64), each (…, size), but ``width``, ``clear`` and all behind ``material`` (…,)."""
 
     code: Array
     one: Array
@@ -185,8 +184,7 @@ GEOMETRY_INPUTS = {"affine": 16, "twirl": 1, "bend": 1}
 MATERIAL_INPUTS = {"color": 3}
 
 
-@dataclass(frozen=True, slots=True)
-class Lifting:
+class Lifting(Record):
     """A model's codes of geometries (G, d_g) and materials (K, d_m), in the manifest's order, and encoders.
 
     All is float64. An encoder, of a kind of transformation, is three layers: weight (out, in), bias (out,).

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final
 
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.gradient import Gradient
+from scenelang.assets.records import Record
 from scenelang.compiler import graph, steps
 from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
@@ -64,7 +65,6 @@ def step_of(transform: schema.Transform | schema.Flip, space: Space) -> Step | R
 ROUGHNESS: Final = 0.3  # of what reflects, where it is not written
 MAX_OBJECTS = 100_000
 MAX_DEPTH = 1_000  # nested nodes of a Scene. Text cannot come near it; a Scene built in Python can
-
 
 Spans = SpanMap
 Leaves = dict[int, tuple[schema.Object, schema.Material | None, Leaf]]
@@ -130,8 +130,7 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
 Composite = Scene | schema.Group | schema.Boolean | schema.Chain
 
 
-@dataclass(slots=True)
-class _OpenComposite:
+class _OpenComposite(Record, frozen=False):
     """A composite whose children are being lowered, and the operator that joins it to what came before."""
 
     op: Combine
@@ -157,8 +156,7 @@ def _width(node: schema.Boolean | schema.Link) -> float:
     return 0.0 if node.k is None or (node.op == "smooth" and node.k == words.BLEND) else node.k
 
 
-@dataclass(slots=True)
-class _Lowering:
+class _Lowering(Record, frozen=False):
     manifest: Manifest
     space: Space
     spans: Spans | None
@@ -178,8 +176,7 @@ class _Lowering:
         self.origin = scene if scene.model else None
         while True:
             here = stack[-1]
-            item = next(here.todo, None)
-            if item is None:
+            if (item := next(here.todo, None)) is None:
                 stack.pop()
                 if isinstance(here.node, Scene):
                     return Fold("scene", tuple(here.links))
@@ -268,8 +265,7 @@ class _Lowering:
         return tuple(result)
 
     def look(self, material: schema.Material) -> Look:
-        known = self.looks.get(id(material))
-        if known is not None:
+        if (known := self.looks.get(id(material))) is not None:
             return known
         name, manifest = material.name, self.manifest
         element: Element | Gradient | None = None
@@ -390,8 +386,7 @@ class _Lowering:
         self, code: str, message: str, node: object, help: str | None = None, labels: tuple[Label, ...] = ()
     ) -> None:
         """Add a diagnostic; without a place each message is said once."""
-        span = self.place(node)
-        if span is None:
+        if (span := self.place(node)) is None:
             if (code, message) in self.said:
                 return
             self.said.add((code, message))

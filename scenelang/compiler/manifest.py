@@ -96,8 +96,7 @@ class Manifest:
 
     def flip(self) -> float:
         """Mean FLIP on the scenes of its set, 1 where it was not measured."""
-        value = self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0)
-        return float(value)
+        return float(self.measured.get("sets", {}).get(self.set, {}).get("flip", 1.0))
 
 
 MANIFEST: Final = "manifest.json"
@@ -124,8 +123,7 @@ def load_manifest(name: str) -> Manifest:
     path = ROOT / name / MANIFEST
     stat = path.stat()
     stamp = stat.st_mtime_ns, stat.st_size, stat.st_ino
-    known = _READ.get(path)
-    if known is None or known[0] != stamp:
+    if (known := _READ.get(path)) is None or known[0] != stamp:
         result = Manifest.from_json(path.read_bytes())
         if result.name != name:
             raise ValueError(f"the manifest of `{name}` calls itself `{result.name}`")

@@ -47,9 +47,7 @@ _GRADED: Final = {-1: "linear", -2: "radial"}
 
 
 class Paint(NamedTuple):
-    """A gradient or an element, a picture or colours of space, and `STEPS` on its colours, clamped to [0, 1]
-    after each.
-    """
+    """A gradient, a picture or colours of space, and `STEPS` on its colours, each clamped to [0, 1]."""
 
     element: Element | Gradient
     steps: tuple[ColourStep, ...] = ()
@@ -86,8 +84,7 @@ def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, .
         graded = Gradient(_GRADED[at], tuple(stops.pop(row, ()))) if at in _GRADED else None
         if not (graded or 0 <= at < len(elements)) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
             raise TensorError("a paint of an element or of steps that are not listed")
-        own = rows[first : first + count]
-        named = [(kinds[int(kind)], *numbers) for kind, *numbers in own]
+        named = [(kinds[int(kind)], *numbers) for kind, *numbers in rows[first : first + count]]
         result.append(Paint(graded or elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
         first += count
     if first != len(rows):
@@ -220,10 +217,8 @@ class Program:
         if self.elements:
             settings = (*settings, *[element and element.digest for element in self.brought()])
         if self.palette:
-            settings = (
-                *settings,
-                *[paint and (paint.element.digest, paint.steps) for paint in self.paints()],
-            )
+            worn = [paint and (paint.element.digest, paint.steps) for paint in self.paints()]
+            settings = (*settings, *worn)
         if self.samples != 4:
             settings = (*settings, "samples", self.samples)
         total = hashlib.sha256(repr(settings).encode())
@@ -246,8 +241,7 @@ class Program:
         """True where it has groups, or cuts with a width, as chains of sharp cuts and blends do not."""
         if (self.tokens > OPERATOR).any():
             return True
-        layout = self._layout()
-        if layout is None:
+        if (layout := self._layout()) is None:
             return False
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
@@ -276,10 +270,8 @@ class Program:
     def check_weights(self, digest: str) -> None:
         """Raise ProgramError where it was compiled for other weights than those of a digest."""
         if self.weights != digest:
-            raise ProgramError(
-                f"the program was compiled for weights {self.weights[:12]}… of model `{self.model}`, "
-                f"these are {digest[:12]}…: compile the scene again"
-            )
+            fact = f"weights {self.weights[:12]}… of model `{self.model}`, these are {digest[:12]}…"
+            raise ProgramError(f"the program was compiled for {fact}: compile the scene again")
 
     def save(self, path: str | Path) -> None:
         """Write to a file, whole or not at all, equal bytes for equal Programs; raises OSError."""
@@ -295,26 +287,15 @@ def program_bytes(program: Program) -> bytes:
     of_geometry = {name: index for index, name in enumerate(geometries)}
     of_file = {name: index for index, name in enumerate(files)}
     places = [(-1,) * 5 if place is None else (of_file[place.file], *place[1:]) for place in program.places]
-    header: dict[str, Any] = {
-        "background": program.background,
-        "canvas": program.canvas,
-        "files": files,
-        "format": FORMAT,
-        "geometries": geometries,
-        "model": program.model,
-        "weights": program.weights,
-    }
+    header = {name: getattr(program, name) for name in ("background", "canvas", "model", "weights")}
+    header |= {"files": files, "format": FORMAT, "geometries": geometries}
     if program.stage is not None:
         header["stage"] = stage_data(program.stage)
     if program.elements:
         header |= {"format": 2, "elements": [[e.name, entry_of(e)] for e in program.elements]}
-    tensors: dict[str, npt.NDArray[Any]] = {
-        "vectors": program.vectors,
-        "tokens": program.tokens,
-        "bounds": program.bounds,
-        "objects": np.array([of_geometry[name] for name in program.objects], dtype=np.int32),
-        "places": np.array(places, dtype=np.int32).reshape(len(program), 5),
-    }
+    tensors = {name: getattr(program, name) for name in ("vectors", "tokens", "bounds")}
+    tensors["objects"] = np.array([of_geometry[name] for name in program.objects], dtype=np.int32)
+    tensors["places"] = np.array(places, dtype=np.int32).reshape(len(program), 5)
     if program.numbers != tuple(range(1, len(program) + 1)):
         tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
     if program.elements and program.forms is not None:
@@ -412,29 +393,14 @@ _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
 MOST_PROGRAM_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
 MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
 
-_LAYOUT: dict[str, tuple[str, tuple[int, ...]]] = {
-    "vectors": ("F32", (WIDTH,)),
-    "tokens": ("I8", ()),
-    "bounds": ("F32", (4,)),
-    "objects": ("I32", ()),
-    "places": ("I32", (5,)),
-}
+_Columns = dict[str, tuple[str, tuple[int, ...]]]  # kinds of numbers, and the sides of each row
+_LAYOUT: _Columns = {"vectors": ("F32", (WIDTH,)), "tokens": ("I8", ()), "bounds": ("F32", (4,))}
+_LAYOUT |= {"objects": ("I32", ()), "places": ("I32", (5,))}
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
-_TABLES: dict[str, tuple[str, tuple[int, ...]]] = {
-    "paints": ("I32", (2,)),
-    "steps": ("F32", (4,)),
-    "stops": ("F32", (5,)),
-}
+_TABLES: _Columns = {"paints": ("I32", (2,)), "steps": ("F32", (4,)), "stops": ("F32", (5,))}
 _PAINTS = {"paints", "steps"}
-_HEADER: dict[str, Any] = {
-    "background": list | None,
-    "canvas": list,
-    "files": list,
-    "format": int,
-    "geometries": list,
-    "model": str,
-    "weights": str,
-}
+_HEADER: dict[str, Any] = {"background": list | None, "format": int, "model": str, "weights": str}
+_HEADER |= dict.fromkeys(("canvas", "files", "geometries"), list)
 
 
 def load_program(path: str | Path, *, weights: str | None = None) -> Program:
@@ -465,9 +431,8 @@ def parse_program(data: bytes) -> Program:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
     newer = {"samples"} if header["format"] == NEWEST else set()
-    if header.keys() - {"stage", "elements", *newer} != _HEADER.keys() or not all(
-        isinstance(header[k], _HEADER[k]) for k in _HEADER
-    ):
+    complete = header.keys() - {"stage", "elements", *newer} == _HEADER.keys()
+    if not complete or not all(isinstance(header[k], _HEADER[k]) for k in _HEADER):
         raise ProgramError("the header has missing, unknown or damaged fields")
     geometries, files = header["geometries"], header["files"]
     if not all(isinstance(name, str) for name in (*geometries, *files)):

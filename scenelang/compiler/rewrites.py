@@ -61,8 +61,7 @@ def drop_empty(graph: Graph, context: Context) -> Graph:
     """
 
     def fold(node: Fold, children: list[Node | None]) -> Node | None:
-        links = _linked(node, children, context)
-        if not links:
+        if not (links := _linked(node, children, context)):
             return None
         if len(links) > 1:
             return Fold(node.kind, tuple(links), node.moves, node.span)
@@ -185,8 +184,7 @@ def drop_hidden(graph: Graph, context: Context) -> Graph:
 
 def cover_of(leaf: Leaf, space: Space) -> Cover | None:
     """A disc or ball that lies within a leaf, where one is known."""
-    disc = space.disc(leaf.geometry, leaf.steps)
-    if disc is None:
+    if (disc := space.disc(leaf.geometry, leaf.steps)) is None:
         return None
     radius, inward = disc
     return radius * space.stretches(composed(leaf.steps))[0], inward, radius * _INSIDE
@@ -305,8 +303,7 @@ def fold_looks(graph: Graph, context: Context) -> Graph:
     folded: dict[int, Look] = {}
 
     def change(leaf: Leaf) -> Leaf:
-        look = folded.get(id(leaf.look))
-        if look is None:
+        if (look := folded.get(id(leaf.look))) is None:
             look = folded[id(leaf.look)] = leaf.look.folded()
         return leaf if look is leaf.look else leaf.changed(look, leaf.moves)
 

@@ -21,7 +21,6 @@ turns each point by an angle that is bounded over any sector about the origin, i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
 from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
@@ -47,7 +46,6 @@ from scenelang.language.nodes import LAMPS, MOST, camera_fault, light_fault
 
 if TYPE_CHECKING:
     from scenelang.language.scene import Scene
-
 
 Triple = tuple[float, float, float]
 
@@ -354,8 +352,7 @@ class Space:
             return None if shift else Twist(sign * along * turn.twist)
         if turn.twirl and (shift or abs(abs(along) - scale) > near):
             return None
-        bend = turn.bend[0]
-        if bend and abs(b) > near:
+        if (bend := turn.bend[0]) and abs(b) > near:
             return None
         return type(turn)(sign * scale * turn.twirl, (sign * a * bend, 0.0)) if not turn.bend[1] else None
 
@@ -478,8 +475,7 @@ class Plane(Space):
 
     def before(self, rows: Rows, turn: Turn) -> Turn | None:
         """A warp for similarities about the origin; `scenelang.compiler.chain.normal` has the proof."""
-        alike = _similarity(rows)
-        if alike is None or not isinstance(turn, Warp):
+        if (alike := _similarity(rows)) is None or not isinstance(turn, Warp):
             return None
         scale, sign = alike
         x, y = turn.bend
@@ -503,9 +499,8 @@ class Plane(Space):
             return _grown((x - wide, y - high, x + wide, y + high))
         across = [a * p + b * q for p, q in row.corners]
         along = [c * p + d * q for p, q in row.corners]
-        return _grown(
-            (x + min(across) - wide, y + min(along) - high, x + max(across) + wide, y + max(along) + high)
-        )
+        low = x + min(across) - wide, y + min(along) - high
+        return _grown((*low, x + max(across) + wide, y + max(along) + high))
 
     def bound(self, geometry: str, steps: Sequence[Step], level: float) -> tuple[float, float, float, float]:
         return self.box(geometry, steps, level)[:4]
@@ -545,8 +540,7 @@ def _grown(box: tuple[float, float, float, float]) -> Box:
     return grown if grown[0] < grown[2] and grown[1] < grown[3] else EVERYWHERE
 
 
-@dataclass(slots=True)
-class _Sector:
+class _Sector(Record, frozen=False):
     """Points about the origin: radii ``near``..``far``, angles ``first``..``last`` (a full turn: all)."""
 
     near: float
@@ -613,12 +607,8 @@ def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, 
         sector = sector.turned(step)
     a, b, x = pending[0], pending[1], pending[3]
     c, d, y = pending[4], pending[5], pending[7]
-    return (
-        x - sector.furthest(-a, -b),
-        y - sector.furthest(-c, -d),
-        x + sector.furthest(a, b),
-        y + sector.furthest(c, d),
-    )
+    low = x - sector.furthest(-a, -b), y - sector.furthest(-c, -d)
+    return *low, x + sector.furthest(a, b), y + sector.furthest(c, d)
 
 
 PLANE: Final = Plane()

@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from scenelang.assets.files import read_regular, reason
+from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError, read_tensors
 from scenelang.compiler.manifest import MANIFEST, ROOT, Manifest, load_manifest, model_folder
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from scenelang.compiler.lifting import Lifting
-
 
 MOST_BYTES = 64 << 20
 REPLACED: Final = ROOT / "replaced"
@@ -31,8 +31,7 @@ class ModelError(Exception):
     """A model's files are missing, damaged or do not fit its manifest."""
 
 
-@dataclass(frozen=True, slots=True)
-class Codes:
+class Codes(Record):
     """The learned codes that a Program carries, by names of leaves and materials.
 
     Geometries have 4 numbers, materials 12, or 2 in space; of a learned lifting these are whole vectors.

@@ -26,7 +26,6 @@ from scenelang.drawing.solid.norms import Norms
 if TYPE_CHECKING:
     from scenelang.compiler.program import Program
 
-
 SHARP = 1e6  # per world unit: gates of the plane's cell open within a millionth
 
 

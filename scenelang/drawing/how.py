@@ -106,7 +106,6 @@ HELP: Final = {
     "one, with hard edges, or one for each 2 x 2 pixels; or so many near outlines, whatever the scene says.",
 }  # The line of `--help` for each field of `How`
 
-
 KEEP_BYTES = 256 << 20
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 
@@ -136,6 +135,4 @@ def threads_for(canvas: tuple[int, int]) -> int:
 
 def usable_cores() -> int:
     """Cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -30,7 +30,6 @@ from scenelang.language.diagnostics import listing, plural
 if TYPE_CHECKING:
     import PIL.Image
 
-
 Output = Literal["depth", "normal", "object", "alpha", "proof"]
 PLANE: tuple[Output, ...] = ("object", "alpha")  # Outputs of 2D pictures
 DEEP = 0.01  # World units in a medium where its object is asked for, where it is as deep
@@ -316,9 +315,7 @@ class Image(np.ndarray[Any, np.dtype[np.float32]]):
         return {name: both[..., at] for at, name in enumerate("RGBA"[: both.shape[2]])}
 
     def _repr_png_(self) -> bytes | None:
-        if self.ndim != 3 or self.shape[2] not in (3, 4):
-            return None
-        return self.encode()
+        return None if self.ndim != 3 or self.shape[2] not in (3, 4) else self.encode()
 
 
 def packed(image: Image, outputs: Outputs, path: Path) -> dict[Path, bytes]:
@@ -349,8 +346,7 @@ def image_format(path: str | os.PathLike[str]) -> str:
     pillow.preinit()  # the common formats; loading all takes as long as loading Pillow
     if pillow.EXTENSION.get(suffix) not in pillow.SAVE:
         pillow.init()
-    kind = pillow.EXTENSION.get(suffix)
-    if kind is None or kind not in pillow.SAVE:
+    if (kind := pillow.EXTENSION.get(suffix)) is None or kind not in pillow.SAVE:
         raise ValueError(f"no image format has the suffix `{suffix}`")
     return kind
 

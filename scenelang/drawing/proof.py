@@ -79,9 +79,7 @@ class WrittenObject(NamedTuple):
         return TAME + _misplaced(self.steps, min(reach, _seen(self.steps, far)))
 
     def mispainted(self, reach: float, far: float) -> tuple[float, float]:
-        """Distance by which (u, v) of a texture may be off there, and a channel of its colours, apart from
-        hard edges.
-        """
+        """How far (u, v) of a texture may be off there, and a channel of its colours, hard edges apart."""
         if (element := self.look.element) is None:
             return 0.0, 0.0
         reach = min(reach, _seen(self.steps, far))
@@ -391,9 +389,7 @@ class Stream:
         return _worn(bare, *self._skins[:, which]) if self._skins.any() else bare
 
     def colour(self, which: Index, q: Floats, sampled: bool) -> Interval:
-        """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or in regions about them, which
-        textures vary in.
-        """
+        """Colours (3 or 4, P), as of `State`, of objects at leaf coordinates, or of textures around them."""
         low, high = self._plain[:, which], self._plain[:, which]
         for at in np.unique(which[self._painted[which]]).tolist():
             some, look = which == at, self._leaves[at].look
@@ -434,9 +430,8 @@ class Band:
     ) -> None:
         self._stream, self._behind, self._reach, self._along = stream, behind, stream.reach, along
         width, height = canvas
-        self._grid = grid = raster(
-            (along * width, along * height), range(along * rows.start, along * rows.stop), largest=SIDES[0]
-        )
+        finer = range(along * rows.start, along * rows.stop)
+        self._grid = grid = raster((along * width, along * height), finer, largest=SIDES[0])
         self._every = np.empty((2, grid.high // along, grid.wide // along, len(behind)))
         self._every[:] = behind
         self.shown = Interval(*self._every[:, : len(rows), :width])

@@ -255,9 +255,7 @@ def outputs_of(
     if not wanted:
         return Outputs()
     drawn = how.sampled(drawn)
-    if isinstance(drawn, Scene):
-        return _exact(drawn, wanted, spans)
-    return _neural(drawn, wanted, how)
+    return _exact(drawn, wanted, spans) if isinstance(drawn, Scene) else _neural(drawn, wanted, how)
 
 
 def _neural(program: Program, wanted: Sequence[Output], how: How) -> Outputs:

@@ -74,7 +74,6 @@ _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Shares of that for other ways to sample."""
 
-
 Drawer = tuple[Literal["numpy", "torch"], str]
 """The library that draws a picture, and the reason in words."""
 

@@ -143,8 +143,7 @@ def colours(document: Document) -> list[types.ColorInformation]:
                 for arg, param in zip(node.args, params, strict=False):
                     if (arg.name.text if arg.name else param) in COLOURS:
                         wanted.add(id(arg.value))
-            rgb = _colour(node, id(node) in wanted)
-            if rgb is not None:
+            if (rgb := _colour(node, id(node) in wanted)) is not None:
                 place = document.lines.span(node.span)
                 result.append(types.ColorInformation(place, types.Color(*rgb, 1.0)))
     result.sort(key=lambda c: (c.range.start.line, c.range.start.character))
@@ -465,8 +464,7 @@ class _Maker:
         return Proposal(symbol.name, _KINDS[symbol.kind][2], text, rank, word.head, word.text, snippet)
 
     def _expressions(self) -> Iterator[Proposal]:
-        callee = find_callee(self.docs, self.document, self.cursor)
-        if callee is not None:
+        if (callee := find_callee(self.docs, self.document, self.cursor)) is not None:
             yield from self._arguments(callee)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind != "module":
@@ -483,8 +481,7 @@ class _Maker:
         call = self.cursor.call
         assert call is not None
         positional = callee is not words.TRANSFORMS["shear"]
-        name = call.named
-        if name is None:
+        if (name := call.named) is None:
             start = self.cursor.before[-1] in ("(", ",")
             left = callee.params[call.index :] if positional else callee.params
             for param in left if start else ():
@@ -534,8 +531,7 @@ class _Maker:
                 yield Proposal(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
             if element.size is not None and not worn:
                 yield Proposal(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
-        library = self.docs.imported(self.document, symbol.node.path.value)
-        if library is None:
+        if (library := self.docs.imported(self.document, symbol.node.path.value)) is None:
             return
         for known in library.names.exported():
             if not statement or known.kind in ("module", "let"):

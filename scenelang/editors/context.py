@@ -169,8 +169,7 @@ _MAX_SHOWN: Final = 200
 
 def find_callee(docs: Workspace, document: Document, cursor: Cursor) -> Word | None:
     """The callee of the call around the cursor; None where there is none or it is unknown."""
-    call = cursor.call
-    if call is None:
+    if (call := cursor.call) is None:
         return None
     result = find_symbol(docs, document, call.name, call.start)
     alias, _, rest = call.name.partition(".")
@@ -256,8 +255,7 @@ def comment_above(symbol: Symbol) -> str:
     start = text.rfind("\n", 0, span.start) + 1
     while start:
         above = text.rfind("\n", 0, start - 1) + 1
-        match = _LINE.match(text[above : start - 1].rstrip("\r"))
-        if match is None:
+        if (match := _LINE.match(text[above : start - 1].rstrip("\r"))) is None:
             break
         result.insert(0, match[1].strip())
         start = above

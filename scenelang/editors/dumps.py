@@ -199,19 +199,14 @@ def graph_data(graph: Graph) -> dict[str, Any]:
 def _node(node: Node) -> dict[str, Any]:
     moves = [_move(move) for move in node.moves]
     if isinstance(node, Leaf):
-        look: dict[str, Any] = {
-            "geometry": node.geometry,
-            "material": node.look.shading,
-            "rgb": list(node.look.colour()),
-        }
+        look: dict[str, Any] = {"geometry": node.geometry, "material": node.look.shading}
+        look["rgb"] = list(node.look.colour())
         look |= {n: numbers if len(numbers) > 1 else numbers[0] for n, *numbers in _properties(node.look)}
         if (element := node.look.element) is not None:
             rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
         return {"kind": "leaf", **look, "moves": moves}
-    links = [
-        {"op": link.op, **({"k": link.k} if link.k else {}), "node": _node(link.node)} for link in node.links
-    ]
+    links = [{"op": one.op, **({"k": one.k} if one.k else {}), "node": _node(one.node)} for one in node.links]
     return {"kind": node.kind, "moves": moves, "links": links}
 
 
@@ -257,9 +252,8 @@ def program_table(program: Program) -> str:
     lines = [f"{head}, digest {program.digest()[:12]}"]
     lines += stage_text(program.stage)
     rows = [("row", "token", "object", "bounds", "place")]
-    for at, (name, token, bounds, place) in enumerate(
-        zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
-    ):
+    columns = zip(program.objects, token_names(program), program.bounds.tolist(), program.places, strict=True)
+    for at, (name, token, bounds, place) in enumerate(columns):
         x, y, *rest = (f"{v:.4g}" for v in bounds)
         box = f"[{x} {y}; {' '.join(rest)}]" if program.stage is None else f"({x} {y} {rest[0]}; {rest[1]})"
         where = "" if place is None else f"{place.file}:{place.line}:{place.column}"
@@ -289,8 +283,7 @@ def changes(before: str, after: str, old: str, new: str) -> str:
     if max(gone, come) > 3000:
         counts = f"{plural(gone, 'line')} became {come:,}"
         return f"--- {old}\n+++ {new}\n@@ from line {start + 1:,}: {counts} @@\n"
-    lines = difflib.unified_diff(a, b, old, new, lineterm="")
-    return "\n".join(lines) + "\n"
+    return "\n".join(difflib.unified_diff(a, b, old, new, lineterm="")) + "\n"
 
 
 MOST_BOXES: Final = 200
@@ -377,9 +370,8 @@ def draw_graph(graph: Graph, most: int = MOST_BOXES) -> list[Box]:
         rgb = hex_text(graph.space.written(node.look.colour()))
         return Box((node.geometry, *texture, *moves), rgb, leaf=True), []
 
-    return _draw_tree(
-        ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage)), links(graph.root), look, most
-    )
+    head = ("scene {} x {}".format(*graph.canvas), *stage_text(graph.stage))
+    return _draw_tree(head, links(graph.root), look, most)
 
 
 def draw_program(program: Program, most: int = MOST_BOXES) -> list[Box]:

@@ -36,8 +36,7 @@ def hover(
     docs: Workspace, document: Document, offset: int, picture: Callable[[Element], str] = lambda element: ""
 ) -> types.Hover | None:
     """The hover at an offset; ``picture`` gives an element's picture in Markdown."""
-    use = document.names.at(offset)
-    if use is not None:
+    if (use := document.names.at(offset)) is not None:
         text = _elements(docs, document, use, picture) or _use(docs, document, use)
         return _answer(document, use.start, use.end, text) if text else None
     for node in reversed(path_to(document.file, offset)):
@@ -63,8 +62,7 @@ def _word(word: words.Word) -> str:
 
 
 def _use(docs: Workspace, document: Document, use: Use) -> str | None:
-    result = docs.definition(document, use)
-    if result is not None:
+    if (result := docs.definition(document, use)) is not None:
         return _definition(document, *result)
     text = use.text
     match use.role:
@@ -135,8 +133,7 @@ def _definition(document: Document, where: Document, symbol: Symbol) -> str:
 
 def seen_at(document: Document, where: Document, start: int, end: int) -> Seen | None:
     """Values of a place in a document's last check; None where it has been edited since."""
-    checked = document.checked
-    if checked is None:
+    if (checked := document.checked) is None:
         return None
     if where is document:
         old_start, old_end = document.before(start), document.before(end)

@@ -25,8 +25,7 @@ class RenameRefused(Exception):
 
 def definition(docs: Workspace, document: Document, offset: int) -> types.Location | None:
     """The definition of the name at an offset; for an import's path the file."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return None
     if use.role == "path":
         library = docs.imported(document, use.text)
@@ -53,8 +52,7 @@ def references(docs: Workspace, document: Document, offset: int, declaration: bo
 
 def highlights(docs: Workspace, document: Document, offset: int) -> list[types.DocumentHighlight]:
     """The uses in this file of the definition that the name at an offset means."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return []
     result = docs.definition(document, use)
 
@@ -72,11 +70,9 @@ def highlights(docs: Workspace, document: Document, offset: int) -> list[types.D
 
 def prepare_rename(docs: Workspace, document: Document, offset: int) -> types.PrepareRenamePlaceholder | None:
     """The name at an offset; raises `RenameRefused` where it belongs to the language or to a model."""
-    use = document.names.at(offset)
-    if use is None:
+    if (use := document.names.at(offset)) is None:
         return None
-    result = docs.definition(document, use)
-    if result is None:
+    if (result := docs.definition(document, use)) is None:
         raise RenameRefused(f"`{use.text}` is not defined in a scene file")
     _check_owner(result[0], use)
     return types.PrepareRenamePlaceholder(document.lines.range(use.start, use.end), use.text)
@@ -113,9 +109,8 @@ def rename(
     if not versioned:
         return types.WorkspaceEdit(changes=edits)
     name, versions = types.OptionalVersionedTextDocumentIdentifier, {d.uri: d.version for d, _ in places}
-    return types.WorkspaceEdit(
-        document_changes=[types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
-    )
+    changes = [types.TextDocumentEdit(name(uri, versions[uri]), edits[uri]) for uri in edits]
+    return types.WorkspaceEdit(document_changes=changes)
 
 
 def _check_owner(where: Document, use: Use) -> None:
@@ -146,8 +141,7 @@ def _check_captures(docs: Workspace, where: Document, symbol: Symbol, new: str) 
             continue
         if not scope.start <= use.start < scope.end:
             continue
-        inner = where.names.scope_at(use.start)
-        meant = inner.find(new)
+        meant = where.names.scope_at(use.start).find(new)
         if meant is None or not (scope.start <= meant.scope.start and meant.scope.end <= scope.end):
             line = where.lines.position(use.start).line + 1
             raise RenameRefused(f"`{new}` in line {line} of {where.name} would mean this")
@@ -157,8 +151,7 @@ def links(docs: Workspace, document: Document) -> list[types.DocumentLink]:
     """Links of imports whose files there are."""
     result = []
     for path in (stmt.path for stmt in document.file.statements if isinstance(stmt, tree.Import)):
-        library = docs.imported(document, path.value)
-        if library is not None and library.path is not None:
+        if (library := docs.imported(document, path.value)) is not None and library.path is not None:
             place = document.lines.range(path.span.start + 1, max(path.span.end - 1, 0))
             result.append(types.DocumentLink(place, uri_of(library.path), tooltip=str(library.path)))
     return result
@@ -183,8 +176,7 @@ def symbols(document: Document, statements: Iterable[tree.Stmt]) -> Iterator[typ
         word = ""
         if isinstance(stmt, tree.Combined):
             word, stmt = f"{stmt.op} ", stmt.child
-        entry = _entry(stmt)
-        if entry is None:
+        if (entry := _entry(stmt)) is None:
             continue
         name, kind, selection, inner, detail = entry
         yield types.DocumentSymbol(
@@ -275,8 +267,7 @@ def folding(document: Document) -> list[types.FoldingRange]:
 def selection(document: Document, offset: int) -> types.SelectionRange:
     """The nodes around an offset, innermost first, each within the next."""
     spans = [(0, len(document.text)), *((n.span.start, n.span.end) for n in path_to(document.file, offset))]
-    use = document.names.at(offset)
-    if use is not None:
+    if (use := document.names.at(offset)) is not None:
         spans.append((use.start, use.end))
     result: types.SelectionRange | None = None
     last = (-1, -1)

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from difflib import SequenceMatcher
 from functools import cache
 from importlib.metadata import version
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
@@ -141,9 +142,7 @@ def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeActi
 def text_edits(document: Document, text: str) -> list[types.TextEdit]:
     """Few small edits that make the text ``text``, so that cursors and folds stay where they are."""
     old, new = document.text.splitlines(keepends=True), text.splitlines(keepends=True)
-    starts = [0]
-    for line in old:
-        starts.append(starts[-1] + len(line))
+    starts = [*accumulate(map(len, old), initial=0)]
     edit = difference(old, new)
     head, inner_old, inner_new = edit.start, old[edit.start : edit.old_end], new[edit.start : edit.new_end]
     if len(inner_old) + len(inner_new) > _MOST_LINES:
@@ -235,9 +234,8 @@ class Server(LanguageServer):
         """Send all current diagnostics: those of syntax, and those of the last check, moved."""
         result = [*document.syntax, *document.semantic]
         shown = [d for d in (to_diagnostic(item, document) for item in result) if d is not None]
-        self.text_document_publish_diagnostics(
-            types.PublishDiagnosticsParams(document.uri, shown, document.version)
-        )
+        params = types.PublishDiagnosticsParams(document.uri, shown, document.version)
+        self.text_document_publish_diagnostics(params)
 
     def schedule(self, document: Document, delay_s: float | None = None) -> None:
         """Check a document once nothing has changed for a while."""
@@ -255,8 +253,7 @@ class Server(LanguageServer):
 
     def _start(self, uri: str) -> None:
         self._timers.pop(uri, None)
-        document = self.docs.open.get(uri)
-        if document is None:
+        if (document := self.docs.open.get(uri)) is None:
             return
         stop = self._running[uri] = threading.Event()
         loop = asyncio.get_running_loop()
@@ -331,8 +328,7 @@ def _opened(server: Server, params: types.DidOpenTextDocumentParams) -> None:
 
 
 def _changed(server: Server, params: types.DidChangeTextDocumentParams) -> None:
-    document = server.docs.open.get(params.text_document.uri)
-    if document is None:
+    if (document := server.docs.open.get(params.text_document.uri)) is None:
         log.warning("change of a document that is not open: %s", params.text_document.uri)
         return
     for change in params.content_changes:
@@ -469,8 +465,7 @@ _OPTIONS: Final = {
 def _answer(server: Server, method: str, params: Any) -> Any:
     if method in _SESSION:
         return _SESSION[method](server, params)
-    document = server.docs.get(params.text_document.uri)
-    if document is None:
+    if (document := server.docs.get(params.text_document.uri)) is None:
         return [] if method in _LISTS else None
     if method in _AT_PLACE:
         return _AT_PLACE[method](server, document, document.lines.offset(params.position))

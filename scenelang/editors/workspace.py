@@ -40,8 +40,7 @@ Encoding = Literal["utf-8", "utf-16", "utf-32"]
 _NEWLINE: Final = re.compile(r"\r\n|\n|\r")
 
 
-@dataclass(frozen=True)
-class TextChange:
+class TextChange(Record):
     """``old[start:old_end]`` became ``new[start:new_end]``; offsets in code points."""
 
     start: int
@@ -122,16 +121,14 @@ def width(text: str, encoding: Encoding) -> int:
 MAX_SEEN: Final = 4  # values and nodes that are recorded of one place
 
 
-@dataclass(slots=True)
-class Seen:
+class Seen(Record, frozen=False):
     """The first few values or nodes of one place in an evaluation, each once, and the number of all."""
 
     values: list[Any] = field(default_factory=list)
     count: int = 0
 
 
-@dataclass(slots=True)
-class Checked:
+class Checked(Record, frozen=False):
     """The result of a check."""
 
     source: SourceFile
@@ -282,7 +279,7 @@ class Document:
 
     def tokens_to(self, offset: int) -> Tokens:
         """The tokens up to the end of an offset's line."""
-        source = SourceFile(self.source.name, "") if self._is_too_long else self.source
+        source = SourceFile(self.source.name, "") if len(self.text) > MAX_TEXT else self.source
         stop = source.text.find("\n", offset)
         return scan(source, Report(source), stop if stop >= 0 else len(source.text))
 
@@ -291,13 +288,9 @@ class Document:
         """All syntax mistakes, in the order of the text."""
         return self._parsed[1]
 
-    @property
-    def _is_too_long(self) -> bool:
-        return len(self.text) > MAX_TEXT
-
     @cached_property
     def _parsed(self) -> tuple[tree.File, tuple[Diagnostic, ...]]:
-        if self._is_too_long:
+        if len(self.text) > MAX_TEXT:
             size = f"{MAX_TEXT // 1_000_000} MB"
             message = f"a text of more than {size}, which the language server does not read"
             help = "`scenelang check` does, up to 10 MB"
@@ -402,8 +395,7 @@ class Workspace:
         try:
             stat = path.stat()
             stamp = (stat.st_mtime_ns, stat.st_size)
-            known = self._closed.get(path)
-            if known is not None and known[0] == stamp:
+            if (known := self._closed.get(path)) is not None and known[0] == stamp:
                 return known[1]
             if not path.is_file():
                 return None
@@ -427,8 +419,7 @@ class Workspace:
             for path in map(Path.resolve, scenes_below(folder, MAX_FILES * 10)):
                 if path not in seen:
                     seen.add(path)
-                    document = self.by_path(path)
-                    if document is not None:
+                    if (document := self.by_path(path)) is not None:
                         yield document
 
     def imported(self, document: Document, text: str) -> Document | None:
@@ -479,10 +470,9 @@ class Workspace:
         others = (other for other in (self.known() if abroad else ()) if other.uri != document.uri)
         for other in chain((document,), others):
             for use in other.names.uses if symbol.name in other.text else ():
-                if use.text == symbol.name and (other is document or use.role in ("member", "argument")):
-                    target = self.definition(other, use)
-                    if target is not None and target[1] is symbol:
-                        yield other, use
+                near = use.text == symbol.name and (other is document or use.role in ("member", "argument"))
+                if near and (target := self.definition(other, use)) is not None and target[1] is symbol:
+                    yield other, use
 
 
 def scenes_below(folder: Path, most: int) -> Iterator[Path]:

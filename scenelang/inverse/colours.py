@@ -59,9 +59,8 @@ def fit_colours(
         report(side, len(element.data), error)
         if best is not None and len(element.data) > MOST_BYTES:
             break
-        best = Element(
-            name, "colours", element.sizes, element.coding, element.data, {**(about or {}), "error": error}
-        )
+        said = {**(about or {}), "error": error}
+        best = Element(name, "colours", element.sizes, element.coding, element.data, said)
         if error <= asked:
             break
     assert best is not None

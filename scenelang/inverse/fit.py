@@ -22,28 +22,8 @@ from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import UNCAPPED_DB
+from scenelang.inverse import search
 from scenelang.inverse.problem import LEVELS, FitProblem, Moment
-from scenelang.inverse.search import (
-    ALIKE,
-    NEAR,
-    STEPS,
-    WHITE,
-    Blur,
-    Found,
-    Given,
-    Matrix,
-    Picture,
-    Point,
-    Report,
-    SearchBox,
-    TargetPicture,
-    blurred,
-    central,
-    descend,
-    solve,
-    space_of,
-    target_of,
-)
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Axis, Source, literals_of, rewritten
 from scenelang.language.reports import SceneError
@@ -55,7 +35,10 @@ MOST_TARGETS: Final = 64
 
 
 def problems_of(
-    moments: Sequence[Moment], goals: Sequence[TargetPicture], space: SearchBox, canvas: tuple[int, int]
+    moments: Sequence[Moment],
+    goals: Sequence[search.TargetPicture],
+    space: search.SearchBox,
+    canvas: tuple[int, int],
 ) -> list[FitProblem]:
     """Comparisons of frames with their targets, from small to large; the last is of the final pictures."""
     values = space.values(space.point({}))
@@ -67,17 +50,14 @@ def problems_of(
         size = max(1, round(canvas[0] * side / min(canvas))), max(1, round(canvas[1] * side / min(canvas)))
         return FitProblem(moments, space, goals, size, light=solid, soft=soft, samples=samples, levels=levels)
 
-    result = [
-        compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True)
-        for at, side in enumerate([side for side in SIDES if side < short] + [short])
-    ]
+    sides = enumerate([*(side for side in SIDES if side < short), short])
+    result = [compared(side, "adaptive" if at else "four", max(1, LEVELS - at), True) for at, side in sides]
     return result if solid else [*result, compared(short, "adaptive", 1, False)]
 
 
 def _is_solid(moment: Moment, values: Mapping[str, Any], canvas: tuple[int, int]) -> bool:
     """Return whether a scene is of solids; raises `FitError` where its pictures cannot be compared."""
-    program = moment.program(values, canvas)
-    if program is None:
+    if (program := moment.program(values, canvas)) is None:
         raise SceneError(moment.trouble)
     manifest = load_manifest(program.model)
     if manifest.renderer not in ("framed", "solid"):
@@ -93,58 +73,58 @@ ENOUGH: Final = 1e-6  # least relative gain of a step; small, as most of the err
 class Lens:
     """Blur of a target, fitted with the values as one more number of the search of the last size."""
 
-    def __init__(self, problem: FitProblem, space: SearchBox, until: float) -> None:
+    def __init__(self, problem: FitProblem, space: search.SearchBox, until: float) -> None:
         self.problem, self.space, self.until = problem, space, until
         self.finer = problem.finer()
-        self._last: tuple[Found, Found, Blur] | None = None
+        self._last: tuple[search.Found, search.Found, search.Blur] | None = None
 
-    def followed(self, place: Found) -> tuple[Found, Blur]:
+    def followed(self, place: search.Found) -> tuple[search.Found, search.Blur]:
         """The place after a descent with blurred pictures, and the blur; the same place where none helps."""
         if self._last is None or self._last[0] is not place:
             self._last = place, *self._follow(place, (True, False))
         return self._last[1:]
 
-    def noise(self, place: Found) -> bool:
+    def noise(self, place: search.Found) -> bool:
         """Return whether the remaining difference is like noise, once the blur is taken into account."""
         result, blur = self.followed(place)
         return self.problem.noise(result.point, blur)
 
-    def ended(self, places: Sequence[Found]) -> tuple[list[Found], Blur]:
+    def ended(self, places: Sequence[search.Found]) -> tuple[list[search.Found], search.Blur]:
         """Descend again from the places of a search, best first, with the blur of the first, if any."""
         first, blur = self.followed(places[0])
         if not blur.sigma:
             return list(places), blur
-        near = (one for one in places[1:] if one.cost <= ALIKE * places[0].cost)
+        near = (one for one in places[1:] if one.cost <= search.ALIKE * places[0].cost)
         others = [self._follow(one, (blur.light,))[0] for one in near]
         return [first, *sorted(others, key=lambda one: one.cost)], blur
 
-    def _follow(self, place: Found, ways: Sequence[bool]) -> tuple[Found, Blur]:
-        pictures = None if place.cost <= NEAR else self.problem.pictures(place.point)
+    def _follow(self, place: search.Found, ways: Sequence[bool]) -> tuple[search.Found, search.Blur]:
+        pictures = None if place.cost <= search.NEAR else self.problem.pictures(place.point)
         sigma = 0.0 if pictures is None else self.problem.blur(pictures)
-        best = place, Blur()
+        best = place, search.Blur()
         if not sigma:
             return best
-        wide = SearchBox(self.space.knobs, Axis("blur", 0.0, WIDEST))
+        wide = search.SearchBox(self.space.knobs, Axis("blur", 0.0, WIDEST))
         start = np.append(place.point, sigma / WIDEST)
         for light in ways:
             if time.monotonic() > self.until:
                 break
             residuals = partial(self._residuals, light)
-            result = descend(residuals, wide, start, step=STEPS[-1], enough=ENOUGH)
+            result = search.descend(residuals, wide, start, step=search.STEPS[-1], enough=ENOUGH)
             if result is not None and result.cost < best[0].cost:
                 way = place.way + tuple(u[:-1] for u in result.way)
-                ended = Found(result.point[:-1], result.cost, way)
-                best = ended, Blur(WIDEST * float(result.point[-1]), light)
+                ended = search.Found(result.point[:-1], result.cost, way)
+                best = ended, search.Blur(WIDEST * float(result.point[-1]), light)
         return best
 
-    def _residuals(self, light: bool, u: Point) -> Point | None:
+    def _residuals(self, light: bool, u: search.Point) -> search.Point | None:
         """Residuals at a point whose last number is the blur, as a share of `WIDEST`."""
         drawn = self.finer if light else self.problem
-        result, blur = drawn.pictures(u[:-1]), Blur(WIDEST * float(u[-1]), light)
+        result, blur = drawn.pictures(u[:-1]), search.Blur(WIDEST * float(u[-1]), light)
         if result is None:
             return None
         times = drawn.canvas[0] // self.problem.canvas[0]
-        return self.problem.residuals([blurred(one, blur, times) for one in result])
+        return self.problem.residuals([search.blurred(one, blur, times) for one in result])
 
 
 TIED: Final = 0.9  # correlation from which two numbers explain each other
@@ -172,7 +152,7 @@ class Fit:
     text: str = field(repr=False)  # the scene with the values as defaults; comments and layout stay
     values: dict[str, str]  # as text of the language, by param
     psnr: float  # of the picture of ``text`` to the target in dB, over pixels that count; at most 100
-    blur: Blur  # estimated blur of the target
+    blur: search.Blur  # estimated blur of the target
     blurred_psnr: float  # PSNR of the picture after the same blur
     start_psnr: float  # PSNR of the picture before the search
     size: tuple[int, int]  # width and height of the pictures that were compared
@@ -203,9 +183,7 @@ class Fit:
             said = ""
             if shares and not any(map(math.isnan, shares)):
                 most = max(shares)
-                said = (
-                    "  not seen" if math.isinf(most) else f"  ± {most:.2%} of its range changes it by 1/255"
-                )
+                said = f"  ± {most:.2%} of its range changes it by 1/255" if most < math.inf else "  not seen"
             lines.append(f"  {name} = {text}{said}")
         lines += [f"`{a}` and `{b}` explain each other here (correlation {r:.2f})" for a, b, r in self.tied]
         for other in self.others:
@@ -220,7 +198,9 @@ class Fit:
         return np.concatenate([parts[0], gap, parts[1], gap, parts[2]], 1).view(Image)
 
 
-def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[FittedNumber, ...]:
+def numbers_of(
+    space: search.SearchBox, u: search.Point, slopes: search.Matrix | None
+) -> tuple[FittedNumber, ...]:
     """Value and sensitivity of each continuous axis."""
     result = []
     for at in np.flatnonzero(space.smooth).tolist():
@@ -232,7 +212,7 @@ def numbers_of(space: SearchBox, u: Point, slopes: Matrix | None) -> tuple[Fitte
     return tuple(result)
 
 
-def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float], ...]:
+def ties(space: search.SearchBox, slopes: search.Matrix | None) -> tuple[tuple[str, str, float], ...]:
     """Pairs of axes whose effects on the picture are correlated, and the correlation."""
     if slopes is None:
         return ()
@@ -250,12 +230,12 @@ def ties(space: SearchBox, slopes: Matrix | None) -> tuple[tuple[str, str, float
 
 
 def hindrances(
-    space: SearchBox,
-    u: Point,
+    space: search.SearchBox,
+    u: search.Point,
     numbers: Sequence[FittedNumber],
     psnr: float,
     done: bool,
-    worst: tuple[str, Matrix],
+    worst: tuple[str, search.Matrix],
     noise: bool,
 ) -> tuple[str, ...]:
     """Reasons why the picture is no nearer; ``worst`` and ``noise`` are those of `FitProblem`."""
@@ -288,20 +268,20 @@ NEAREST_DB: Final = 45.0  # pictures this near count as alike however they diffe
 
 def fit(
     scene: str | os.PathLike[str] | SourceFile,
-    target: Given | Mapping[int, Given],
+    target: search.Given | Mapping[int, search.Given],
     *,
     params: Iterable[str] = (),
     start: Mapping[str, Any] | None = None,
     fixed: Mapping[str, Any] | None = None,
-    mask: Given | None = None,
+    mask: search.Given | None = None,
     crop: tuple[int, int, int, int] | None = None,
-    background: tuple[float, float, float] = WHITE,
+    background: tuple[float, float, float] = search.WHITE,
     model: str | None = None,
     root: str | os.PathLike[str] | None = None,
     frame: int = 0,
     seed: int = 0,
     budget_s: float = 300.0,
-    progress: Report = lambda what, done, count: None,
+    progress: search.Report = lambda what, done, count: None,
 ) -> Fit:
     """Find the values of params whose picture comes nearest to a target: ``fit("a.nsg", "a.png")``.
 
@@ -339,18 +319,20 @@ def fit(
         raise FitError(f"{len(targets):,} targets, where 1 to {MOST_TARGETS} are compared")
     moments = [Moment(source, number) for number in sorted(targets)]
     evaluation, first_scene = moments[0].evaluated(start)
-    space = space_of(evaluation, params, fixed)
+    space = search.space_of(evaluation, params, fixed)
     for name in start:
         if all(name != knob.name for knob in space.knobs):
             raise FitError(f"a start for `{name}`, which is not among the params to find")
     goals = [
-        target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
+        search.target_of(targets[each.frame], first_scene.canvas, mask=mask, crop=crop, under=background)
         for each in moments
     ]
     problems, first = problems_of(moments, goals, space, first_scene.canvas), space.point({})
     last = problems[-1]
     lens = Lens(last, space, until)
-    places, done = solve(problems, space, first, seed=seed, until=until, noise=lens.noise, report=progress)
+    places, done = search.solve(
+        problems, space, first, seed=seed, until=until, noise=lens.noise, report=progress
+    )
     if not places:
         raise FitError("no values that were tried give a picture")
     places, blur = lens.ended(places)
@@ -360,12 +342,12 @@ def fit(
     before = last.pictures(first)
     if after is None:
         raise FitError("the scene with the values that were found has no picture")
-    soft = [blurred(one, blur) for one in after]
+    soft = [search.blurred(one, blur) for one in after]
     soft_db = _db(last, soft)
-    step = 2 * STEPS[min(len(problems), len(STEPS)) - 1]
-    slopes = central(last.pixels, space, best, step, space.smooth)
+    step = 2 * search.STEPS[min(len(problems), len(search.STEPS)) - 1]
+    slopes = search.central(last.pixels, space, best, step, space.smooth)
     numbers = numbers_of(space, best, slopes)
-    alike = max(ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
+    alike = max(search.ALIKE * places[0].cost, 10 ** (-NEAREST_DB / 10))
     return Fit(
         text=text,
         values=every[0],
@@ -378,9 +360,7 @@ def fit(
         notes=hindrances(space, best, numbers, soft_db, done, last.worst(soft), last.noise(best, blur)),
         numbers=numbers,
         tied=ties(space, slopes),
-        others=tuple(
-            literals for place, literals in zip(places[1:], every[1:], strict=True) if place.cost <= alike
-        ),
+        others=tuple(own for place, own in zip(places[1:], every[1:], strict=True) if place.cost <= alike),
         frames=sum(problem.frames for problem in (*problems, lens.finer)),
         before=_image(after if before is None else before),
         after=_image(after),
@@ -389,18 +369,18 @@ def fit(
     )
 
 
-def _scenes(moment: Moment, space: SearchBox, way: Sequence[Point]) -> Iterator[Scene]:
+def _scenes(moment: Moment, space: search.SearchBox, way: Sequence[search.Point]) -> Iterator[Scene]:
     for u in way:
         with suppress(SceneError):
             yield moment.evaluated(space.values(u))[1]
 
 
-def _db(problem: FitProblem, pictures: Sequence[Picture]) -> float:
+def _db(problem: FitProblem, pictures: Sequence[search.Picture]) -> float:
     """PSNR over the pixels that count."""
     off = problem.residuals(pictures)
     error = float(off @ off)
     return UNCAPPED_DB if error <= 0 else min(UNCAPPED_DB, -10 * math.log10(error))
 
 
-def _image(pictures: Sequence[Picture]) -> Image:
+def _image(pictures: Sequence[search.Picture]) -> Image:
     return np.concatenate(pictures).astype(np.float32).view(Image)

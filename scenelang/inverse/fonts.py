@@ -66,8 +66,7 @@ def read_font(
     left_out, count = list[str](), 0
     for code, glyph in sorted(held.items()):
         advance = font.get_glyph_h_advance(glyph) / face.upem
-        curves = _contours(font, glyph) / face.upem
-        disc, outline = _outline(curves)
+        disc, outline = _outline(_contours(font, glyph) / face.upem)
         if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _closed(outline):
             left_out.append(f"U+{code:04X}")
             continue
@@ -95,8 +94,7 @@ def ranges_of(text: str) -> list[range]:
     """Code points of ranges as style sheets have them: ``U+20-7E, U+2190-2193``; raises `ValueError`."""
     result = []
     for part in text.replace(" ", "").split(","):
-        match = re.fullmatch(r"[Uu]\+([0-9A-Fa-f]{1,6})(?:-([0-9A-Fa-f]{1,6}))?", part)
-        if match is None:
+        if (match := re.fullmatch(r"[Uu]\+([0-9A-Fa-f]{1,6})(?:-([0-9A-Fa-f]{1,6}))?", part)) is None:
             raise ValueError(f"`{part[:40]}` is not a range of letters such as U+20-7E")
         result.append(range(int(match[1], 16), int(match[2] or match[1], 16) + 1))
     return result
@@ -248,9 +246,8 @@ def _kerning(
         uharfbuzz.shape(font, buffer, plain)
         own = np.zeros(len(asked), np.int64)
         infos = [(info.cluster, info.codepoint) for info in buffer.glyph_infos]
-        for (first, left), (second, right), place in zip(
-            infos, infos[1:], buffer.glyph_positions, strict=False
-        ):
+        neighbours = zip(infos, infos[1:], buffer.glyph_positions, strict=False)
+        for (first, left), (second, right), place in neighbours:
             k, odd = divmod(first, 2)
             if not odd and second == first + 1 and (left, right) == (glyphs[at], wanted[k]):
                 own[k] = place.x_advance - advance  # others join, or become other glyphs

@@ -132,9 +132,8 @@ class SoftPlane:
         leaves = [part.expand(shape).clone().requires_grad_() for part in each]
         leaves.append(still.behind.expand(3, count).clone().requires_grad_())
         shown = self._fold(*leaves)
-        by_distance, by_colour, by_width, by_clear, by_behind = torch.autograd.grad(
-            shown.sum(), leaves, materialize_grads=True
-        )
+        found = torch.autograd.grad(shown.sum(), leaves, materialize_grads=True)
+        by_distance, by_colour, by_width, by_clear, by_behind = found
         slopes = by_behind[..., None] * moving.behind[:, None]
         slopes += by_colour.swapaxes(1, 2) @ moving.colours.swapaxes(0, 1)
         slopes += by_width.swapaxes(1, 2) @ moving.widths
@@ -178,9 +177,7 @@ class SoftPlane:
         return d * _scale(*maps)
 
     def _fold(self, d: Tensor, colours: Tensor, widths: Tensor, clear: Tensor, behind: Tensor) -> Tensor:
-        """Channels (3, M) of points, by distances, colours, widths and 1 - opacities (3, N, M) and what is
-        behind (3, M).
-        """
+        """Channels (3, M) of points by distances, colours, widths, 1 - opacities (3, N, M) and ``behind``."""
         lines, bias, candidate, bump = self.cell
         state = d.new_full((3, 1, d.shape[2]), EMPTY * self.widest / BLEND)
         colour = torch.zeros_like(torch.cat([state] * (1 + self.clear), 1))  # and coverage behind it
@@ -194,9 +191,8 @@ class SoftPlane:
                 given = torch.cat([given, torch.ones_like(given)], 1) * (1 - through)
                 if self.union[i]:
                     given = given + (0.5 - state * slope).clamp(0.0, 1.0) * through * colour
-            state, colour = self.network.update(
-                levels, candidate[i, :, 0] * own, bump[i, 0] / narrow, state, colour, given
-            )
+            wanted, lowered = candidate[i, :, 0] * own, bump[i, 0] / narrow
+            state, colour = self.network.update(levels, wanted, lowered, state, colour, given)
         coverage = (0.5 - state * slope).clamp(0.0, 1.0)
         hidden = coverage * colour[:, 1:] if self.clear else coverage
         shown: Tensor = (colour * coverage)[:, 0] + (1 - hidden[:, 0]) * behind
@@ -294,8 +290,7 @@ class Rates:
             moved = u.copy()
             moved[axes] += way * np.where((u[axes] + way * STEP > 1.0) & ~self.space.wraps[axes], -STEP, STEP)
             end = self.space.inside(moved)
-            program = self.program(end)
-            if program is not None and alike(here, program):
+            if (program := self.program(end)) is not None and alike(here, program):
                 width = end - self.space.inside(u)
                 change = numbers_of(program) - base
                 return change, np.where(self.space.wraps, (width + 0.5) % 1.0 - 0.5, width)

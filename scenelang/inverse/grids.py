@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from scenelang.assets.element import MOST_SIDE, Element, Facts
 from scenelang.assets.pyramid import Grid, finest, packed, refine, unpacked
+from scenelang.assets.records import Record
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.mesh import Points
 from scenelang.drawing.exact.originals import Shape
@@ -75,8 +76,7 @@ class Rung(NamedTuple):
     thin: float  # share of the surface with no inside of the grid, or of the shape, within a cell
 
 
-@dataclass(slots=True)
-class _Pyramid:
+class _Pyramid(Record, frozen=False):
     """A pyramid as far as it has grown."""
 
     cells: int
@@ -142,9 +142,7 @@ def fit(
     best: tuple[Rung, Element] | None = None
     tried: list[Rung] = []
     ended = "steps"
-    while best is None or (
-        len(tried) < steps if steps is not None else time.monotonic() - started < budget_s
-    ):
+    while best is None or (time.monotonic() - started < budget_s if steps is None else len(tried) < steps):
         pyramid = min(growing, key=lambda p: p.next_side)
         if pyramid.next_side > MOST_SIDE[shape.dimension]:
             ended = "largest grid"

@@ -171,18 +171,14 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
             f"1 in 100 {rung.worst:.4f}  normals {rung.normal_deg:.1f}°"
         )
 
+    def grown(side: int, share: float) -> None:
+        job.tell("progress", f"{name}, {side} a side", share, 1.0)
+
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     centre = [f"{x:.6g}" for x in shape.centre]
     job.say(f"{name}: {name}_size is {shape.size:.6g}, the file's ({', '.join(centre)}) is the origin")
     job = job._replace(about=job.about | {"size": shape.size, "centre": " ".join(centre)})
-    element, tried = fit(
-        shape,
-        name,
-        max_error=asked,
-        report=report,
-        progress=lambda side, share: job.tell("progress", f"{name}, {side} a side", share, 1.0),
-        **job.terms,
-    )
+    element, tried = fit(shape, name, max_error=asked, report=report, progress=grown, **job.terms)
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
     if element.about["ended"] == "time":
@@ -199,15 +195,10 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
 
 
 def _colours(shape: Mesh, name: str, job: _Job) -> Element:
-    element = fit_colours(
-        shape,
-        name,
-        max_error=job.options.color_error,
-        report=lambda side, size, error: job.say(
-            f"  {side:>4} a side {size:>8,} bytes  colours off by {error:.4f}"
-        ),
-        **job.terms,
-    )
+    def report(side: int, size: int, error: float) -> None:
+        job.say(f"  {side:>4} a side {size:>8,} bytes  colours off by {error:.4f}")
+
+    element = fit_colours(shape, name, max_error=job.options.color_error, report=report, **job.terms)
     shown = f"{element.sides[-1]} colours a side, {len(element.data):,} bytes"
     job.say(f"{name}: {shown}, off by {element.about['error']:.4f}")
     return element

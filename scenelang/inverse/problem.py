@@ -63,8 +63,7 @@ class Moment(Record, frozen=False):
     def program(self, values: Mapping[str, Any], canvas: tuple[int, int]) -> Program | None:
         """Compile the scene of values for a canvas; None where it has errors, which `trouble` then holds."""
         try:
-            scene = self.evaluated(values)[1]
-            return compile_scene(scene.sized(canvas))
+            return compile_scene(self.evaluated(values)[1].sized(canvas))
         except SceneError as error:
             self.trouble = error.diagnostics
             return None
@@ -157,10 +156,8 @@ class FitProblem:
         A few compilations and one soft picture of each frame give them, however many params there are.
         Elements, textures, trees, solids, and axes along which objects come or go are left to differences.
         """
-        rows, known = [], np.ones(len(u), bool)
-        for program, given, root in zip(
-            self.programs(u) if self.soft else (), self._rates, self.roots, strict=False
-        ):
+        rows, known, programs = [], np.ones(len(u), bool), self.programs(u) if self.soft else ()
+        for program, given, root in zip(programs, self._rates, self.roots, strict=False):
             if program is None or not len(program) or program.elements or program.palette or program.extended:
                 return None
             rates, axes = given.at(u, program)

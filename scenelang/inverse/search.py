@@ -212,8 +212,7 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
                 raise FitError(f"a file of more than {MOST_BYTES >> 20} MiB")
             with opened(data) as file:
                 kind = "RGBA" if file.has_transparency_data else "RGB"
-                values = ImageOps.exif_transpose(file).convert(kind)
-                return np.asarray(values, np.float64) / 255
+                return np.asarray(ImageOps.exif_transpose(file).convert(kind), np.float64) / 255
         except FitError as error:
             raise FitError(f"{os.fspath(picture)}: {error}") from None
     if picture.ndim != 3 or picture.shape[2] not in (3, 4):
@@ -224,7 +223,6 @@ def _read(picture: Given) -> npt.NDArray[np.floating]:
 Residuals = Callable[[Point], Point | None]
 Report = Callable[[str, int, int], None]
 Matrix = npt.NDArray[np.float64]
-
 
 MANY: Final = 6  # numbers from which on derivatives by reverse passes cost less than differences
 APART: Final = 0.02  # least distance of two solutions, in shares of a range
@@ -318,8 +316,7 @@ def descend(
     Differences take a ``step`` in shares of a range; ``fine`` ones are central: twice the pictures, but they
     follow a narrow valley that others lose. The first step of less relative gain than ``enough`` is the last.
     """
-    at = residuals(u)
-    if at is None:
+    if (at := residuals(u)) is None:
         return None
     cost, damping = float(at @ at), 1e-2
     way: list[Point] = []
@@ -342,8 +339,7 @@ def descend(
             move[free] = -np.linalg.solve(square + scale, pull[free])
             move *= min(1.0, 0.3 / max(1e-12, float(abs(move).max())))  # at most 0.3 of a range
             moved = space.inside(u + move)
-            there = residuals(moved)
-            if there is not None and (lower := float(there @ there)) < cost:
+            if (there := residuals(moved)) is not None and (lower := float(there @ there)) < cost:
                 way.append(u)
                 u, at, cost, damping = moved, there, lower, max(1e-6, damping / 5)
                 break

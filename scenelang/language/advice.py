@@ -147,9 +147,8 @@ def unknown_member(
         return
     else:
         names = exported.scope.names
-        known = [n for n, b in names.items() if b.kind in kinds] or [
-            n for n, b in names.items() if b.kind != "import"
-        ]
+        fitting = [n for n, b in names.items() if b.kind in kinds]
+        known = fitting or [n for n, b in names.items() if b.kind != "import"]
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
@@ -245,9 +244,6 @@ def report_problem(
     help, fix = problem.help, None
     if problem.fix and not library.holds(place.source):
         help, fix = problem_advice(problem, operand)
-    labels = [
-        Label(other.span, note)
-        for index, note in problem.notes.items()
-        if index < len(operands) and (other := operands[index]) is not None
-    ]
+    others = ((operands[index], note) for index, note in problem.notes.items() if index < len(operands))
+    labels = [Label(other.span, note) for other, note in others if other is not None]
     report.error(problem.code, problem.message, place, help=help, fix=fix, labels=tuple(labels))

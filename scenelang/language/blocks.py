@@ -414,9 +414,8 @@ def prepare_object(stmt: tree.Call, place: Site, geometry: str | None = None) ->
             fix = None
             if name in ("sphere", "disc") and len(stmt.args) == 1 and stmt.body is None:
                 rest = Span(where.name.source, where.name.end, stmt.span.end)
-                fix = Fix(
-                    "put it into its block", (Edit(rest, f" {{ scale({stmt.args[0].value.span.text}); }}"),)
-                )
+                scaled = f" {{ scale({stmt.args[0].value.span.text}); }}"
+                fix = Fix("put it into its block", (Edit(rest, scaled),))
             message = f"`{name}` takes no arguments"
             session.report.error("E0308", message, stmt.args[0].span, help=help, fix=fix)
         return None
@@ -428,12 +427,8 @@ def prepare_object(stmt: tree.Call, place: Site, geometry: str | None = None) ->
         inside = Builder()
         body.run(env, inside, session, where.name)
         session.count_objects(1, where.name)
-        fields = {
-            "kind": "object",
-            "geometry": geometry or name,
-            "transforms": tuple(inside.transforms),
-            "material": inside.material,
-        }
+        fields: dict[str, Any] = {"kind": "object", "geometry": geometry or name}
+        fields |= {"transforms": tuple(inside.transforms), "material": inside.material}
         place_child(make(Object, fields), where, out, session)
 
     return action
@@ -495,11 +490,7 @@ def _width(stmt: tree.Node | tree.Combined, place: Site) -> Callable[[Env], floa
 def _finish(
     kind: str, inside: Builder, transforms: list[Any], material: Material | None, k: float | None = None
 ) -> Any:
-    fields: dict[str, Any] = {
-        "children": tuple(inside.children),
-        "transforms": tuple(transforms),
-        "material": material,
-    }
+    fields = {"children": tuple(inside.children), "transforms": tuple(transforms), "material": material}
     if kind in ("group", "chain"):
         return make(Group if kind == "group" else Chain, {"kind": kind, **fields})
     return make(Boolean, {"kind": "boolean", "op": kind, **fields, "k": k})
@@ -534,8 +525,7 @@ def prepare_combined(stmt: tree.Combined, place: Site) -> Action | None:
         help = "the word joins one object or node to those before it"
         misplaced(place, stmt.keyword, "`{}` before a statement that makes no object", op, help)
         return None
-    act = prepare_statement(child, place)
-    if act is None:
+    if (act := prepare_statement(child, place)) is None:
         return None
 
     def action(env: Env, out: Builder) -> None:
@@ -557,8 +547,7 @@ def prepare_module_call(stmt: tree.Call, definition: Definition, place: Site) ->
     fits = holds_children(place, where.name, "a call of module `{}`", stmt.name.text)
     given = expressions.prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
-    enter = expressions.entering(stmt.name, given, definition, place)
-    if enter is None or not fits:
+    if (enter := expressions.entering(stmt.name, given, definition, place)) is None or not fits:
         return None
     place.file.weight += MODULE_CALL
 

@@ -30,7 +30,6 @@ Role = Literal[
     "path",
 ]
 
-
 _OWN: Final[dict[str, Role]] = {**dict.fromkeys(CONSTANTS, "constant"), **dict.fromkeys(ANIMATED, "animated")}
 """Roles of the language's words in an expression."""
 
@@ -222,8 +221,7 @@ class Names:
                 self._call(node, scope, kind)
             case tree.NameRef():
                 text = node.name.text
-                own = _OWN.get(text)
-                if own is None or scope.find(text) is not None:
+                if (own := _OWN.get(text)) is None or scope.find(text) is not None:
                     self._reference(node.name, scope, "name")
                 else:
                     self._add(node.name.span, text, own)
@@ -326,7 +324,6 @@ def find_unused(file: tree.File, diagnostics: Diagnostics) -> None:
 
 def _is_inside_its_definition(use: Use) -> bool:
     """Test whether a use is the definition itself, or a call of a function or module in its own body."""
-    symbol = use.symbol
-    if symbol is None or use.defines or symbol.kind not in ("fn", "module"):
+    if (symbol := use.symbol) is None or use.defines or symbol.kind not in ("fn", "module"):
         return use.defines
     return symbol.node.span.start <= use.start < symbol.node.span.end

@@ -212,8 +212,7 @@ def ranked(
         effort.left -= 8
         if abs(len(candidate) - len(name)) > limit + 2:  # an underscore and a final s make no slip
             continue
-        other = _plain(candidate)
-        if other == plain:
+        if _plain(candidate) == plain:
             distance = _CASE if candidate.lower() == name.lower() else _JOINT
         else:
             lower = candidate.lower()
@@ -230,8 +229,7 @@ def ranked(
 
 
 def nearest(name: str, known: Iterable[str], slips: int | None = None) -> str | None:
-    result = ranked(name, known, slips)
-    return result[0][1] if result else None
+    return next((candidate for _, candidate in ranked(name, known, slips)), None)
 
 
 def _plain(name: str) -> str:
@@ -268,8 +266,7 @@ def did_you_mean(
 
     Where several names are equally near there is no fix, and the help names the first three.
     """
-    ranking = ranked(name, known, slips, effort)
-    if not ranking:
+    if not (ranking := ranked(name, known, slips, effort)):
         return None, None
     best = ranking[0][0]
     near = [candidate for distance, candidate in ranking if distance < best + _CLEAR]
@@ -289,8 +286,7 @@ def instead(
     name: str, words: Mapping[str, str], known: Iterable[str], span: Span
 ) -> tuple[str | None, Fix | None]:
     """Help and fix for a word of another language whose name here is known, or None and None."""
-    here = words.get(name.lower())
-    if here is None or here not in known:
+    if (here := words.get(name.lower())) is None or here not in known:
         return None, None
     return f"it is called `{here}` here", Fix(f"write `{here}`", (Edit(span, here),))
 

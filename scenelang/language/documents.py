@@ -332,8 +332,7 @@ class _Printer:
 
     def write(self, text: str, margin: int) -> None:
         if self.ended:
-            text = text.lstrip(" ")
-            if not text:
+            if not (text := text.lstrip(" ")):
                 return
             self.newline(margin + INDENT)
         if self.line:

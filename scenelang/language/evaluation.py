@@ -60,8 +60,7 @@ class Source(Record):
         """The same with text and tree; reports syntax errors once. Raises OSError, SceneError if not text."""
         if self.tree is not None:
             return self
-        text = self.text
-        if text is None:
+        if (text := self.text) is None:
             name = os.fspath(self.path or "")
             try:
                 text = read_source(Path(name), name)
@@ -172,18 +171,11 @@ class Evaluation:
         if self._body is None or len(self.diagnostics.errors) > self._errors:
             return None, session.spans
         settings = session.settings
-        fields = {
-            "version": 1,
-            "model": self._model or settings.model,
-            "canvas": settings.canvas,
-            "background": settings.background,
-            "samples": settings.samples,
-            **{word: settings.stage.get(word, "default") for word in STAGE},
-            "animation": settings.animation,
-            "elements": tuple(session.elements.values()),
-            "nodes": tuple(out.children),
-        }
-        scene = make(Scene, fields)
+        fields: dict[str, Any] = {"version": 1, "model": self._model or settings.model}
+        fields |= {name: getattr(settings, name) for name in ("canvas", "background", "samples")}
+        fields |= {word: settings.stage.get(word, "default") for word in STAGE}
+        fields |= {"animation": settings.animation, "elements": tuple(session.elements.values())}
+        scene = make(Scene, {**fields, "nodes": tuple(out.children)})
         scene = scene if self._size is None else scene.sized(self._size)
         session.spans.main = self.file.span.source
         for written in settings.given.get("model", ())[:1]:

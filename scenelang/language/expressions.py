@@ -192,8 +192,7 @@ def prepare_range(expr: tree.Range, place: Site) -> Code:
 
 def _component(code: Code, name: tree.Name, place: Site, of: tree.Expr) -> Code:
     """``code.name``, a component of a vector."""
-    index = values.COMPONENTS.get(name.text)
-    if index is None:
+    if (index := values.COMPONENTS.get(name.text)) is None:
         help, fix = member_advice(name), None
         if help is None:
             help, fix = did_you_mean(name.text, values.COMPONENTS, name.span)
@@ -444,8 +443,7 @@ def prepare_member(expr: tree.Member, place: Site) -> Code:
         code = prepare(value, place)
         return POISONED if code.value is POISON else _component(code, expr.name, place, value)
     name = tree.Name(expr.span, f"{value.span.text}.{expr.name.text}")
-    result = lookup(name, place)
-    if result is not None:
+    if (result := lookup(name, place)) is not None:
         return _as_value(name, result, place)
     unknown_member(name, place, binding.value)
     return POISONED
@@ -505,8 +503,7 @@ def bind(
             message = f"`{called}` has no argument `{word.text}`"
             fail(word.text, message, word.span, hint, fix=fix, code="E0206")
             continue
-        earlier = bound[index]
-        if earlier is None:
+        if (earlier := bound[index]) is None:
             bound[index] = given
             continue
         labels = (Label(earlier.arg.span, "first given here"), *here)
@@ -539,8 +536,7 @@ def prepare_call(expr: tree.CallExpr, place: Site) -> Code:
         wrong_kind(name, binding, place, "a function", help)
         return POISONED
     definition: Definition = binding.value
-    enter = entering(name, given, definition, place)
-    if enter is None:
+    if (enter := entering(name, given, definition, place)) is None:
         return POISONED
     session = place.session
 
@@ -558,8 +554,7 @@ def prepare_call(expr: tree.CallExpr, place: Site) -> Code:
 def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Site) -> Code:
     """A call of a function of the language; reports a name that stands for nothing."""
     name = expr.name
-    word = words.FUNCTIONS.get(name.text)
-    if word is None:
+    if (word := words.FUNCTIONS.get(name.text)) is None:
         alias, dot, rest = name.text.partition(".")
         outer = place.scope.find(alias) if dot else None
         if outer is None:
@@ -577,8 +572,7 @@ def _call_builtin(expr: tree.CallExpr, given: list[Given], place: Site) -> Code:
             place.report.error("E0308", message, name.span)
             return POISONED
     else:
-        bound = bind(place.report, name, word.params, word.required, given)
-        if bound is None:
+        if (bound := bind(place.report, name, word.params, word.required, given)) is None:
             return POISONED
         given = [one for one in bound if one is not None]
     exprs = [arg.value for arg, _ in given]

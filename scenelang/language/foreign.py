@@ -29,11 +29,8 @@ OPERATORS: Final = _TABLES["operators"]
 HEADS: Final = _TABLES["heads"]
 SIGNS: Final = _TABLES["signs"]
 UNIT_NAMES: Final = _TABLES["units"]
-ARGUMENTS: Final = {
-    name.removeprefix("arguments of "): table
-    for name, table in _TABLES.items()
-    if name.startswith("arguments of ")
-}
+_OF: Final = "arguments of "
+ARGUMENTS: Final = {name.removeprefix(_OF): own for name, own in _TABLES.items() if name.startswith(_OF)}
 LIBRARIES: Final = ("Math", "math", "np", "numpy")
 """Prefixes of the names of functions and constants."""
 LOOKS: Final = ("color", "colour", "fill", "stroke", "material", "c")

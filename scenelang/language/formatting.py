@@ -251,8 +251,7 @@ class Braced:
             head = [Comments(opened, inside=True), plain(self.opening, after=True)]
         elif opened := [*opened, *after_of(self.opening)]:
             first = [Comments(own_after_first(opened))]
-        inside = entries(self.statements, before_of(self.closing))
-        if not inside and not opened:
+        if not (inside := entries(self.statements, before_of(self.closing))) and not opened:
             return [self.flat or "{}"]
         return [*head, Indent(Concat(None, [*first, *inside])), LINE, plain(self.closing)]
 
@@ -288,8 +287,7 @@ class FileLayout:
 
     def word(self, token: int) -> Part:
         text = self.text[self.starts[token] : self.ends[token]]
-        note = self.notes.get(token)
-        if note is None:
+        if (note := self.notes.get(token)) is None:
             return text
         if note.leading or note.trailing:
             gap = "" if text in ("(", "[") else " "
@@ -454,8 +452,7 @@ class FileLayout:
 
     def file(self, statements: list[Item] | None = None) -> Part:
         last = self.notes.get(len(self.tokens.kinds) - 1)
-        parts = entries(statements or [], last.before if last else [])
-        return Concat(None, parts[1:])
+        return Concat(None, entries(statements or [], last.before if last else [])[1:])
 
     def following(self, items: list[Item], item: Part) -> list[Item]:
         items.append(Item(item))
@@ -644,11 +641,8 @@ def format_text(text: str, *, name: str = "<text>") -> str:
 def _significant(tokens: Tokens) -> list[str]:
     """The texts of the tokens but for commas before a closing bracket, which make no difference."""
     texts = [tokens.source.text[s:e] for s, e in zip(tokens.starts, tokens.ends, strict=True)]
-    return [
-        word
-        for word, following in zip(texts, [*texts[1:], ""], strict=True)
-        if word != "," or following not in (")", "]")
-    ]
+    pairs = zip(texts, [*texts[1:], ""], strict=True)
+    return [word for word, following in pairs if word != "," or following not in (")", "]")]
 
 
 # ---------------------------------------------------------------- parts of a text

@@ -88,7 +88,6 @@ _ONCE, _BOUND, _BEFORE = (
     for pattern in ("<n><++|-->;", "<n> = <LINE> <;?>", "<before>(<P>) <o>")
 )
 
-
 # ---------------------------------------------------------------- patterns over text
 
 _PIECE: Final = re.compile(
@@ -151,8 +150,7 @@ def _text(tokens: Tokens, place: tuple[int, int]) -> str:
 def _find(pattern: str, tokens: Tokens, at: int) -> _Match | None:
     """The tokens from ``at`` on that a pattern describes; None where they are others."""
     begin = tokens.starts[at]
-    matched = _expression(pattern).match(tokens.source.text, begin, begin + _LONGEST)
-    if matched is None:
+    if (matched := _expression(pattern).match(tokens.source.text, begin, begin + _LONGEST)) is None:
         return None
 
     def index(offset: int) -> int:
@@ -242,8 +240,7 @@ def mend_habit(tokens: Tokens, report: Report, stack: list[int], first: int, at:
         assert lead is not None
         text = lead["text"] or lead["hole"]
         for start in anchors.get(text, anchors["word" if text[1:] else "name"]):
-            match = _find(habit.pattern, tokens, start)
-            if match is None:
+            if (match := _find(habit.pattern, tokens, start)) is None:
                 continue
             written, new = _replaced(tokens, match, habit.meant)
             if written != _text(tokens, match[""]) and _reads_on(

@@ -67,8 +67,7 @@ def prepare_text(stmt: tree.Call, place: Site, letters: Letters) -> Action | Non
     fits = holds_children(place, where.name, "a call of `{}`", stmt.name.text)
     given = prepare_arguments(stmt.args, place)
     block = prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
-    bound = bind(place.report, stmt.name, word.params, word.required, given)
-    if bound is None or not fits:
+    if (bound := bind(place.report, stmt.name, word.params, word.required, given)) is None or not fits:
         return None
     place.file.weight += MODULE_CALL
     names = [name for name, one in zip(word.params, bound, strict=True) if one is not None]
@@ -102,8 +101,7 @@ def prepare_text(stmt: tree.Call, place: Site, letters: Letters) -> Action | Non
 def prepare_width(letters: Letters, expr: tree.CallExpr, given: list[Given], place: Site) -> Code | None:
     """``abc.width("Ag", size = 0.5)``, a number; None after a report."""
     word = LETTERS["width"]
-    bound = bind(place.report, expr.name, word.params, word.required, given)
-    if bound is None:
+    if (bound := bind(place.report, expr.name, word.params, word.required, given)) is None:
         return None
     codes = [one.code for one in bound if one is not None]
     exprs = [one.arg.value for one in bound if one is not None]

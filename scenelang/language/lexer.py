@@ -205,8 +205,7 @@ def scan(source: SourceFile, report: Report, stop: int | None = None) -> Tokens:
     stop = len(text) if stop is None else stop
     keyword = literals.get
     for match in pattern.finditer(text, 0, stop):
-        group = match.lastindex
-        if group is None:
+        if (group := match.lastindex) is None:
             break
         start, end = match.span(group)
         if group == name_group:
@@ -318,10 +317,8 @@ def run(kinds: list[int], callbacks: Iterable[Callable[..., Any] | None], mend: 
     at = 0
     kind = kinds[0]
     while True:
-        action = actions[state].get(kind)
-        if action is None:
-            resumed = mend(states, values, at)
-            if resumed is None:
+        if (action := actions[state].get(kind)) is None:
+            if (resumed := mend(states, values, at)) is None:
                 return None
             at = resumed
             kind = kinds[at]
@@ -356,8 +353,7 @@ def advance(stack: list[int], kind: int) -> bool:
     language = tables()
     actions, gotos, rules = language.actions, language.gotos, language.rules
     while True:
-        action = actions[stack[-1]].get(kind)
-        if action is None:
+        if (action := actions[stack[-1]].get(kind)) is None:
             return False
         if action >= 0:
             stack.append(action)

@@ -15,18 +15,6 @@ from scenelang.language.diagnostics import Edit, Fix, Label, Span
 from scenelang.language.expressions import POISONED, Code, Given, bind
 from scenelang.language.library import Written
 from scenelang.language.limits import MATERIAL_VALUE, MATRIX, MOVE, SAME_MOVE
-from scenelang.language.nodes import (
-    LATER,
-    MOST,
-    SAMPLES,
-    Color,
-    Frozen,
-    Grayscale,
-    Shear,
-    Stop,
-    light_fault,
-    singular,
-)
 from scenelang.language.reporter import Reporter
 from scenelang.language.scene import Material
 from scenelang.language.session import Binding, Env, Session
@@ -115,26 +103,26 @@ def _rows(rows: Any, operand: int) -> tuple[tuple[float, ...], ...]:
     values = tuple([vector(row, 4, operand, "a row") for row in rows.items])
     if values[3] != (0.0, 0.0, 0.0, 1.0):
         raise Problem("E0311", "the last row of a matrix is not 0, 0, 0, 1", operand=operand)
-    if singular(values):
+    if nodes.singular(values):
         raise Problem("E0312", "a singular matrix flattens what it moves", operand=operand)
     return values
 
 
 def _power(value: Any, operand: int) -> float:
     power = number(value, operand)
-    if (fault := light_fault(power)) is not None:
+    if (fault := nodes.light_fault(power)) is not None:
         raise Problem("E0339", fault, operand=operand)
-    if power > MOST:
-        raise Problem("E0311", f"`power` is not within {MOST:,.0f} of 0", operand=operand)
+    if power > nodes.MOST:
+        raise Problem("E0311", f"`power` is not within {nodes.MOST:,.0f} of 0", operand=operand)
     return power
 
 
-_LEAF_UNITS: Final = "{} is in units of the leaf, before any scale"
+_LEAF: Final = "{} is in units of the leaf, before any scale"
 _side = _within(
     lambda side: side.is_integer() and 1 <= side <= MAX_SIDE_PX,
     f"a canvas side of {{}} is not a whole number in 1..{MAX_SIDE_PX}",
 )
-_samples = _within(lambda count: count in SAMPLES, "{} samples a pixel, where it takes 4 or 16")
+_samples = _within(lambda count: count in nodes.SAMPLES, "{} samples a pixel, where it takes 4 or 16")
 _seconds = _within(lambda seconds: seconds > 0.0, "a length of {} is not above 0")
 
 KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
@@ -145,12 +133,8 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "factor": _within(
         bool, "a scale by 0 flattens what it moves", "decimals stand behind a point, as in 0.5", "E0312"
     ),
-    "growth": _within(
-        lambda r: -0.5 <= r <= 1.0, "a growth of {} is outside -0.5..1", _LEAF_UNITS.format("r")
-    ),
-    "wall": _within(
-        lambda w: 0.0 < w <= 1.0, "a wall of {} is not above 0 and at most 1", _LEAF_UNITS.format("w")
-    ),
+    "growth": _within(lambda r: -0.5 <= r <= 1.0, "a growth of {} is outside -0.5..1", _LEAF.format("r")),
+    "wall": _within(lambda w: 0.0 < w <= 1.0, "a wall of {} is not above 0 and at most 1", _LEAF.format("w")),
     "point": lambda value, at: vector(value, 3, at, "a point"),
     "axis": _axis,
     "rows": _rows,
@@ -194,7 +178,7 @@ class Spec(Record):
     word: words.Word
     help: str | None  # advice for a wrong number of arguments; None prints the signature
     spread: bool  # whether one vector may stand for all arguments
-    node: type[Frozen] | None  # None for a single value: of a material, or of the picture
+    node: type[nodes.Frozen] | None  # None for a single value: of a material, or of the picture
     rows: tuple[tuple[str, Callable[[Any, int], Any], Any, int], ...]  # field, reader, default, number
     stated: bool  # whether it is a setting, or a property of a material
 
@@ -229,13 +213,13 @@ class Spec(Record):
         return make(self.node, self.read(spread(values, self.word) if self.spread else values))
 
 
-def _shear(spec: Spec, terms: Sequence[Any]) -> Shear:
+def _shear(spec: Spec, terms: Sequence[Any]) -> nodes.Shear:
     given = [at for at, term in enumerate(terms) if term is not LEFT_OUT]
     if len(given) != 1:
         help = "write one term a call, as in shear(xy = 0.5); several calls apply in order"
         raise Problem("E0308", f"shear takes one term, found {len(given)}", help)
     at = given[0]
-    return make(Shear, {"kind": "shear", "axes": spec.word.params[at], "k": number(terms[at], at)})
+    return make(nodes.Shear, {"kind": "shear", "axes": spec.word.params[at], "k": number(terms[at], at)})
 
 
 GEOMETRY: Final = {name: Spec.of(word) for name, word in words.TRANSFORMS.items()}
@@ -266,8 +250,7 @@ def prepare_move(stmt: tree.Call, place: Site) -> Action | None:
     """The action of a transform or a texture operation; checks that it may stand here."""
     name, report = stmt.name.text, place.report
     given = expressions.prepare_arguments(stmt.args, place, name)
-    spec = _spec(stmt, place)
-    if spec is None:
+    if (spec := _spec(stmt, place)) is None:
         return None
     if stmt.body is not None:
         help = f"put {name}(…); into the block of what it moves, as in square {{ {name}(…); }}"
@@ -328,11 +311,11 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: S
         try:
             if spec.node is None:  # a property that is a number
                 return spec.read(values)[spec.word.params[0]]
-            node = _shear(spec, values) if spec.node is Shear else spec.build(values)
+            node = _shear(spec, values) if spec.node is nodes.Shear else spec.build(values)
         except Problem as problem:
             advice.report_problem(session.report, problem, span, operands)
             return None
-        if isinstance(node, Color | Grayscale | Stop):
+        if isinstance(node, nodes.Color | nodes.Grayscale | nodes.Stop):
             _warn(node, session.report, next((o.span for o in reversed(operands) if o is not None), span))
         return node
 
@@ -377,9 +360,9 @@ def given_twice(what: str, span: Span, first: Span, report: Reporter) -> None:
     report.error("E0333", f"`{what}` is given twice", span, labels=labels, help="leave one of them out")
 
 
-def _warn(node: Color | Grayscale | Stop, report: Reporter, span: Span) -> None:
+def _warn(node: nodes.Color | nodes.Grayscale | nodes.Stop, report: Reporter, span: Span) -> None:
     """Warn of a component of a colour, or an amount of grey, outside 0 to 1."""
-    components = (node.amount,) if isinstance(node, Grayscale) else node.rgb
+    components = (node.amount,) if isinstance(node, nodes.Grayscale) else node.rgb
     outside = next((component for component in components if not 0.0 <= component <= 1.0), None)
     if outside is not None:
         help = "components run from 0 to 1; the result is clamped to that"
@@ -401,8 +384,7 @@ def _stands(place: Site, span: Span, what: str, help: str, inside: str | None = 
 def prepare_use(stmt: tree.MaterialUse, place: Site) -> Action | None:
     word = Span(stmt.span.source, stmt.span.start, stmt.name.span.end)
     stands = _stands(place, word, "a material", "put it into the block of an object or a group")
-    make_material = _prepare(stmt, place)
-    if make_material is None or not stands:
+    if (make_material := _prepare(stmt, place)) is None or not stands:
         return None
     session = place.session
 
@@ -418,7 +400,7 @@ def prepare_material(expr: tree.MaterialExpr, place: Site) -> Code:
     return POISONED if make_material is None else Code(lambda env: MaterialValue(make_material(env)))
 
 
-_UNSAID: Final = {name: LATER[name] for name in words.PROPERTIES}
+_UNSAID: Final = {name: nodes.LATER[name] for name in words.PROPERTIES}
 
 
 def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Callable[[Env], Material] | None:
@@ -443,8 +425,7 @@ def _prepare(written: tree.MaterialUse | tree.MaterialExpr, place: Site) -> Call
 
 def _check_stops(material: Material, where: Written, session: Session) -> None:
     """Report a gradient whose stops are too few, too many or out of order, and stops of what is not one."""
-    fault = material_fault(material.name, material.ops)
-    if fault is None:
+    if (fault := material_fault(material.name, material.ops)) is None:
         return
     stop, message = fault
     statement, report = where.statement, session.report
@@ -575,9 +556,8 @@ def prepare_value_use(stmt: tree.Call, binding: Binding, place: Site) -> Action 
         session.report.error("E0308", f"`{name}` is a value and takes no arguments", stmt.args[0].span)
         return None
     help = "materials stand in the block of an object or a group"
-    if (binding.known and binding.value is POISON) or not _stands(
-        place, span, "value `{}`", help, help, name
-    ):
+    wrong = binding.known and binding.value is POISON
+    if wrong or not _stands(place, span, "value `{}`", help, help, name):
         return None
     place.file.weight += MATERIAL_VALUE
     where = Written(span, stmt.span)

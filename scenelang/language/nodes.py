@@ -91,7 +91,6 @@ Opaque = Annotated[
     tuple[Share, Share, Share], Field(description="red, green, blue as written (sRGB-encoded), in 0 to 1")
 ]
 
-
 _NOT_RESERVED: Final = AfterValidator(
     lambda word: _checked(word, word in RESERVED, f"`{word}` is a word of the language")
 )
@@ -147,7 +146,7 @@ Affine = Annotated[
 ]
 
 
-def _kind_is_required(schema: dict[str, Any]) -> None:
+def _kind_needed(schema: dict[str, Any]) -> None:
     """In data the kind tells nodes apart, while Python's constructors know it."""
     if "kind" in schema["properties"]:
         schema["required"] = ["kind", *schema.get("required", ())]
@@ -177,11 +176,7 @@ class Frozen(BaseModel):
 
     # Validators are built when first used: a scene evaluated from text needs none.
     model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        defer_build=True,
-        json_schema_extra=_kind_is_required,
+        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, json_schema_extra=_kind_needed
     )
 
     def __init__(self, *args: Any, **data: Any) -> None:
@@ -444,7 +439,6 @@ MaterialOp = Annotated[
 ]
 Inks = Iterable[MaterialOp] | MaterialOp | str
 
-
 Place = Annotated[Length, Field(ge=-MOST, le=MOST)]
 Point = Annotated[tuple[Place, Place, Place], Field(description="x, y, z in the world")]
 Unsaid = Annotated[Literal["default"], Tag("unsaid")]
@@ -468,8 +462,7 @@ class Camera(Frozen):
 
     @model_validator(mode="after")
     def _sees(self) -> Self:
-        fault = camera_fault(self.eye, self.target, self.fov)
-        if fault is not None:
+        if (fault := camera_fault(self.eye, self.target, self.fov)) is not None:
             raise ValueError(fault[1])
         return self
 
@@ -497,7 +490,7 @@ Lights = Annotated[
     | Annotated[tuple[Light, ...], Field(max_length=LAMPS), Tag("several")]
     | Unsaid,
     Discriminator(
-        lambda value: {str: "unsaid", list: "several", tuple: "several"}.get(type(value), "stated")
+        lambda given: {str: "unsaid", list: "several", tuple: "several"}.get(type(given), "stated")
     ),
     Field(description="3D; null: without one"),
 ]
@@ -544,7 +537,6 @@ MAX_NODE_DEPTH = 400  # nodes within nodes
 Blend = Annotated[
     Finite, Field(gt=0, description="width of the blend; null: 0.15 of `smooth`, a sharp edge of a cut")
 ]
-
 
 SAMPLES: Final = 4, 16
 """Numbers of samples that a pixel may be the mean of, on regular grids."""
@@ -713,9 +705,8 @@ class Chain(Frozen):
         given = super()._arranged(args, data)
         if isinstance(given.get("children"), list | tuple):
             nodes = (Object, Group, Boolean, Chain)
-            given["children"] = tuple(
-                Link("union", child) if isinstance(child, nodes) else child for child in given["children"]
-            )
+            links = (Link("union", at) if isinstance(at, nodes) else at for at in given["children"])
+            given["children"] = tuple(links)
         return given
 
     @field_validator("children")

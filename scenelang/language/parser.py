@@ -23,7 +23,6 @@ from scenelang.language.words import RESERVED
 if TYPE_CHECKING:
     from scenelang.language.recovery import Recovery
 
-
 Arguments = tuple[tuple[tree.Argument, ...], int]
 Keyword = tuple[Any, Span]
 
@@ -302,7 +301,6 @@ MAX_DEPTH = 200
 """No tree is deeper, so no later stage can exhaust the stack."""
 
 _OTHER, _LOOP, _OPERATOR, _OPEN, _BRACE, _CLOSE, _END_BRACE, _COMMA, _SEMICOLON = range(9)
-
 
 _REACH: Final = 240
 """Tokens past a mistake that recovery may look at, with room."""

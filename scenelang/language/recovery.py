@@ -53,8 +53,7 @@ def balance(tokens: Tokens, report: Report) -> None:
         report.add("E0105", f"unmatched `{tokens.text(at)}`", *tokens.place(at))
     tokens.drop(stray)
     last -= len(stray)
-    open_ = tokens.unmatched(last)[0]
-    if open_ and not tokens.cut:
+    if (open_ := tokens.unmatched(last)[0]) and not tokens.cut:
         _report_unclosed(tokens, report, last, open_[-3:], len(open_))
     tokens.replace(last, 0, [tables().literals["}"]] * len(open_))
 
@@ -182,9 +181,7 @@ FOLLOWED: Final = 80
 _WINDOW: Final = 8  # tokens before the mistake among which its cause is looked for
 _THOROUGH: Final = 100  # after so many mistakes in a file it is looked for at the mistake alone
 
-_REPLACEMENTS: Final = [
-    (written, meant, float(cost)) for written, meant, cost in rows("recovery", "replacements")
-]
+_REPLACEMENTS: Final = [(old, new, float(cost)) for old, new, cost in rows("recovery", "replacements")]
 _CODES: Final = dict[str, str](rows("recovery", "codes"))
 _DELETION, _SUBSTITUTION, _MISSPELT, _BREAK, _SWAP = 1.5, 1.1, 0.9, 1.4, 1.8
 _NEW_LINE = 0.6  # a token that begins a line is seldom the slip
@@ -221,10 +218,8 @@ def _kinds(names: str) -> tuple[int, ...]:
 @cache
 def _insertions() -> list[tuple[tuple[int, ...], float, tuple[int, ...]]]:
     """Insertions to try: the tokens, the cost, and the token that has to follow if that matters."""
-    return [
-        (_kinds(names), float(cost), _kinds("".join(needed)))
-        for names, cost, *needed in rows("recovery", "insertions")
-    ]
+    known = rows("recovery", "insertions")
+    return [(_kinds(names), float(cost), _kinds("".join(needed))) for names, cost, *needed in known]
 
 
 class Recovery:
@@ -315,8 +310,7 @@ class Recovery:
         name, new_line = tokens.name(at), tokens.on_new_line(at)
         following = at + (kind != END)
         after = tokens.kinds[following]
-        open_ = [tokens.name(index) for index in tokens.unmatched(at, first, "()[]")[0]]
-        if open_:
+        if open_ := [tokens.name(index) for index in tokens.unmatched(at, first, "()[]")[0]]:
             cost = _CLOSING + (tokens.name(at - 1) in ("(", "[", ","))  # nobody forgets to close these
             closings = _kinds(" ".join(_CLOSES[bracket] for bracket in reversed(open_)))
             yield Repair(at, 0, closings[:1], cost)
@@ -371,8 +365,7 @@ class Recovery:
     def _broken_off(self, stack: list[int], at: int, cost: float = _BREAK) -> Iterator[Repair]:
         """The line before a token breaks off in the middle of a statement."""
         for end in (_kinds(";"), _kinds("{ }")):
-            missing = completion(stack, end[0])
-            if missing or (missing is not None and len(end) == 1):
+            if (missing := completion(stack, end[0])) or (missing is not None and len(end) == 1):
                 yield Repair(at, 0, (*missing, *end), cost + 0.05 * len(missing))
 
     # ------------------------------------------------------------ mistakes with words of their own

@@ -146,10 +146,8 @@ class Reporter(Record, frozen=False):
 
     def error_once(self, key: Hashable, code: str, message: str, span: Span, **more: Any) -> None:
         """Report a mistake, as `error` does, or show its place at the report of the same one of this key."""
-        index = self.shared.get(key)
-        if index is None:
-            index = self.error(code, message, span, **more)
-            if index is not None:
+        if (index := self.shared.get(key)) is None:
+            if (index := self.error(code, message, span, **more)) is not None:
                 self.shared[key] = index
             return
         known = self.diagnostics.items[index]

@@ -203,8 +203,7 @@ def render_text(
         fixer: the command that applies fixes, for the summary.
         fixable: how many it would apply; by default all that there are.
     """
-    ordered = in_order(diagnostics)
-    if not ordered:
+    if not (ordered := in_order(diagnostics)):
         return ""
     blocks = [_block(diagnostic, width, color) for diagnostic in ordered[:most]]
     if most is not None and len(ordered) > most:

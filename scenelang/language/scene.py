@@ -14,14 +14,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import (
-    BaseModel,
-    Field,
-    PrivateAttr,
-    TypeAdapter,
-    ValidationError,
-    field_validator,
-)
+from pydantic import BaseModel, Field, PrivateAttr, TypeAdapter, ValidationError, field_validator
 from pydantic_core import ErrorDetails, PydanticSerializationError
 
 from scenelang.assets import notebook
@@ -167,10 +160,7 @@ class Scene(nodes.Brief):
     version: Version = 1
     model: Annotated[
         str | None,
-        Field(
-            pattern=r'^[^"\\\x00-\x1f]+$',
-            description="the model to draw with; null: the usual one",
-        ),
+        Field(pattern=r'^[^"\\\x00-\x1f]+$', description="the model to draw with; null: the usual one"),
     ] = None
     canvas: Annotated[tuple[Pixels, Pixels], Field(description="width and height in pixels")] = (256, 256)
     background: Annotated[

@@ -115,8 +115,7 @@ class Scope(Record, frozen=False):
 
     def reach(self, slots: Slots) -> Callable[[Env], Env]:
         """Function that gets the live ``slots``, which enclose this scope, from those of here."""
-        root = slots.root
-        if root is not None:
+        if (root := slots.root) is not None:
             return lambda env: root
         hops, at = 0, self.slots
         while at is not slots:
@@ -216,8 +215,7 @@ class Defines(Record, frozen=False):
         for name in self.values:
             if name in self.known or name in self.lost:
                 continue
-            result = nearest(name, self.known)
-            if result:
+            if result := nearest(name, self.known):
                 help, labels = f"did you mean `{result}`?", [Label(self.known[result], "this param")]
             else:
                 names = listing(self.known)
@@ -298,8 +296,7 @@ class Loader(Record, frozen=False):
 
     def _locate(self, text: str, importer: Path | None) -> Path:
         if library.is_reserved(text):
-            shipped = library.find(text)
-            if shipped is None:
+            if (shipped := library.find(text)) is None:
                 help = f"it has {listing(library.names())}; a file of your own is `./{text}`"
                 raise Unreadable("E0214", f"the library has no `{text}`", help)
             return shipped

@@ -203,8 +203,7 @@ def prepare_import(stmt: tree.Import, place: Site) -> Action | None:
     loader = context.loader
     binding = Binding("import", alias.span)
     good = blocks.define(alias, binding, place)
-    loaded = loader.load(stmt, context.path, context.session)
-    if loaded is None or not good:
+    if (loaded := loader.load(stmt, context.path, context.session)) is None or not good:
         return None
     path, file = loaded
     if isinstance(file, ElementFile):
@@ -523,8 +522,7 @@ def _unknown(stmt: tree.Call, place: Site) -> None:
     """Report a statement whose name stands for nothing."""
     name, text = stmt.name, stmt.name.text
     if "." in text:
-        alias = place.scope.find(text.partition(".")[0])
-        if alias is None:
+        if (alias := place.scope.find(text.partition(".")[0])) is None:
             advice.unknown(name, place)
         elif alias.kind == "import":
             advice.unknown_member(name, place, alias.value, kinds=("module", "text", "element"))

@@ -183,8 +183,7 @@ def pack(number: float, unit: str) -> Any:
 def describe(value: Any) -> str:
     """Kind of a value, for messages."""
     if value.__class__ is Vec:
-        count = len(value.items)
-        return f"a vector of {plural(count, 'item')}"
+        return f"a vector of {plural(len(value.items), 'item')}"
     return _KINDS.get(value.__class__, "another value")
 
 
@@ -197,9 +196,7 @@ def unexpected(
 
 def show(number: float) -> str:
     """A number for messages: short, integers without a point."""
-    if number.is_integer() and abs(number) < 1e15:
-        return str(int(number))
-    return f"{number:.6g}"
+    return str(int(number)) if number.is_integer() and abs(number) < 1e15 else f"{number:.6g}"
 
 
 _VERBS: Final = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "divide", "^": "raise"}
@@ -289,11 +286,8 @@ def _unit_of(op: str, a: float, ua: str, b: float, ub: str) -> str:
             return ua
         if ua == "number" and ub == "time":
             return "number"
-    raise Problem(
-        "E0303",
-        f"cannot {_VERBS[op]} {NAMED[ua]} {_PREPOSITIONS[op]} {NAMED[ub]}",
-        "divide an angle by 1rad, or a time by 1s, for a bare number",
-    )
+    help = "divide an angle by 1rad, or a time by 1s, for a bare number"
+    raise Problem("E0303", f"cannot {_VERBS[op]} {NAMED[ua]} {_PREPOSITIONS[op]} {NAMED[ub]}", help)
 
 
 def _unfit(message: str, a: Any, b: Any, operand: int, shared: bool = True) -> Problem:
@@ -446,8 +440,7 @@ def _pick(a: Any, b: Any, better: Callable[[float, float], bool]) -> Any:
         return Vec(tuple([_pick(x, y, better) for x, y in zip(left, right, strict=True)]))
     x, ua = _scalar(a, 0)
     y, ub = _scalar(b, 1)
-    unit = same_unit(x, ua, y, ub)
-    return pack(x if better(x, y) else y, unit)
+    return pack(x if better(x, y) else y, same_unit(x, ua, y, ub))
 
 
 def _whole(function: Callable[..., Any]) -> Callable[..., Any]:

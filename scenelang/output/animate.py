@@ -13,6 +13,7 @@ from typing import Any, Final, Unpack
 from PIL import features
 
 from scenelang.assets.files import output_place, write_whole
+from scenelang.assets.records import Record
 from scenelang.drawing.how import How, Options, RenderError, usable_cores
 from scenelang.drawing.image import Image, output_file
 from scenelang.language.diagnostics import plural
@@ -132,8 +133,7 @@ def make(
     return result
 
 
-@dataclass(slots=True)
-class _Run:
+class _Run(Record, frozen=False):
     """Frames on their way into a store."""
 
     painter: Painter

@@ -44,18 +44,10 @@ def stages(graphs: Mapping[str, Graph]) -> list[dict[str, Any]]:
         folds = [node for node in result if isinstance(node, Fold)]
         steps = [move.step for node in result for move in node.moves]
         affines = sum(isinstance(step, Affine) for step in steps)
-        out.append(
-            {
-                "stage": name,
-                "objects": len(result) - len(folds),
-                "matrices": len(steps),
-                "affines": affines,
-                "deformations": len(steps) - affines,
-                "folds": len(folds),
-                "tokens": token_counts(TOKENS[link.op] for fold in folds for link in fold.links),
-                "changed": before is not None and graph != before,
-            }
-        )
+        sizes: dict[str, Any] = {"stage": name, "objects": len(result) - len(folds), "matrices": len(steps)}
+        sizes |= {"affines": affines, "deformations": len(steps) - affines, "folds": len(folds)}
+        tokens = token_counts(TOKENS[link.op] for fold in folds for link in fold.links)
+        out.append({**sizes, "tokens": tokens, "changed": before is not None and graph != before})
         before = graph
     return out
 

@@ -14,7 +14,7 @@ import os
 import shutil
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import GifImagePlugin, Image
 
+from scenelang.assets.records import Record
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import SIGNATURE, chunk
 from scenelang.output.frames import VIDEOS, Film, Pixels, changed, delays, runs
@@ -110,8 +111,7 @@ def unpacked(numbers: npt.NDArray[np.uint32]) -> Colours:
     return np.stack([numbers >> 16, (numbers >> 8) & 255, numbers & 255], axis=-1).astype(np.uint8)
 
 
-@dataclass(slots=True)
-class Census:
+class Census(Record, frozen=False):
     """Counts of colours over all pictures, added one picture at a time."""
 
     most: int  # colours of a palette; `crowded` is true once a single picture has more
@@ -149,8 +149,7 @@ class Census:
         repeat = np.maximum(1, np.floor(share * (_SAMPLE / share.sum())).astype(np.int64))
         sample = np.repeat(self.colours, repeat)
         side = int(np.ceil(np.sqrt(len(sample))))
-        square = np.resize(sample, side * side)
-        image = Image.fromarray(unpacked(square).reshape(side, side, 3))
+        image = Image.fromarray(unpacked(np.resize(sample, side * side)).reshape(side, side, 3))
         reduced = image.quantize(self.most, method=Image.Quantize.MEDIANCUT, kmeans=2)
         used = len(reduced.getcolors(256) or ())
         table = np.array(reduced.getpalette() or [], np.uint8).reshape(-1, 3)
@@ -175,11 +174,8 @@ def mapped(pixels: Pixels, colours: Colours, dither: bool) -> npt.NDArray[np.uin
 
 def write_apng(film: Film, part: Path, progress: Progress) -> None:
     """Encode a film, losslessly, with alpha where it has any; delays are exact fractions of a second."""
-    shown = [
-        (file, piece)
-        for file, count in runs(film.files, [1] * len(film.files))
-        for piece in _pieces(count, film.fps)
-    ]
+    counted = runs(film.files, [1] * len(film.files))
+    shown = [(file, piece) for file, count in counted for piece in _pieces(count, film.fps)]
     with part.open("wb") as out:
         out.write(SIGNATURE)
         sequence, before, last = 0, None, None
@@ -273,8 +269,7 @@ def find_codec(suffix: str) -> tuple[str, tuple[str, ...]]:
 
     It is the one on the PATH, or the one that imageio-ffmpeg brings.
     """
-    ffmpeg = shutil.which("ffmpeg")
-    if ffmpeg is None:
+    if (ffmpeg := shutil.which("ffmpeg")) is None:
         try:
             import imageio_ffmpeg
 

@@ -13,7 +13,6 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +23,7 @@ import numpy.typing as npt
 from PIL import Image as pillow
 
 from scenelang.assets.files import lock, open_own, write_whole
+from scenelang.assets.records import Record
 from scenelang.compiler.lower import Memory
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
@@ -43,16 +43,14 @@ class FramesError(ValueError):
     """Not a range of frames, or one that an animation does not have."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameRange:
+class FrameRange(Record):
     first: int = 0  # from 0
     last: int | None = None  # the last one; None for that of the animation
 
     @classmethod
     def parse(cls, text: str) -> FrameRange:
         """``a..b`` inclusive, ``a..<b`` without b, ``a..`` to the end, or ``a``; else `FramesError`."""
-        match = _RANGE.fullmatch(text)
-        if match is None or (match[2] and match[3] is None):
+        if (match := _RANGE.fullmatch(text)) is None or (match[2] and match[3] is None):
             raise FramesError(f"`{text}` is not a range of frames such as 0..23, 0..<24, 12.. or 7")
         first, last = int(match[1]), int(match[3]) - bool(match[2]) if match[3] else None
         if ".." not in text:
@@ -120,8 +118,7 @@ class TargetError(ValueError):
     """A name that says nothing about the format, or cannot be written."""
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(Record):
     """Files of an animation."""
 
     kind: Kind  # format
@@ -158,9 +155,7 @@ def is_animation(out: str) -> bool:
 
 
 def find_target(out: str, stem: str = "frame", digits: int = 4, *, film: bool = True) -> Target:
-    """Parse ``out``, one of `FILM_FORMATS` if it may be a ``film``, a pattern, or a folder of ``stem``s, or
-    raise `TargetError`.
-    """
+    """The target ``out``: a ``film`` if it may be, a pattern or a folder of ``stem``s; else `TargetError`."""
     path, folder = Path(out), out.endswith(("/", "\\"))
     if not film and not is_pattern(out) and not folder:
         if path.is_file() or (path.suffix and not path.is_dir()):
@@ -287,8 +282,7 @@ def put_frame(files: Mapping[Path, bytes]) -> None:
         write_whole(file, data, flush=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Film:
+class Film(Record):
     """Finished frames in the order in which they are shown; read from the disk one at a time."""
 
     files: Sequence[Path]  # one for each frame; equal frames have the same
@@ -322,15 +316,13 @@ STILL = Animation(seconds=1.0, fps=1.0)
 """Animation of a scene without ``animate``: one frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shot:
+class Shot(Record):
     number: int  # from 0
     scene: Scene  # evaluated
     spans: SpanMap  # where its nodes were written
 
 
-@dataclass(frozen=True, slots=True)
-class Drawable:
+class Drawable(Record):
     number: int  # from 0
     key: str  # digest of all that determines its pixels
     shot: Shot  # the frame

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import ConfigDict, NonNegativeFloat, TypeAdapter, ValidationError
 
 from scenelang.assets.files import read_json, read_regular
+from scenelang.assets.records import Record
 from scenelang.compiler.lower import lower
 from scenelang.compiler.manifest import ROOT, available, load_manifest
 from scenelang.compiler.program import Program
@@ -33,8 +34,7 @@ MOST_BYTES: Final = 4 << 20
 _STRICT: Final = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(Record):
     """Limits of a picture's time and error; None for no limit."""
 
     ms: float | None  # most milliseconds of a frame on this machine
@@ -124,8 +124,7 @@ class NothingFits(Exception):
     """No point keeps the limits; the message names the nearest one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Offer:
+class Offer(Record):
     """A point and what it promises for a scene on this machine."""
 
     point: Point  # from the frontier

@@ -67,8 +67,7 @@ class TriangleMesh(NamedTuple):
 
         Raises `ValueError` for another suffix, OSError where it cannot be written.
         """
-        write = WRITERS.get(Path(path).suffix.lower())
-        if write is None:
+        if (write := WRITERS.get(Path(path).suffix.lower())) is None:
             raise ValueError(f"not one of {', '.join(WRITERS)}")
         write_output(path, write(self))
 
@@ -93,10 +92,8 @@ class Sampler:
 
     def widen(self, by: float) -> None:
         """Let objects take part up to some way outside of their balls, world units."""
-        self.field.solids = [
-            replace(solid, ball=solid.ball + by * stretch, extent=solid.extent + by)
-            for solid, stretch in zip(self.solids, self._stretch, strict=True)
-        ]
+        pairs = zip(self.solids, self._stretch, strict=True)
+        self.field.solids = [replace(s, ball=s.ball + by * rate, extent=s.extent + by) for s, rate in pairs]
 
     def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
         """As `SolidField.meet`, at points (M, 3); those that meet nothing are far outside."""

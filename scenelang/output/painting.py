@@ -230,7 +230,6 @@ def main() -> None:
 if __name__ == "__main__":
     main()
 
-
 BATCH_S: Final = 0.25  # drawing time of a batch, against which a task's own milliseconds are small
 MOST_BATCH: Final = 64
 MOST_BYTES: Final = 4 << 20  # of the Programs in a batch; elements make them large
@@ -290,7 +289,5 @@ def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[
     """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
     cache = _local.__dict__.setdefault("kept", TileCache())
     started = time.process_time()  # others on this machine do not make batches smaller
-    result = [
-        {file.name: data for file, data in errand.run(program, cache).items()} for program, errand in batch
-    ]
+    result = [{p.name: data for p, data in errand.run(program, cache).items()} for program, errand in batch]
     return time.process_time() - started, result

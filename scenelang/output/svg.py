@@ -186,9 +186,8 @@ class Region:
         each = max(1, (1 << 16) // (p.shape[1] * len(self.bound.tokens)))
         for some in (slice(i, i + each) for i in range(0, p.shape[2], each)):
             q = p[..., some]
-            value = np.maximum(
-                shapes.ask(self.bound, q, half_px), (abs(q - shapes.half) - shapes.half).max(0) - BORDER
-            )
+            beyond = (abs(q - shapes.half) - shapes.half).max(0) - BORDER
+            value = np.maximum(shapes.ask(self.bound, q, half_px), beyond)
             for one, other, floor in self.wins:
                 rest = shapes.ask(other, q, half_px)
                 value = np.maximum(value, shapes.ask(one, q, half_px) - (rest.clip(0.0) if floor else rest))
@@ -214,8 +213,7 @@ class Region:
     def outlines(self) -> list[tuple[Floats, Floats]]:
         """Closed outlines with the inside on one hand: points (2, n), and unit normals there (2, n)."""
         grid, first, step = self.grid()
-        loops = _loops(grid < 0)
-        if not loops:
+        if not (loops := _loops(grid < 0)):
             return []
         ends = np.concatenate(loops)  # (n, 2): nodes inside and outside
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
@@ -234,9 +232,8 @@ def _loops(inside: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
     """Closed outlines on a grid whose border is outside, as pairs of neighbours inside and outside (n, 2)."""
     flat, way = inside.ravel(), np.array([1, inside.shape[1], -1, -inside.shape[1]])
     node, to = np.nonzero(flat[(np.arange(flat.size)[:, None] + way) % flat.size] < flat[:, None])
-    beside = (
-        node + way[(to + 1) % 4]
-    )  # the next pair of a cell; corners inside that face each other are apart
+    # the next pair of a cell; corners inside that face each other are apart
+    beside = node + way[(to + 1) % 4]
     across = beside + way[to]
     then = np.where(flat[across], (across, (to + 3) % 4), (beside, to))
     then = np.where(flat[beside], then, (node, (to + 1) % 4))
@@ -398,10 +395,8 @@ class Inks:
             stops = np.concatenate([stops, np.stack(between, 1)])
             stops = stops[np.argsort(stops[:, 0], kind="stable")]
         shown = stepped(whole.xp, stops[:, 1:].T.astype(np.float32), texture.steps).T
-        listed = "".join(
-            f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>'
-            for at, rgb in zip(stops[:, 0], shown, strict=True)
-        )
+        pairs = zip(stops[:, 0], shown, strict=True)
+        listed = "".join(f'<stop offset="{at:.4g}" stop-color="{_hex(rgb)}"/>' for at, rgb in pairs)
         ends = 'x1="-1" x2="1"' if gradient.name == "linear" else 'cx="0" cy="0" r="1"'
         form = f'id="%s" gradientUnits="userSpaceOnUse" {ends} gradientTransform="matrix({moved})"'
         return f"<{gradient.name}Gradient {form}>{listed}</{gradient.name}Gradient>"

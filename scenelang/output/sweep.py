@@ -310,10 +310,8 @@ class Variants(Clip):
         self.file = target.path / f"{stem}.csv"
         self.names = tuple(dict.fromkeys(name for row in rows for name in row))
         self.told: dict[int, Sequence[Diagnostic]] = {}  # errors of the first rows that have any, by number
-        self.lines = [
-            TableRow(target.file(at).name, tuple(row.get(name, "") for name in self.names))
-            for at, row in enumerate(rows)
-        ]
+        values = (tuple(row.get(name, "") for name in self.names) for row in rows)
+        self.lines = [TableRow(target.file(at).name, own) for at, own in enumerate(values)]
         self._old = self._before()
         target.path.mkdir(parents=True, exist_ok=True)
         if not self._old:
@@ -360,9 +358,8 @@ class Variants(Clip):
                 for into, path in files.items():
                     store.adopt(into, path)
         elif old.digest:
-            raise TableError(
-                f"`{self.file}` is of another scene, model, size or version: row {frame.number} differs"
-            )
+            fact = "of another scene, model, size or version"
+            raise TableError(f"`{self.file}` is {fact}: row {frame.number} differs")
         self._note(frame.number, TableRow(line.picture, line.values, frame.key))
         result = {}
         if "scene" in self._asked:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from scenelang.drawing.image import Image
     from scenelang.output.frames import Target
 
-
 Stamps = dict[Path, tuple[int, int, int] | None]
 
 LOOK_S: Final = 0.03  # between two polls
@@ -190,8 +189,7 @@ def settle(paths: Collection[Path]) -> None:
         now = stamps(paths)
         if now == last:
             first = next(iter(now.values()), None)
-            whole = first is not None and first[1] > 0
-            if whole or time.monotonic() - started > PATIENCE_S:
+            if (first is not None and first[1] > 0) or time.monotonic() - started > PATIENCE_S:
                 return
         last = now
         if time.monotonic() - started > 10 * PATIENCE_S:

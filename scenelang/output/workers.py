@@ -25,7 +25,6 @@ from scenelang.drawing.how import RenderError, usable_cores
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-
 LOCAL: Final = "local"
 AHEAD: Final = 3  # pending tasks of each worker
 LOGGED: Final = "distributed.admin.low-level-log-length"  # messages that dask keeps, with their contents
@@ -120,9 +119,8 @@ class Connection:
         except KilledWorker as error:
             raise GivenUp(f"given up: {error.allowed_failures + 1} workers ended over it") from None
         except (CancelledError, CommClosedError, TimeoutError):
-            raise RenderError(
-                f"the scheduler at `{self.address}` is gone; the same command goes on with what is left"
-            ) from None
+            fact = f"the scheduler at `{self.address}` is gone"
+            raise RenderError(f"{fact}; the same command goes on with what is left") from None
 
     def close(self) -> None:
         """Cancel pending tasks and end workers of this machine."""

@@ -109,18 +109,13 @@ def _shape(element: Element, store: ArrayStore) -> dict[str, Any]:
         table, curves = table_of(element, OUTLINE_SIDES), curves_of(element)
         wide, high = (float(side) for side in abs(curves).max((0, 1)))
         return {
-            "name": element.name,
-            "kind": "outline",
-            "dimension": 2,
+            **{"name": element.name, "kind": "outline", "dimension": 2},
             "cells": store.add(np.concatenate([table.first, table.near]).astype(np.int32)),
             "pieces": store.add(np.ascontiguousarray(table.pieces.T).reshape(-1)),
             "bounds": (wide, high, 1.0),
         }
     return {
-        "name": element.name,
-        "kind": "grid",
-        "dimension": element.dimension,
-        "sides": element.sides,
+        **{"name": element.name, "kind": "grid", "dimension": element.dimension, "sides": element.sides},
         "finest": len(unpacked(element)),
         "steps": store.add(_steps(element)),
         "codec": {
@@ -188,14 +183,15 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             "shape": _index(codes, parts.code[i]) if form < 0 else len(codes) + forms.index(form),
             "material": _index(material_codes, parts.material[i]),
             "steps": _row_steps(v.astype(np.float64), layout),
-            "scale": scales[i],
-            "colour": parts.rgb[i].tolist(),
+            **{"scale": scales[i], "colour": parts.rgb[i].tolist()},
             "opacity": 1.0 - min(max(float(parts.clear[i]), 0.0), 1.0),
-            "paint": -1,
-            "amount": 0.0,
-            "frequency": 0.0,
-            "blend": widths[i],
-            "object": program.numbers[i],
+            **{
+                "paint": -1,
+                "amount": 0.0,
+                "frequency": 0.0,
+                "blend": widths[i],
+                "object": program.numbers[i],
+            },
         }
         if skins is not None:
             row["skin"] = [float(number) for number in skins.at(i)]

@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
     from scenelang.drawing.image import Image
 
-
 MOST: Final = 5  # kinds of objects, and colours, that a text names
 _HUES: Final = (
     (0.03, "red"),
@@ -96,9 +95,8 @@ def alternative(data: dict[str, Any]) -> str:
         said += f", on {colour_name(background)}"
     said += "."
     if animation:
-        said += (
-            f" It moves for {animation['seconds']:g} seconds{', over and over' * bool(animation['loop'])}."
-        )
+        again = ", over and over" * bool(animation["loop"])
+        said += f" It moves for {animation['seconds']:g} seconds{again}."
     return said
 
 
@@ -181,17 +179,10 @@ def view_of(
     figures = manifest.measured.get("sets", {}).get(manifest.set)  # errors on the scenes of its own set
     measured = {} if figures is None else {"cap": manifest.measured.get("psnr_cap_db")}
     measured |= {} if figures is None else {key: figures[key] for key in ("scenes", "psnr", "flip")}
+    about = {"name": manifest.name, "summary": manifest.summary, "weights": digest, "measured": measured}
     data: dict[str, Any] = {
-        "format": FORMAT,
-        "title": title,
-        "canvas": program.canvas,
-        "dimension": manifest.dimension,
-        "model": {
-            "name": manifest.name,
-            "summary": manifest.summary,
-            "weights": digest,
-            "measured": measured,
-        },
+        **{"format": FORMAT, "title": title, "canvas": program.canvas, "dimension": manifest.dimension},
+        "model": about,
         "shapes": [*geometries, *shapes_of(elements, store)],
         "materials": [
             {"name": name, "albedo": row[:3].tolist(), "medium": float(row[3]) if len(row) > 3 else 0.0}
@@ -377,8 +368,7 @@ def viewed(source: Source | Scene | Program, title: str) -> tuple[PagePayload, P
     evaluation, scene = None, source if isinstance(source, Scene) else None
     if isinstance(source, Source):
         evaluation = source.evaluation(result := Diagnostics())
-        scene = evaluation.run(0)[0]
-        if scene is None or result.errors:
+        if (scene := evaluation.run(0)[0]) is None or result.errors:
             raise SceneError(result)
     assert scene is not None
     program = compile_scene(scene)

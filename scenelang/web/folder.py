@@ -161,18 +161,10 @@ class Folder:
 def fits(name: str) -> bool:
     """True for names that a scene may have on any system, such as ``a/b.nsg``."""
     parts = name.split("/")
-    return (
-        name.endswith(".nsg")
-        and len(parts) <= _MOST_PARTS
-        and all(
-            _PART.fullmatch(part) is not None
-            and part[0] not in ". "
-            and part[-1] not in ". "
-            and _DEVICE.fullmatch(part) is None
-            and len(part.encode()) <= _MOST_NAME
-            for part in parts
-        )
-    )
+    if not (name.endswith(".nsg") and len(parts) <= _MOST_PARTS and all(map(_PART.fullmatch, parts))):
+        return False
+    plain = all(part == part.strip(". ") and not _DEVICE.fullmatch(part) for part in parts)
+    return plain and all(len(part.encode()) <= _MOST_NAME for part in parts)
 
 
 def _digest(data: bytes) -> str:

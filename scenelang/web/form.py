@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from typing import Any, Final, TypeVar
 
@@ -38,16 +38,14 @@ Worn = Element | Gradient
 T = TypeVar("T", Element, Worn)
 
 
-@dataclass(slots=True, eq=False)
-class Frame:
+class Frame(Record, frozen=False):
     """The slots of a call of a function or a module; slot 0 holds the call around it."""
 
     outer: Frame | None
     size: int = 1
 
 
-@dataclass(slots=True, eq=False)
-class PageScope:
+class PageScope(Record, frozen=False):
     """The names of a block, and the block around it; without a frame its slots are those of files."""
 
     frame: Frame | None = None
@@ -61,8 +59,7 @@ class PageScope:
         return result.inside.names.get(rest) if dot and result is not None and result.inside else result
 
 
-@dataclass(slots=True, eq=False)
-class Bound:
+class Bound(Record, frozen=False):
     """The binding of a name."""
 
     kind: str  # as of `scenelang.language.session.Binding`
@@ -533,13 +530,9 @@ def form_of(
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
     shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]
-    return PageProgram(
-        data,
-        [param_data(name, stmt, file) for name, stmt, file, _ in shown],
-        [{"name": name, "reason": reason} for name, reason in reasons.items()],
-        tuple(writer.shapes),
-        tuple(writer.paints),
-    )
+    params = [param_data(name, stmt, file) for name, stmt, file, _ in shown]
+    fixed = [{"name": name, "reason": reason} for name, reason in reasons.items()]
+    return PageProgram(data, params, fixed, tuple(writer.shapes), tuple(writer.paints))
 
 
 @cache

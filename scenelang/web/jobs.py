@@ -87,12 +87,8 @@ def _view(job: Job, tell: Tell) -> Answer:
     except (ProgramError, FileNotFoundError) as error:
         problem = {"code": "", "severity": "warning", "message": str(error), "line": 1, "column": 1}
         lacking.append(problem)
-    data = {
-        **job["message"],
-        "view": shown and shown.message(),
-        "problems": [*map(_problem, result.items[:MOST_TOLD]), *lacking],
-        "ms": _since(started),
-    }
+    problems = [*map(_problem, result.items[:MOST_TOLD]), *lacking]
+    data = {**job["message"], "view": shown and shown.message(), "problems": problems, "ms": _since(started)}
     head: dict[str, Any] = {"wanted": [str(path) for path in evaluation.wanted]}
     if shown is not None:
         head["lit"] = "around" in shown.data and len(shown.data["program"]["rows"]) <= MOST_LIT
@@ -124,8 +120,7 @@ def _network(job: Job, tell: Tell) -> Answer:
 
 def _reference(job: Job, tell: Tell) -> Answer:
     started = time.perf_counter()
-    image = _exact(job, Clip(_source(job)))
-    return _picture(job, image, {"draw": _since(started)})
+    return _picture(job, _exact(job, Clip(_source(job))), {"draw": _since(started)})
 
 
 def _difference(job: Job, tell: Tell) -> Answer:
@@ -176,8 +171,7 @@ def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
     program = clip.program(_shot(clip, frame))
     ms = {"compile": _since(started)}
     started = time.perf_counter()
-    image = _by_network(program)
-    return image, {**ms, "draw": _since(started)}
+    return _by_network(program), {**ms, "draw": _since(started)}
 
 
 def _by_network(program: Program, tell: Tell | None = None) -> Image:

@@ -224,8 +224,7 @@ class Live:
         kept = await asyncio.to_thread(self._play.journal.find, path)
         async with self._play.reading:
             text, disk = await asyncio.to_thread(self._play.folder.read, name)
-        known = self.open.get(name)
-        if known is None:
+        if (known := self.open.get(name)) is None:
             known = self.open[name] = Open(path, text or "", disk)
         lost = kept is not None and kept.text != text
         unsaved = {"text": kept.text, "disk": kept.disk, "seconds": kept.seconds} if kept and lost else None
@@ -293,12 +292,10 @@ class Live:
         return name, self.open[name]
 
     def _keep_later(self, name: str) -> None:
-        known = self.open.get(name)
-        if known is not None:
+        if (known := self.open.get(name)) is not None:
             known.keeping = None
-            self._play.later(
-                asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
-            )
+            work = asyncio.to_thread(self._play.keep, known.path, known.text, known.saved, known.base)
+            self._play.later(work)
 
     def _keep(self, name: str) -> None:
         """Store the unsaved text of a file now."""
@@ -314,8 +311,7 @@ class Live:
 
     def changed(self, name: str, text: str | None, disk: str | None) -> None:
         """Send the page a file that has changed on the disk."""
-        known = self.open.get(name)
-        if known is None or known.disk == disk:
+        if (known := self.open.get(name)) is None or known.disk == disk:
             return
         clean = known.text == known.saved
         known.saved, known.disk = text or "", disk
@@ -335,8 +331,7 @@ class Live:
         version = self.open[name].version
 
         def viewed(answer: Answer) -> None:
-            known = self.open.get(name)
-            if known is not None:
+            if (known := self.open.get(name)) is not None:
                 known.wanted = frozenset(map(Path, answer.head["wanted"]))
                 known.angles = frozenset(answer.head.get("angles", known.angles))
                 if answer.head.get("lit"):  # the same with a draft of its light, which takes longer
@@ -386,9 +381,8 @@ class Live:
             if key in known.angles and isinstance(value, int | float) and not isinstance(value, bool):
                 job["params"] = {**job["params"], key: f"{value!r}rad"}
         job["path"], job["root"] = str(known.path), None if root is None else str(root)
-        job["texts"] = {
-            str(o.path.resolve()): o.text for k, o in self.open.items() if k != name and o.version
-        }
+        others = (other for other in self.open.values() if other is not known and other.version)
+        job["texts"] = {str(other.path.resolve()): other.text for other in others}
         if slot in self._jobs:
             self._jobs[slot][0].cancel()
         elif len(self._jobs) >= MOST_JOBS:

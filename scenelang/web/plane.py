@@ -61,16 +61,9 @@ def shader(network: FramedArrays, store: ArrayStore, skinned: Set[int] = frozens
     short = [levels.get(code.tobytes()) if i in skinned else None for i, code in enumerate(network.codes)]
     sizes = {
         **{name.upper(): token for name, token in TOKENS.items()},
-        "KINDS": len(lines),
-        "LINES": config.paint_lines,
-        "RIM": RADIUS,
-        "BLEND": field.BLEND,
-        "FARTHER": field.FARTHER,
-        "FARTHEST": field.FARTHEST,
-        "UNIT": unit,
-        "SLOPE": float(np.exp(network.read_slope)) / 4,
-        "LUMA": f"vec3{LUMA}",
-        "HARD": HARD,
+        **{"KINDS": len(lines), "LINES": config.paint_lines, "RIM": RADIUS, "UNIT": unit},
+        **{"BLEND": field.BLEND, "FARTHER": field.FARTHER, "FARTHEST": field.FARTHEST},
+        **{"SLOPE": float(np.exp(network.read_slope)) / 4, "LUMA": f"vec3{LUMA}", "HARD": HARD},
         **{name.upper(): float(at) for at, name in enumerate(STEPS)},
     }
     defines = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
@@ -79,11 +72,8 @@ def shader(network: FramedArrays, store: ArrayStore, skinned: Set[int] = frozens
         "shader": {"fragment": text + defines + web("angles.glsl") + web("plane.glsl")},
         "network": {
             "cell": store.add(table.reshape(-1)),
-            "empty": EMPTY,
-            "blend": field.BLEND,
-            "slack": field.SLACK,
-            "farther": field.FARTHER,
-            "farthest": field.FARTHEST,
+            **{"empty": EMPTY, "blend": field.BLEND, "slack": field.SLACK},
+            **{"farther": field.FARTHER, "farthest": field.FARTHEST},
             "paintSteps": list(STEPS),
             "decoders": [
                 {

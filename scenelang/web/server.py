@@ -219,8 +219,7 @@ def make_app(play: Play) -> Starlette:
         return Response(text.replace("__NONCE__", nonce), media_type="text/html", headers=headers)
 
     async def download(request: Request) -> Response:
-        result = play.store.take(request.query_params.get("key", ""))
-        if result is None:
+        if (result := play.store.take(request.query_params.get("key", ""))) is None:
             return PlainTextResponse("There is no such file any more.\n", 404)
         name, kind, data = result
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name, safe='')}"}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
+from itertools import accumulate, pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -24,15 +25,8 @@ from scenelang.web.arrays import ArrayStore, web
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "lamps.glsl", "light.glsl")
 """Files of ``viewer/``, in order."""
 _CONSTANTS: Final = {
-    "EMPTY": EMPTY,
-    "RADIUS": RADIUS,
-    "EXTINCTION": EXTINCTION,
-    "FADE": FADE,
-    "NEAREST": NEAREST,
-    "LIFT": LIFT,
-    "AMBIENT_EVEN": AMBIENT[0],
-    "AMBIENT_UP": AMBIENT[1],
-    "HARD": HARD,
+    **{"EMPTY": EMPTY, "RADIUS": RADIUS, "EXTINCTION": EXTINCTION, "FADE": FADE, "NEAREST": NEAREST},
+    **{"LIFT": LIFT, "AMBIENT_EVEN": AMBIENT[0], "AMBIENT_UP": AMBIENT[1], "HARD": HARD},
 }
 
 
@@ -51,23 +45,17 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     usual = stage_data(Stage())
     usual["lights"] = [{**usual.pop("light"), "radius": 0.0}]
     parts += ["#ifndef LAMPS\n#define LAMPS 1\n#endif", _struct("Stage", usual)]
-    parts += [
-        f"uniform vec4 cells[{len(cells)}]; // of each join what is made of a distance, a bump; then lines"
-    ]
+    said = "of each join what is made of a distance, a bump; then lines"
+    parts += [f"uniform vec4 cells[{len(cells)}]; // {said}"]
     parts += [_decoders(decoders, sloped=False), _decoders(decoders, sloped=True), _gates(paint, kind)]
+    boxes = np.array([network.box(layers) for layers in decoders], np.float32)
     return {
         "shader": {"source": "".join(map(web, FILES)).replace("//network//", "\n".join(parts))},
         "network": {
             "cells": store.add(cells.astype(np.float32).reshape(-1)),
-            "boxes": store.add(
-                np.array([network.box(layers) for layers in decoders], np.float32).reshape(-1)
-            ),
+            "boxes": store.add(boxes.reshape(-1)),
             "geometries": len(decoders),
-            "blend": BLEND,
-            "extinction": EXTINCTION,
-            "slack": SLACK,
-            "loose": LOOSE,
-            "far": RADIUS,
+            **{"blend": BLEND, "extinction": EXTINCTION, "slack": SLACK, "loose": LOOSE, "far": RADIUS},
             "products": max(products) + 2 * (1 + paint + kind),
         },
     }
@@ -143,24 +131,20 @@ def _norms(layers: Norms, sloped: bool) -> list[str]:
         "float across = length(q.xz), most = max(max(s.x, s.y), s.z), least = min(min(s.x, s.y), s.z);",
         *(f"float l{i} = {level};" for i, level in enumerate(levels)),
     ]
-    outer, at, lengths = sum(layers.units), 0, []
+    outer, ends = sum(layers.units), [*pairwise(accumulate(layers.units, initial=0))]
     lines += [f"l{i} = max(l{i}, 0.0);" for i in range(outer)]
-    for k, size in enumerate(layers.units):
-        squares = [f"l{i} * l{i}" for i in range(at, at + size)]
+    for k, (first, end) in enumerate(ends):
+        squares = [f"l{i} * l{i}" for i in range(first, end)]
         lines.append(f"float u{k} = sqrt({' + '.join(squares)});")
-        lengths.append(f"u{k}")
-        at += size
+    lengths = [f"u{k}" for k in range(len(ends))]
     lines.append(f"float far = {_highest(lengths) if lengths else '0.0'};")
     inner = [f"l{i}" for i in range(outer, len(levels))]
     lines.append(f"float deep = {_highest(inner) if inner else '0.0'};")
     if sloped:
         lines.append("vec3 a = vec3(0.0); float about = 0.0, up = 0.0, top = 0.0, low = 0.0;")
         places = ("a.x", "a.y", "a.z", "about", "up", "top", "low")
-        at = 0
-        rates = []
-        for k, size in enumerate(layers.units):
-            rates += [f"u{k} == far ? l{i} / max(far, 1e-18) : 0.0" for i in range(at, at + size)]
-            at += size
+        units = ((k, i) for k, (first, end) in enumerate(ends) for i in range(first, end))
+        rates = [f"u{k} == far ? l{i} / max(far, 1e-18) : 0.0" for k, i in units]
         rates += [f"(deep < 0.0 || far == 0.0) && {name} == deep ? 1.0 : 0.0" for name in inner]
         for rate, row in zip(rates, layers.w.tolist(), strict=True):
             terms = [f"{places[i]} += r * {v!r};" for i, v in zip(layers.features, row, strict=True) if v]

@@ -34,5 +34,4 @@ def command(
     with clock("save"):
         job.program.save(out)
     if verbose:
-        lines = "".join(f"\n  {note}" for note in job.notes)
-        click.echo(f"{file} -> {out}{lines}\n{clock.report()}", err=True)
+        click.echo("\n  ".join([f"{file} -> {out}", *job.notes]) + f"\n{clock.report()}", err=True)

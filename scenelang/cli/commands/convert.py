@@ -16,11 +16,9 @@ from scenelang.language.scene import to_readable_json
 @click.argument("file", metavar="FILE")
 @options.out
 @click.option(
-    "--to",
-    "kind",
-    type=click.Choice(["nsg", "json"]),
+    "--to", "kind", type=click.Choice(["nsg", "json"]),
     help="Format to write; by default the one of OUT's suffix (.nsg, .json).",
-)
+)  # fmt: skip
 @options.request()
 @click.pass_context
 def command(

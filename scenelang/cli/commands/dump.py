@@ -22,7 +22,6 @@ from scenelang.language.words import COMBINE
 if TYPE_CHECKING:
     from scenelang.cli.inputs import Input
 
-
 Kind = Literal["text", "json", "mmd", "dot", "svg", "png"]
 _DRAWN: Final = ("mmd", "dot", "svg", "png")
 STAGES: Final = ("syntax", "scene", "lower", *(step.name for step in PASSES), "program")
@@ -32,22 +31,16 @@ _PATIENCE_S: Final = 60
 @click.command("dump")
 @click.argument("file", metavar="FILE")
 @click.option(
-    "--after",
-    "stages",
-    multiple=True,
-    type=click.Choice(STAGES),
-    help="Stage or pass to show; may be given several times. By default program, with --diff all, and of "
-    "drawings scene.",
-)
+    "--after", "stages", multiple=True, type=click.Choice(STAGES), help="Stage or pass to show; may be given "
+    "several times. By default program, with --diff all, and of drawings scene.",
+)  # fmt: skip
 @click.option("--diff", is_flag=True, help="Show only what each pass changed.")
 @click.option("--costs", is_flag=True, help="Show what drawing the scene takes and what is left out of it.")
 @click.option(
-    "--format",
-    "kind",
-    type=click.Choice(("text", "json", *_DRAWN)),
-    help="Format of what is printed, or of a drawing of the graph: mmd (Mermaid), dot, or svg and png, which "
-    "need Graphviz; by default the one of OUT's suffix, else text.",
-)
+    "--format", "kind", type=click.Choice(("text", "json", *_DRAWN)), help="Format of what is printed, or of "
+    "a drawing of the graph: mmd (Mermaid), dot, or svg and png, which need Graphviz; by default the one of "
+    "OUT's suffix, else text.",
+)  # fmt: skip
 @options.count("--most", high=10_000, default=200, help="Largest number of boxes to draw.")
 @options.out
 @options.request()
@@ -156,8 +149,7 @@ def _drawing(job: Input, stage: str, kind: str, most: int) -> str:
 
 def _picture(kind: str, text: str) -> bytes:
     """A picture of DOT text by Graphviz."""
-    dot = shutil.which("dot")
-    if dot is None:
+    if (dot := shutil.which("dot")) is None:
         raise click.UsageError(
             f".{kind} needs Graphviz, whose program `dot` is not here: install the package `graphviz`, "
             "or write .dot or .mmd, which need nothing."
@@ -198,19 +190,12 @@ def _costs_text(plan: dict[str, Any]) -> str:
     if cost["unknown"] is None:
         flip = "" if cost["flip"] is None else f", FLIP {cost['flip']:.4f},"
         error = f"{cost['psnr']:.2f} dB PSNR (50 at most){flip} against the exact picture"
-    return "\n".join(
-        [
-            f"stream     {plural(plan['rows'], 'row')} of 64 numbers ({tokens or 'empty'})",
-            *(_rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)),
-            f"frame      {cost['ms']:.1f} ms",
-            f"error      {error}",
-            "",
-            f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; {others}",
-            *[f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()],
-            "",
-            *_table(plan["stages"]),
-        ]
-    )
+    lines = [f"stream     {plural(plan['rows'], 'row')} of 64 numbers ({tokens or 'empty'})"]
+    lines += _rays(cost, plan["rows"]) if "rays" in cost else _meetings(cost)
+    lines += [f"frame      {cost['ms']:.1f} ms", f"error      {error}", ""]
+    lines += [f"model {plan['model']} ({plan['why']}), {cost['parameters']:,} parameters; {others}"]
+    lines += [f"  {name} lacks {', '.join(names)}" for name, names in plan["lacking"].items()]
+    return "\n".join([*lines, "", *_table(plan["stages"])])
 
 
 def _meetings(cost: dict[str, Any]) -> list[str]:

@@ -62,8 +62,7 @@ def _print_list(codes: list[str], kind: str, painted: bool) -> None:
     sections = []
     for area, name in AREAS.items():
         pages = [read_page(code) for code in codes if code[1:3] == area]
-        own = [f"  {paint(page.severity, page.code, painted)}  {page.title}" for page in pages]
-        if own:
+        if own := [f"  {paint(page.severity, page.code, painted)}  {page.title}" for page in pages]:
             sections.append("\n".join([paint("bold", name, painted), *own]))
     click.echo("\n\n".join(sections), color=True)
 

@@ -63,8 +63,7 @@ def command(
             text = page(view, still=picture).encode()
             write_output(path, text)
         if verbose:
-            lines = "".join(f"\n  {note}" for note in (*job.notes, f"{len(text):,} bytes"))
-            click.echo(f"{job.name} -> {path}{lines}", err=True)
+            click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes, f"{len(text):,} bytes"]), err=True)
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)

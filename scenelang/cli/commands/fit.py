@@ -56,14 +56,9 @@ def _to(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> 
 @click.command("fit")
 @click.argument("scene", metavar="SCENE", type=click.Path(path_type=Path))
 @click.option(
-    "--to",
-    "target",
-    required=True,
-    multiple=True,
-    callback=_to,
-    metavar="PICTURE",
+    "--to", "target", required=True, multiple=True, callback=_to, metavar="PICTURE",
     help="Target, PNG or JPEG; FRAME=PICTURE, several times, or frame-%04d.png for frames of an animation.",
-)
+)  # fmt: skip
 @click.option(
     "-o", "--out", metavar="OUT", help="Scene to write, with the values found as defaults; - prints it."
 )

@@ -21,41 +21,29 @@ from scenelang.cli.say import Bar
 @options.writes("ZOO", "File of elements to write or to add to, .safetensors.")
 @click.option("--name", metavar="NAME", help="Name of the element; by default the file's.")
 @options.choice(
-    "--as",
-    "pictures",
-    words="texture outline",
-    help="Element to make of a picture: a material, or the flat shape of its opaque or, without "
-    "transparency, dark part.",
-)
+    "--as", "pictures", words="texture outline", help="Element to make of a picture: a material, or the "
+    "flat shape of its opaque or, without transparency, dark part.",
+)  # fmt: skip
 @options.count(
-    "--texels",
-    high=MOST_PIXELS,
-    default=TEXELS,
+    "--texels", high=MOST_PIXELS, default=TEXELS,
     help="Texels of a texture along its longer side, at most; larger pictures are made smaller.",
-)
+)  # fmt: skip
 @options.choice(
-    "--sign",
-    words="auto winding closed",
-    help="Test for the inside: winding numbers, of any mesh, or normals, of a closed one that "
-    "nowhere passes through itself; auto is winding.",
-)
+    "--sign", words="auto winding closed", help="Test for the inside: winding numbers, of any mesh, or "
+    "normals, of a closed one that nowhere passes through itself; auto is winding.",
+)  # fmt: skip
 @click.option(
-    "--parts/--together",
-    default=None,
-    help="Make parts elements of their own too: solids that a mesh file names, areas of one "
-    "colour; by default those of drawings.",
-)
+    "--parts/--together", default=None, help="Make parts elements of their own too: solids that a mesh file "
+    "names, areas of one colour; by default those of drawings.",
+)  # fmt: skip
 @options.positive(
     "--color-error", "SHARE", "Largest root mean square error of a mesh's colours; by default 0.025.", high=1
 )
 @options.positive(
-    "--max-error",
-    "SHARE",
-    "Largest mean error of distances at the surface, in radii of the shape, by default 0.00015 "
-    "for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
-    "colours, by default 0.01.",
-    high=1,
-)
+    "--max-error", "SHARE", "Largest mean error of distances at the surface, in radii of the shape, by "
+    "default 0.00015 for solids and 0.0001 for flat shapes; of a texture the root mean square error of its "
+    "colours, by default 0.01.", high=1,
+)  # fmt: skip
 @click.option("--letters", metavar="RANGES", help="Letters to take of a font, U+20-7E,U+3B1; by default all.")
 @click.option("--font", metavar="FONT.ttf", help="Font for texts of drawings; else std/letters.")
 @options.positive("--budget", "SECONDS", "Time after which nothing new is begun, for each file.")

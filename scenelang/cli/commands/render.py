@@ -34,7 +34,6 @@ _SECTIONS: Final = {
     "Meshes": "--resolution",
 }
 
-
 _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backend", "strict", "verbose")
 """Parameters that shapes have too."""
 
@@ -46,11 +45,9 @@ _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backe
 @options.film()
 @options.drawing()
 @options.several(
-    "--output",
-    "outputs",
-    of=("depth", "normal", "object", "alpha", "proof"),
+    "--output", "outputs", of=("depth", "normal", "object", "alpha", "proof"),
     help="Output to write beside the picture, to STEM.depth.png and so on, or into an .exr",
-)
+)  # fmt: skip
 @click.option("--prove", is_flag=True, help="Prove how far pixels are from the exact picture at most (2D).")
 @click.option("--redraw", is_flag=True, help="With a proof: draw again what is not proved right to 1/255.")
 @options.positive(
@@ -127,8 +124,7 @@ def command(
     request = replace(request, source=replace(request.source, fps=film.fps))
     clock, result = Clock(), None
     if len(files) == 1 and request.frame is None and not files[0].endswith(PROGRAM):
-        target = film.target(files[0], out)
-        if target is not None:
+        if (target := film.target(files[0], out)) is not None:
             result = read_input(files[0], request, clock, how)
             if _moves(result, target, film, out):
                 if limits or prove:
@@ -168,8 +164,7 @@ def command(
 
             told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
-                lines = "".join(f"\n  {note}" for note in job.notes)
-                click.echo(f"{job.name} -> {path}{lines}", err=True)
+                click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
     for line in told:
         click.echo(line, err=True)
     if verbose and able:

@@ -12,10 +12,9 @@ from scenelang.cli.say import put_out
 
 @click.command("schema")
 @options.choice(
-    "--kind",
-    words="scene diagnostics",
+    "--kind", words="scene diagnostics",
     help="Schema of scenes as JSON, or of what `check --format json` prints.",
-)
+)  # fmt: skip
 @options.out
 def command(kind: str, out: str | None) -> None:
     """Print the JSON Schema (draft 2020-12) of scenes as JSON.

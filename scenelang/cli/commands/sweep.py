@@ -49,11 +49,9 @@ def _random(ctx: click.Context, param: click.Parameter, given: tuple[str, ...]) 
 @options.count("--count", help="Number of pictures; by default the grid once.")
 @options.count("--seed", low=0, default=0, help="Seed of the random values.")
 @options.several(
-    "--output",
-    "outputs",
-    of=("depth", "normal", "object", "alpha", "scene", "program"),
+    "--output", "outputs", of=("depth", "normal", "object", "alpha", "scene", "program"),
     help="Output to write beside each picture",
-)
+)  # fmt: skip
 @click.option("--sheet", metavar="FILE", help="Write a picture of all pictures, small.")
 @click.option("--table", metavar="FILE", help="Write a copy of the table, .csv or .parquet.")
 @options.request()

@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.drawing.image import decoded, encoded
 from scenelang.language.diagnostics import plural
 
@@ -29,8 +30,7 @@ Points = npt.NDArray[np.float64]  # (M, 3)
 Rows = npt.NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tints:
+class Tints(Record, frozen=False):
     """The colours of F triangles."""
 
     tint: npt.NDArray[np.float32]  # (F, 3, 3), at corners; of a texture what multiplies it
@@ -321,15 +321,9 @@ def mesh_of(
     kind = "closed" if closed else "not closed, filled where the winding number is over a half"
     rule = "normals" if by_normals else "winding numbers"
     notes = [plural(len(mesh.faces), "triangle"), kind, *notes, f"inside by {rule}"]
-    return Mesh(
-        np.ascontiguousarray(mesh.vertices, float),
-        np.ascontiguousarray(mesh.faces, np.int64),
-        by_normals,
-        (float(centre[0]), float(centre[1]), float(centre[2])),
-        size,
-        tuple(notes),
-        look,
-    )
+    vertices, faces = np.ascontiguousarray(mesh.vertices, float), np.ascontiguousarray(mesh.faces, np.int64)
+    x, y, z = centre.tolist()
+    return Mesh(vertices, faces, by_normals, (x, y, z), size, tuple(notes), look)
 
 
 MOST_OF_MESH: Final = dict.fromkeys((".obj", ".ply", ".stl", ".glb"), 1 << 30)  # bytes of a file

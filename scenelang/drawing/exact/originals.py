@@ -45,8 +45,7 @@ def shape_in(data: bytes, suffix: str, sign: Sign, number: int) -> Shape:
         drawn = outline.read_outline(data, suffix)
         if number == 0:
             return drawn
-        layers = [layers for _, layers in drawn.painted()][number - 1 :]
-        if layers:
+        if layers := [layers for _, layers in drawn.painted()][number - 1 :]:
             return Outline(layers[0])
     else:
         result, _ = meshes.read_solids(data, suffix)
@@ -171,13 +170,11 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
     if path.name != file or path.suffix.lower() not in MOST_OF or not path.is_file():
         ships = library.owns(Path(folder, file).resolve())
         means = ", which `python -m lab docs meshes` of the repository makes" if ships else ""
-        raise FitError(
-            f"{origin}, which is not in `{folder}`; `--originals FOLDER` ({FOLDER}) says where it is{means}"
-        )
+        advice = f"`--originals FOLDER` ({FOLDER}) says where it is{means}"
+        raise FitError(f"{origin}, which is not in `{folder}`; {advice}")
     version = path.stat().st_mtime_ns, path.stat().st_size
     part = int(element.about.get("part", 0))
-    shape = _shape(path, digest, element.about.get("sign") == "closed", part, *version)
-    if shape is None:
+    if (shape := _shape(path, digest, element.about.get("sign") == "closed", part, *version)) is None:
         raise FitError(f"{origin}, and `{path}` is another file of that name")
     return shape
 

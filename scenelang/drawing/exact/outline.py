@@ -13,7 +13,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 from xml.etree import ElementTree
@@ -27,6 +26,7 @@ from scenelang.assets.element import TEXELS, Element, Facts, Painted
 from scenelang.assets.element_file import load_element_file
 from scenelang.assets.font import Font, FontError
 from scenelang.assets.picture import frame_of, painted, texels
+from scenelang.assets.records import Record
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
 from scenelang.language import library
 from scenelang.language.diagnostics import plural
@@ -177,8 +177,7 @@ Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Layer:
+class Layer(Record, frozen=False):
     """The area on one side of edges, or near them."""
 
     edges: Edges
@@ -204,8 +203,7 @@ class Layer:
         at = np.repeat(np.arange(len(counts)), counts)
         step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
         a, b = self.edges[at, 0], self.edges[at, 1]
-        ends = [a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)]
-        result = np.stack(ends, 1)
+        result = np.stack([a + ((step + k) / counts[at])[:, None] * (b - a) for k in (0, 1)], 1)
         if self.inside is None:
             return result
         middle, beside = result.mean(1), _BESIDE * _normals(result)
@@ -510,9 +508,8 @@ def _seen(paint: Any, shape: Any) -> Painted | None:
     alpha = paint.alpha / 255 * _share(str(shape.values.get("opacity", "1")))
     if alpha == 0:
         return None
-    red, green, blue = (
-        round(1 - alpha * (1 - channel / 255), 4) for channel in (paint.red, paint.green, paint.blue)
-    )
+    channels = (paint.red, paint.green, paint.blue)
+    red, green, blue = (round(1 - alpha * (1 - channel / 255), 4) for channel in channels)
     return red, green, blue
 
 

@@ -70,8 +70,7 @@ def true_shapes(graph: Graph, brought: Brought | None) -> Brought:
     """
     result = dict(brought or {})
     for leaf in leaves(graph.root):
-        element = graph.elements.get(name := leaf.geometry)
-        if element is not None and name not in result:
+        if (element := graph.elements.get(name := leaf.geometry)) is not None and name not in result:
             if element.form != "outline":
                 raise ValueError(f"the exact shape of `{name}` is not known")
             result[name] = of_curves(element)
@@ -90,9 +89,8 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
             p = sample_points(graph.canvas, rows, 1, columns)
             d, owner = evaluate(node, p, owners=True, brought=brought)
             result[4][part] = np.where(d < 0, owner[:, 0], 0).reshape(len(rows), len(columns))
-            d, owner = evaluate(
-                node, sample_points(graph.canvas, rows, side, columns), owners=True, brought=brought
-            )
+            p = sample_points(graph.canvas, rows, side, columns)
+            d, owner = evaluate(node, p, owners=True, brought=brought)
             covered = np.where(d < 0, owner[:, 2], 0.0).reshape(len(rows), side, len(columns), side)
             result[5][part] = covered.mean((1, 3))
         return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
@@ -101,19 +99,12 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
         centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
-        alpha = _covered(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))
+        view = seen_along(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))[1]
+        alpha = 1.0 - (view.last != OPAQUE) * np.exp(-view.total)  # the share that objects hide
         result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         result[5, rows.start : rows.stop] = alpha.reshape(len(rows), side, width, side).mean((1, 3))
-    depth, normal, owner, alpha = result[0], np.moveaxis(result[1:4], 0, 2), result[4], result[5]
-    return Outputs(
-        depth.astype(np.float32), normal.astype(np.float32), owner.astype(np.int32), alpha.astype(np.float32)
-    )
-
-
-def _covered(field: ExactField, stage: Stage, d: Array) -> Array:
-    """Share of the background (M,) that objects hide along unit directions d (3, M)."""
-    view = seen_along(field, stage, d)[1]
-    return 1.0 - (view.last != OPAQUE) * np.exp(-view.total)
+    depth, normal = result[0].astype(np.float32), np.moveaxis(result[1:4], 0, 2).astype(np.float32)
+    return Outputs(depth, normal, result[4].astype(np.int32), result[5].astype(np.float32))
 
 
 def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
@@ -128,8 +119,7 @@ def _shown(field: ExactField, stage: Stage, d: Array) -> Array:
     enter, leave = view.enter[first], view.leave[first]
     t = np.minimum((enter + leave) / 2.0, enter + DEEP)
     out[4, inside] = field.at(o[:, inside] + t * d[:, inside]).owner
-    p = o[:, ray] + end[ray] * d[:, ray]
-    state, out[1:4, ray] = facing(field, p, d[:, ray])
+    state, out[1:4, ray] = facing(field, o[:, ray] + end[ray] * d[:, ray], d[:, ray])
     out[4, ray] = state.owner
     out[0] = np.where(end < np.inf, (forward @ d) * np.where(end < np.inf, end, 1.0), np.inf)
     return out

@@ -10,13 +10,13 @@ thinner than that along the ray.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Sky, Stage
@@ -129,9 +129,8 @@ def way_back(steps: Sequence[Step]) -> Any:
                 back.append(affine())
                 pending = np.eye(4)
             slope = (0.0, step.twist, 0.0) if isinstance(step, Twist) else (*step.bend, 0.0)
-            back.append(
-                ExactTurn(1, step.twirl, slope) if isinstance(step, Warp) else ExactTurn(2, 0.0, slope)
-            )
+            turn = ExactTurn(1, step.twirl, slope) if isinstance(step, Warp) else ExactTurn(2, 0.0, slope)
+            back.append(turn)
     return back if back and (pending == np.eye(4)).all() else [*back, affine()]
 
 
@@ -226,8 +225,7 @@ _MARGIN = 2e-2
 """Balls are this much larger than what they hold, in world units: more than the least step of a ray."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExactState:
+class ExactState(Record):
     """State of a fold, and optional values."""
 
     d: Any  # distance (M,)
@@ -409,9 +407,8 @@ def march(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = Fa
         going = np.nonzero((kind != OPAQUE) & (lower[0] < stop))[0]
         if len(going) < len(ray):
             ray, t, stop, lower = ray[going], t[going], stop[going], tuple(v[going] for v in lower)
-            origin, along, enter, leave, speed = (
-                v.take(going, 1) for v in (origin, along, enter, leave, speed)
-            )
+            parts = origin, along, enter, leave, speed
+            origin, along, enter, leave, speed = (part.take(going, 1) for part in parts)
     if not result:
         return Changes(first, last, np.zeros(0, int), np.zeros(0), first[:0], first[:0])
     ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*result, strict=True))

@@ -32,8 +32,7 @@ def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corne
         row = first + corner
         values.append(_between(xp.take(flat, row), xp.take(flat, row + 1), share[-1]))
     for along in reversed(share[:-1]):
-        pairs = zip(values[::2], values[1::2], strict=True)
-        values = [_between(a, b, along) for a, b in pairs]
+        values = [_between(a, b, along) for a, b in zip(values[::2], values[1::2], strict=True)]
     return values[0]
 
 

@@ -14,10 +14,11 @@ where they do whatever the tiles are, so that tiles and threads change nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from scenelang.assets.records import Record
 from scenelang.compiler.groups import SMOOTH, UNION
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import sample_places
@@ -78,8 +79,7 @@ def ties(field: Field, trace: Trace, reach: float) -> Array:
         shown[:, at] |= tied[:, at] & mixed
         blended[:, at] |= mixed
         tied[:, at] |= joins & (abs(margin) < 2 * reach)
-    nested = any(met.turn.ending is not None for met in trace)
-    return tied & blended if nested else shown
+    return tied & blended if any(met.turn.ending is not None for met in trace) else shown
 
 
 def add_textures(
@@ -129,8 +129,7 @@ MANY = 2  # objects a pixel above which it is asked which of them matter to its 
 FLAT = 1e-4  # of a channel: a block that is known so well has one colour
 
 
-@dataclass(slots=True)
-class Tile:
+class Tile(Record, frozen=False):
     """Some rows of pixels."""
 
     # (rows, width, 3) over a background, else premultiplied colour and coverage (rows, width, 4)
@@ -149,9 +148,7 @@ class Tile:
 
 
 class Coverage:
-    """Asks a field for pixels, of ``count`` samples each; ``skip`` leaves out what is out of reach or proved
-    not to matter.
-    """
+    """Asks a field for pixels of ``count`` samples; ``skip`` leaves out what is out of reach or unseen."""
 
     def __init__(self, field: Field, *, skip: bool = True, prove: bool = True, count: int = 4) -> None:
         self.count, self.corner = count, CORNERS[count]
@@ -401,8 +398,7 @@ class Coverage:
 
 def _portions(meetings: Meetings, points: int) -> list[tuple[int, Meetings]]:
     """Columns in turn, as many at a time as make `PAIRS` with so many points each, and which is the first."""
-    total = len(meetings.pairs) * points
-    if not total:
+    if not (total := len(meetings.pairs) * points):
         return []
     if total <= PAIRS:
         return [(0, meetings)]

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Unpack
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.how import Care
 from scenelang.drawing.image import Image, Outputs, enlarged, from_samples
@@ -29,8 +30,7 @@ from scenelang.drawing.solid.network import SolidNetwork
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
 
-@dataclass(slots=True)
-class TileCache:
+class TileCache(Record, frozen=False):
     """The last picture of a sequence."""
 
     keys: list[bytes] = field(default_factory=list)  # what each of its tiles showed, a digest
@@ -92,8 +92,7 @@ class Run(Care, total=False):
 TILE = 1 << 18  # pixels that are drawn at a time
 
 
-@dataclass(slots=True)
-class Drawing:
+class Drawing(Record, frozen=False):
     """A picture and what it cost."""
 
     image: Image  # (H, W, 3), or (H, W, 4) with straight alpha

@@ -117,9 +117,8 @@ class Field:
         codes = np.array([np.frombuffer(code, np.float32) for code in result], np.float32)
         self.codes = codes = codes.reshape(len(result), every.shape[1])
         """Codes of the leaves in use (K, C), whose decoders are computed together."""
-        self.shapes: list[Decoder | GridShape | OutlineShapes] = [
-            *network.decoders(xp.array(codes, self.like))
-        ]
+        learned = network.decoders(xp.array(codes, self.like))
+        self.shapes: list[Decoder | GridShape | OutlineShapes] = [*learned]
         self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
         self.levels: list[tuple[int, Lattice, float, float]] = []
@@ -321,10 +320,8 @@ class Field:
             old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
             if turn.ending is None:
                 rows, d, own = pairs.object[which], features[..., which], colours[:, which]
-                cell, lies = (
-                    Cell(*(part[..., which] for part in every)),
-                    over if over is None else over[which],
-                )
+                cell = Cell(*(part[..., which] for part in every))
+                lies = over if over is None else over[which]
             else:  # groups that end join as objects
                 top = xp.array(turn.ending, self.like)
                 ended, rows = xp.take(stack, top), count + which

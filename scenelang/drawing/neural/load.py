@@ -114,8 +114,7 @@ class Model:
 def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Network:
     """Build the network of a weights file; `ModelError` where it does not fit the manifest or itself."""
     header, arrays = open_weights(data)
-    make = _MAKERS.get(manifest.renderer)
-    if make is None:
+    if (make := _MAKERS.get(manifest.renderer)) is None:
         raise ModelError(f"an unknown renderer `{manifest.renderer}`")
     try:
         with torch.random.fork_rng(devices=[]):
@@ -135,8 +134,7 @@ def load_network(data: bytes, manifest: Manifest, device: str = "cpu") -> Networ
 
 
 def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streaming:
-    sizes = config["student"]["streaming"]
-    known = StreamingConfig(**{**sizes, "vector": WIDTH})
+    known = StreamingConfig(**{**config["student"]["streaming"], "vector": WIDTH})
     if manifest.sizes != ((known.resolution, known.resolution),):
         raise ModelError(f"a network for {known.resolution} pixels, which the manifest does not say")
     filters = known.filters(known.resolution)

@@ -11,13 +11,14 @@ rounding error of float32.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.records import Record
 from scenelang.compiler.groups import SMOOTH, Groups
 from scenelang.drawing.neural.frames import Floats, Frames
 from scenelang.drawing.neural.network import Cell
@@ -26,8 +27,7 @@ Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class Pairs:
+class Pairs(Record):
     """P pairs."""
 
     block: Index  # (P,)
@@ -62,8 +62,7 @@ class Pairs:
         return replace(self.take(by // parts**2), block=block[by])
 
 
-@dataclass(frozen=True, slots=True)
-class Meetings:
+class Meetings(Record):
     """Pairs slot by slot."""
 
     columns: Index  # (B,) blocks
@@ -242,8 +241,7 @@ class State(NamedTuple):
             side[:, columns] = now + choose(share.low * more, share.high * more)
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(Record):
     """Facts that are proved of blocks."""
 
     picture: Interval  # premultiplied colour and coverage (4, B)
@@ -374,8 +372,7 @@ LEVELS = 8, 4  # sides of blocks, pixels
 ROUNDING = 1e-6  # world units
 
 
-@dataclass(frozen=True, slots=True)
-class Raster:
+class Raster(Record):
     """Pixels in rows of blocks, of the largest size in both directions."""
 
     px: float  # world units

@@ -199,9 +199,8 @@ class Streaming(nn.Module):
         super().__init__()
         self.config = config
         sizes = [config.vector, *(config.filters(r) for r in config.levels)]
-        self.deconvolutions = nn.ModuleList(
-            nn.ConvTranspose2d(a, b, 4, 2, 1) for a, b in itertools.pairwise(sizes)
-        )
+        pairs = itertools.pairwise(sizes)
+        self.deconvolutions = nn.ModuleList(nn.ConvTranspose2d(a, b, 4, 2, 1) for a, b in pairs)
         first = SMALLEST if grown else config.resolution
         self.stages = nn.ModuleDict({str(r): Level(config.filters(r)) for r in config.levels if r >= first})
 
