@@ -680,7 +680,8 @@ def light(
         click.echo(
             f"{family:8} PSNR {result['mean_psnr']:.2f} dB, 5th percentile {result['psnr_5']:.2f}, "
             f"FLIP {result['mean_flip']:.4f}, {result['mean_seconds']:.2f} s; "
-            f"traced to {result['own']:.1f} dB"
+            f"traced to {result['own']:.1f} dB, without that noise {result['mean_clean']:.2f} and "
+            f"{result['clean_5']:.2f} dB"
         )
 
 

@@ -30,7 +30,7 @@ def colour(rng: Rng, low: float = 0.05, high: float = 0.9) -> str:
     return f"[{_n(r, g, b)}]"
 
 
-def _diffuse(rng: Rng) -> str:
+def diffuse(rng: Rng) -> str:
     return f"material diffuse {{ color({colour(rng)}); }}"
 
 
@@ -38,7 +38,7 @@ def _bright(rng: Rng) -> str:
     return f"material diffuse {{ color({colour(rng, *((0.5, 0.9), (0.9, 0.98))[int(rng.integers(2))])}); }}"
 
 
-def _mist(rng: Rng, most: float = 12.0) -> str:
+def mist_of(rng: Rng, most: float = 12.0) -> str:
     high = 1.0 - 10 ** _in(rng, -2.0, -0.4)  # an albedo of 0.6 to 0.99
     tint = colour(rng, max(high - 0.3, 0.0), high)
     return f"material volumetric {{ color({tint}); density({_n(math.exp(_in(rng, 0.0, math.log(most))))}); }}"
@@ -63,21 +63,21 @@ def _moves(rng: Rng, size: float = 1.0, spread: float = 1.0) -> str:
     return f"scale({_n(*sides)}); {_turn(rng)} translate({_n(*at)});"
 
 
-def _solid(rng: Rng, material: str, size: float = 1.0, spread: float = 1.0) -> str:
+def solid(rng: Rng, material: str, size: float = 1.0, spread: float = 1.0) -> str:
     return f"{LEAVES[int(rng.integers(len(LEAVES)))]} {{ {_moves(rng, size, spread)} {material} }}\n"
 
 
-def _solids(rng: Rng, low: int, high: int, look: Callable[[Rng], str] = _diffuse, size: float = 1.0) -> str:
-    return "".join(_solid(rng, look(rng), size) for _ in range(int(rng.integers(low, high + 1))))
+def _solids(rng: Rng, low: int, high: int, look: Callable[[Rng], str] = diffuse, size: float = 1.0) -> str:
+    return "".join(solid(rng, look(rng), size) for _ in range(int(rng.integers(low, high + 1))))
 
 
-def _lamp(rng: Rng, power: float, radius: float, at: tuple[float, ...] | None = None) -> str:
+def lamp(rng: Rng, power: float, radius: float, at: tuple[float, ...] | None = None) -> str:
     turn, far = _in(rng, 0, math.tau), _in(rng, 2.0, 4.5)
     place = at or (far * math.cos(turn), _in(rng, 2.0, 5.0), far * math.sin(turn))
     return f"light([{_n(*place)}], {_n(power)}, {colour(rng, 0.6, 1.0)}, {_n(radius)});\n"
 
 
-def _sky(rng: Rng, low: float, high: float) -> str:
+def sky_of(rng: Rng, low: float, high: float) -> str:
     own = f", {colour(rng, 0.2, 1.0)}, {colour(rng, 0.05, 1.0)}" if rng.random() < 0.4 else ""
     return f"sky({_n(_in(rng, low, high))}{own});\n"
 
@@ -91,42 +91,42 @@ def _staged(rng: Rng) -> str:
 
 
 def sky(rng: Rng) -> str:
-    return "light(none);\n" + _sky(rng, 0.5, 1.3) + _solids(rng, 2, 5)
+    return "light(none);\n" + sky_of(rng, 0.5, 1.3) + _solids(rng, 2, 5)
 
 
 def soft(rng: Rng) -> str:
-    return _lamp(rng, _in(rng, 12, 35), _in(rng, 0.2, 0.9)) + _sky(rng, 0.1, 0.8) + _solids(rng, 2, 5)
+    return lamp(rng, _in(rng, 12, 35), _in(rng, 0.2, 0.9)) + sky_of(rng, 0.1, 0.8) + _solids(rng, 2, 5)
 
 
 def several(rng: Rng) -> str:
     count = int(rng.integers(2, 6))
-    lamps = [_lamp(rng, _in(rng, 20, 60) / count, max(_in(rng, -0.2, 0.6), 0.0)) for _ in range(count)]
-    return "".join(lamps) + _sky(rng, 0.05, 0.6) + _solids(rng, 2, 5)
+    lamps = [lamp(rng, _in(rng, 20, 60) / count, max(_in(rng, -0.2, 0.6), 0.0)) for _ in range(count)]
+    return "".join(lamps) + sky_of(rng, 0.05, 0.6) + _solids(rng, 2, 5)
 
 
 def mist(rng: Rng) -> str:
-    lit = _lamp(rng, _in(rng, 12, 30), _in(rng, 0.0, 0.6)) + _sky(rng, 0.2, 1.0)
-    return lit + _solids(rng, 1, 3, _mist) + _solids(rng, 0, 2)
+    lit = lamp(rng, _in(rng, 12, 30), _in(rng, 0.0, 0.6)) + sky_of(rng, 0.2, 1.0)
+    return lit + _solids(rng, 1, 3, mist_of) + _solids(rng, 0, 2)
 
 
 def inside(rng: Rng) -> str:
     """Lamps in mist, or behind the openings of something hollow."""
     at = tuple(rng.uniform((-0.4, -0.2, -0.4), (0.4, 0.4, 0.4)).tolist())
-    text = _lamp(rng, _in(rng, 0.5, 3.0), _in(rng, 0.08, 0.25), at) + _sky(rng, 0.02, 0.3)
+    text = lamp(rng, _in(rng, 0.5, 3.0), _in(rng, 0.08, 0.25), at) + sky_of(rng, 0.02, 0.3)
     scale, move = _n(_in(rng, 0.7, 0.95)), f"translate({_n(*at)});"
     if rng.random() < 0.6:
-        text += f"sphere {{ scale({scale}); {move} {_mist(rng, 5.0)} }}\n"
+        text += f"sphere {{ scale({scale}); {move} {mist_of(rng, 5.0)} }}\n"
     else:
         holes = "".join(
             f"capsule {{ scale(0.3, 2, 0.3); {_turn(rng)} }}\n" for _ in range(int(rng.integers(2, 5)))
         )
         shell = f"sphere {{ shell({_n(_in(rng, 0.06, 0.2))}); }}\n"
         text += f"subtract {{ {shell}{holes} scale({scale}); {move} {_bright(rng)} }}\n"
-    return text + _solids(rng, 1, 3, _diffuse, 0.6)
+    return text + _solids(rng, 1, 3, diffuse, 0.6)
 
 
 def glow(rng: Rng) -> str:
-    text = "light(none);\n" + _sky(rng, 0.02, 0.3)
+    text = "light(none);\n" + sky_of(rng, 0.02, 0.3)
     for _ in range(int(rng.integers(1, 4))):
         wide = math.exp(_in(rng, math.log(0.02), math.log(0.3)))  # of the tube
         power = _in(rng, 1.0, 3.0) / max(wide, 0.05) ** 0.7
@@ -141,11 +141,13 @@ def glow(rng: Rng) -> str:
 
 def meshes(rng: Rng) -> str:
     text = (
-        'import "std/meshes" as m;\n' + _lamp(rng, _in(rng, 12, 30), _in(rng, 0.0, 0.6)) + _sky(rng, 0.2, 1.0)
+        'import "std/meshes" as m;\n'
+        + lamp(rng, _in(rng, 12, 30), _in(rng, 0.0, 0.6))
+        + sky_of(rng, 0.2, 1.0)
     )
     for _ in range(int(rng.integers(1, 4))):
         at, size = _n(*rng.uniform((-1.1, -0.4, -1.1), (1.1, 0.6, 1.1))), _n(_in(rng, 0.6, 1.0))
-        look = _mist(rng, 8.0) if rng.random() < 0.2 else _diffuse(rng)
+        look = mist_of(rng, 8.0) if rng.random() < 0.2 else diffuse(rng)
         text += (
             f"m.{MESHES[int(rng.integers(3))]} {{ scale({size}); {_turn(rng)} translate({at}); {look} }}\n"
         )
@@ -154,7 +156,7 @@ def meshes(rng: Rng) -> str:
 
 def white(rng: Rng) -> str:
     lit = ("sky();\n", "sky(0.6);\n", "light(none);\nsky();\n")[int(rng.integers(3))]
-    return lit + "".join(_solid(rng, "") for _ in range(int(rng.integers(1, 6))))
+    return lit + "".join(solid(rng, "") for _ in range(int(rng.integers(1, 6))))
 
 
 def caves(rng: Rng) -> str:
@@ -168,16 +170,16 @@ def caves(rng: Rng) -> str:
     text = f"subtract {{ {hollow} {mouth} {hole if rng.random() < 0.6 else ''} {turn} {look} }}\n"
     kind, at = int(rng.integers(3)), tuple(rng.uniform(-0.3, 0.3, 3).tolist())
     lit = (
-        _lamp(rng, _in(rng, 12, 35), _in(rng, 0.1, 0.6)),
-        _lamp(rng, _in(rng, 0.5, 2.0), 0.08, at),
+        lamp(rng, _in(rng, 12, 35), _in(rng, 0.1, 0.6)),
+        lamp(rng, _in(rng, 0.5, 2.0), 0.08, at),
         f"light(none);\nsphere {{ scale(0.15); translate({_n(*at)}); {_glow(rng, _in(rng, 4, 12))} }}\n",
     )[kind]
-    small = "".join(_solid(rng, _bright(rng), 0.4, 0.4) for _ in range(int(rng.integers(1, 3))))
-    return lit + _sky(rng, 0.3, 1.2) + text + small
+    small = "".join(solid(rng, _bright(rng), 0.4, 0.4) for _ in range(int(rng.integers(1, 3))))
+    return lit + sky_of(rng, 0.3, 1.2) + text + small
 
 
 def glossy(rng: Rng) -> str:
-    lit = _lamp(rng, _in(rng, 8, 25), _in(rng, 0.2, 0.8)) + _sky(rng, 0.3, 1.0)
+    lit = lamp(rng, _in(rng, 8, 25), _in(rng, 0.2, 0.8)) + sky_of(rng, 0.3, 1.0)
     return lit + _solids(rng, 1, 3, _shiny) + _solids(rng, 1, 2)
 
 
@@ -194,7 +196,7 @@ def mixed(rng: Rng) -> str:
             "",
         )
         warps += f"twist({_n(_in(rng, -0.8, 0.8))});", f"grow({_n(_in(rng, -0.1, 0.2))});", "shell(0.12);"
-        look = (_diffuse, _bright, _mist, lambda rng: _glow(rng, 1.5))[
+        look = (diffuse, _bright, mist_of, lambda rng: _glow(rng, 1.5))[
             int(rng.choice(4, p=(0.5, 0.2, 0.2, 0.1)))
         ]
         name = LEAVES[int(rng.integers(len(LEAVES)))]
@@ -204,8 +206,8 @@ def mixed(rng: Rng) -> str:
         word = ("union", "smooth", "subtract", "intersect")[int(rng.choice(4, p=(0.3, 0.3, 0.25, 0.15)))]
         return f"{word} {{\n{''.join(leaf(depth) for _ in range(int(rng.integers(2, 4))))}}}\n"
 
-    lamps = "".join(_lamp(rng, _in(rng, 8, 25), _in(rng, 0.0, 0.6)) for _ in range(int(rng.integers(1, 3))))
-    return lamps + _sky(rng, 0.2, 1.0) + tree(2) + (_solids(rng, 1, 1) if rng.random() < 0.5 else "")
+    lamps = "".join(lamp(rng, _in(rng, 8, 25), _in(rng, 0.0, 0.6)) for _ in range(int(rng.integers(1, 3))))
+    return lamps + sky_of(rng, 0.2, 1.0) + tree(2) + (_solids(rng, 1, 1) if rng.random() < 0.5 else "")
 
 
 FAMILIES: Final[dict[str, Callable[[Rng], str]]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +23,7 @@ from scenelang.compiler.graph import Graph
 from scenelang.compiler.lower import lower
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.image import from_light
-from scenelang.drawing.metrics import flip, over_white, psnr
+from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.language.diagnostics import Diagnostics
 
 ENOUGH = 52.0  # decibels of a traced picture's own noise
@@ -92,6 +93,9 @@ def measure(
             exact = over_white(from_light(truth.mean, program.background is None))
             picture = over_white(image)
             row |= {"psnr": psnr(picture, exact), "flip": flip(picture, exact)}
+            # without the traced picture's noise, whose square adds to that of the error
+            square = float(np.mean((picture - exact) ** 2)) - 10 ** (-truth.decibels / 10)
+            row["clean"] = min(-10 * math.log10(max(square, 1e-12)), MOST_DB)
             row |= {"mean": 255 * float(picture.mean()), "traced_mean": 255 * float(exact.mean())}
             if family in PROBES:
                 row["value"] = PROBES[family][1][index]
@@ -102,8 +106,8 @@ def measure(
     result: dict[str, Any] = {"family": family, "seed": seed, "size": size}
     result["own"] = round(float(np.mean([row["own"] for row in rows])), 2)
     if drawn:
-        every = {name: np.array([row[name] for row in rows]) for name in ("psnr", "flip", "seconds")}
+        every = {name: np.array([row[name] for row in rows]) for name in ("psnr", "clean", "flip", "seconds")}
         result |= {f"mean_{name}": round(float(values.mean()), 4) for name, values in every.items()}
-        result["psnr_5"] = round(float(np.percentile(every["psnr"], 5)), 2)
+        result |= {f"{name}_5": round(float(np.percentile(every[name], 5)), 2) for name in ("psnr", "clean")}
     pictures.sort(key=lambda pair: pair[0])
     return result | {"scenes": rows}, [picture for _, picture in pictures[:WORST]]

@@ -206,7 +206,7 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[self.hollow]))
+        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[self.hollow or self.emitters.there]))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
