@@ -45,7 +45,7 @@ GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 APART, BETWEEN = 0.02, (0.25, 0.5, 0.75)  # world units before surfaces, and where walls are looked for
 LATTICE = 38, 64  # of points along the picture's shorter side, and where something may be hollow
-LATTICE_RAYS, PIXEL_RAYS, MISTY = 32, 8, 4  # of each, of pixels that are asked themselves, and through media
+LATTICE_RAYS, PIXEL_RAYS, MISTY = 40, 8, 4  # of each, of pixels that are asked themselves, and through media
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
@@ -206,7 +206,10 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[self.hollow or self.emitters.there]))
+        self.canvas, self.step = (
+            canvas,
+            max(1, round(min(canvas) / LATTICE[self.hollow or self.emitters.there])),
+        )
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)

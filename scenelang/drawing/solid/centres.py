@@ -16,7 +16,9 @@ from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.passes import INF
 
 EACH = 3  # pixels, along both sides, from one that asks to the next
-EVEN, STEADY = 0.2, 0.2  # differences of shares between neighbours, in passing over two pixels and over one
+# differences of shares: from one that asks to the next, and to a pixel's neighbours, whose samples take from
+# around, and of small lamps ask themselves
+EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
 APART = 0.35  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
 UNKNOWN = -1.0
@@ -34,7 +36,7 @@ class Centres:
         # of samples, once all centres are known: row and column of the pixel, and the next to each (K,)
         self.pixels: Any = None
         self.p, self.n, self.light = (xp.full((3, count), 0.0, like) for _ in range(3))
-        self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and whether they are steady
+        self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and how uneven they are
 
     def received(self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array]) -> Array:
         """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met."""
@@ -47,38 +49,45 @@ class Centres:
             return xp.take(self.light, rays)
         return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))
 
-    def shares(self, lamp: int, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]) -> Array:
-        """Shares (K,) of a lamp at such points, of which some are asked by their indices."""
+    def shares(
+        self, lamp: int, small: bool, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]
+    ) -> Array:
+        """Shares (K,) of a lamp, which may be small, at such points; some are asked by their indices."""
         xp = self.xp
         if self.pixels is None:
             share = self._spread(rays, 1, lambda index: ask(index)[None], EVEN)[0]
-            self.lit[lamp] = share, self._steady(share.reshape(self.shape))
+            self.lit[lamp] = share, self._uneven(share.reshape(self.shape))
             return xp.take(share, rays)
         if lamp not in self.lit:
             return ask(xp.where(rays >= 0))
-        share, steady = self.lit[lamp]
-        return self._mixed(share[None], steady, rays, p, n, lambda rest: ask(rest)[None])[0]
+        share, uneven = self.lit[lamp]
+        uneven = uneven if small else uneven.clip(0.0, SHARP)
+        return self._mixed(share[None], uneven, rays, p, n, lambda rest: ask(rest)[None])[0]
 
     def _mixed(
         self,
         values: Array,
-        steady: Array | None,
+        uneven: Array | None,
         rays: Array,
         p: Array,
         n: Array,
         ask: Callable[[Array], Array],
     ) -> Array:
         """Values (R, K) of samples from those (R, M) of pixels on the same surfaces: their own where these
-        are ``steady``, else of those around them. Where nothing is known around, they are asked by their
-        indices.
+        are not ``uneven``, else of those around them. Where they are very much so, or nothing is known
+        around, samples are asked by their indices.
         """
         xp, (rows, columns) = self.xp, self.shape
         at = [xp.take(part, rays) for part in self.pixels]
         index = at[0] * columns + at[1]
         own = _same(xp.take(self.p, index) - p, xp.take(self.n, index), n) & (xp.take(values[0], index) >= 0)
-        if steady is not None:
-            own = own & xp.take(steady, index)
-        result, rest = xp.take(values, index), xp.where(~own)
+        result, sharp = xp.take(values, index), rays < 0
+        if uneven is not None:
+            differs = xp.take(uneven, index)
+            own, sharp = own & (differs < STEADY), differs > SHARP
+        if len(some := xp.where(sharp)):
+            xp.put(result, some, ask(some))
+        rest = xp.where(~(own | sharp))
         if not len(rest):
             return result
         for ring in (
@@ -123,17 +132,17 @@ class Centres:
             xp.put(result, xp.take(rays, rest), ask(rest))
         return result
 
-    def _steady(self, share: Array) -> Array:
-        """Pixels (M,) whose neighbours have about the same shares (R, C), or none."""
-        uneven = share < 0
+    def _uneven(self, share: Array) -> Array:
+        """Greatest differences (M,) of pixels' shares (R, C) from those of their neighbours that have any."""
+        result = 0 * share
         for here, there, one, other in (
-            (share[1:], share[:-1], uneven[1:], uneven[:-1]),
-            (share[:, 1:], share[:, :-1], uneven[:, 1:], uneven[:, :-1]),
+            (share[1:], share[:-1], result[1:], result[:-1]),
+            (share[:, 1:], share[:, :-1], result[:, 1:], result[:, :-1]),
         ):
-            differs = (abs(here - there) > STEADY) & (here >= 0) & (there >= 0)
-            one |= differs
-            other |= differs
-        return ~uneven.reshape(-1)
+            differs = abs(here - there) * ((here >= 0) & (there >= 0))
+            one[:] = self.xp.maximum(one, differs)
+            other[:] = self.xp.maximum(other, differs)
+        return result.reshape(-1)
 
 
 def _same(off: Array, n: Array, other: Array) -> Array:

@@ -50,6 +50,7 @@ THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
+SMALL = 0.15  # world units: lamps with shadows that may be sharper than pixels
 DISTANT = 6.0  # radii of a lamp: points in media so far from it see the same through media all over its disc
 STEEP = 1.2  # how much more light the last node may get than the first
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
@@ -336,7 +337,8 @@ class Lighting:
         centres, rays = beside
         on, rest = xp.take(lit, xp.where(lit < len(rays))), xp.take(lit, xp.where(lit >= len(rays)))
         ray, at, up = (xp.take(part, on) for part in (rays, p, n))
-        share = centres.shares(number, ray, at, up, lambda index: ask(xp.take(on, index)))
+        small = lamp.light.radius < SMALL
+        share = centres.shares(number, small, ray, at, up, lambda index: ask(xp.take(on, index)))
         return xp.concat([share, ask(rest)], 0) if len(rest) else share, work
 
     def _sent(self, points: Points, lamp: Lamp) -> Array:

@@ -31,7 +31,7 @@ NEWTON = 2
 INSIDE = 1e-3  # world units behind a surface where its material is asked for
 FLAT = 0.01  # of distances; less is none
 BEFORE = 0.02  # world units before a surface where nothing must be, lest a node fades
-SIDES = 18, 40  # nodes of the ground along one axis, and where something may be hollow
+SIDES = 24, 40  # nodes of the ground along one axis, and where something may be hollow
 FAR, WARP = 20.0, 4.5  # world units to the last ones; they lie at FAR sinh(WARP u) / sinh(WARP)
 
 
