@@ -98,7 +98,7 @@ def _edit(scene: str) -> None:
     """Requests of an editor when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.editors import completion, context, hover, navigation
+    from scenelang.editors import completion, context, navigation
     from scenelang.editors import completion as tokens
     from scenelang.editors.workspace import Workspace
 
@@ -110,7 +110,7 @@ def _edit(scene: str) -> None:
     navigation.folding(document)
     navigation.selection(document, offset)
     navigation.workspace_symbols(docs, "aaaaaaaab")
-    hover.hover(docs, document, offset)
+    navigation.hover(docs, document, offset)
     document.change(types.TextDocumentContentChangePartial(types.Range(middle, middle), "x"))
     for place in (offset, len(document.text)):
         tokens.semantic_tokens(docs, document)
