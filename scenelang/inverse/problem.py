@@ -1,9 +1,9 @@
 """Residuals between the pictures of a scene's values and its targets, at a size, and how they change.
 
 A pixel's four samples see an outline jump from one to the next: a picture of few pixels stays as it is while
-a param moves a little. So for slopes one sample tells how much of its pixel is covered: the network's own gates (those
-of union, subtraction and intersection, and the one that reads coverage) are made as wide as a pixel. Nothing
-else of the network changes.
+a param moves a little. So for slopes one sample tells how much of its pixel is covered: the network's own
+gates (those of union, subtraction and intersection, and the one that reads coverage) are made as wide as a
+pixel. Nothing else of the network changes.
 
 Two reverse passes tell how all pixels change with numbers of their own: one through the cell, by distances,
 colours and widths of blends, and one through decoders and frames, of the few pixels that change with a

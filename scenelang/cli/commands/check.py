@@ -19,7 +19,7 @@ from scenelang.cli.files import STDIN, scenes_of
 from scenelang.cli.inputs import merged, read_input, read_text, unused_defines
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
-from scenelang.compiler.check import Frames, check_evaluated
+from scenelang.compiler.compile import Frames, check_evaluated
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Settled, SourceFile, plural, settle
 from scenelang.language.reports import in_order, printable, render_text
 from scenelang.language.session import Defines
