@@ -217,7 +217,7 @@ class Streaming(nn.Module):
             x = torch.relu(deconvolution(x))  # (B N, F, 2^k, 2^k)
         level = self.stages[str(r)]
         assert isinstance(level, Level)
-        maps = x.unflatten(0, vectors.shape[:2])  # (B, N, F, R, R)
+        maps = x.view(*vectors.shape[:2], *x.shape[1:])  # (B, N, F, R, R)
         marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)  # (B, N, 4)
         image: Tensor = level.pixels(level.states(maps, marks, count)[-1])
         return image
