@@ -19,8 +19,7 @@ from scenelang.compiler.program import ProgramError, parse_program
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.language.formatting import format_text
-from scenelang.language.machine import render_github, render_json, render_sarif
-from scenelang.language.reports import SceneError, render_text
+from scenelang.language.reports import SceneError, render_github, render_json, render_sarif, render_text
 from scenelang.language.session import Defines
 
 NUMBER: Final = "¤"
