@@ -18,12 +18,12 @@ from scenelang.assets.element import TEXELS, Element, Facts
 from scenelang.assets.element_file import (
     MOST_ELEMENT_BYTES,
     ElementFile,
+    Font,
     element_file_bytes,
     is_said,
     read_zoo,
 )
 from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
-from scenelang.assets.font import Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
