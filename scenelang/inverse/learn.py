@@ -29,9 +29,8 @@ from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
 from scenelang.drawing.exact.mesh import Mesh, Sign, read_solids
 from scenelang.drawing.exact.originals import MOST_OF, Shape, said
-from scenelang.inverse.colours import fit_colours
 from scenelang.inverse.fonts import MOST_OF_FONT, ranges_of, read_font
-from scenelang.inverse.grids import NEAR, THIN, Rung, fit
+from scenelang.inverse.grids import NEAR, THIN, Rung, fit, fit_colours
 from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Asked, Hear, SandboxProcess, files_beside, run_alone
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene import Elements, load_elements
