@@ -11,7 +11,7 @@ from typing import Any
 from fuzz.target import Failure, hold
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import parse_program, program_bytes
-from scenelang.language import machine, reports
+from scenelang.language import reports
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import Diagnostic, SourceFile, Span
 from scenelang.language.pages import CODES
@@ -78,8 +78,8 @@ def check_rendering(found: Sequence[Diagnostic]) -> None:
     coloured = reports.render_text(found, color=True)
     hold("\x1b" not in plain and len(coloured) >= len(plain), "colours only where asked for")
     for name, text in (
-        ("json", machine.render_json(found)),
-        ("sarif", machine.render_sarif(found)),
+        ("json", reports.render_json(found)),
+        ("sarif", reports.render_sarif(found)),
     ):
         try:
             data = json.loads(text)
@@ -87,9 +87,9 @@ def check_rendering(found: Sequence[Diagnostic]) -> None:
             raise Failure(f"{name} output is JSON", error) from None
         listed = data["diagnostics"] if name == "json" else data["runs"][0]["results"]
         hold(len(listed) == len(found), f"{name} output has every diagnostic", len(listed))
-    concise = machine.render_concise(found)
+    concise = reports.render_concise(found)
     hold(concise.count("\n") == len(concise.splitlines()) == len(found), "a line each", concise)
-    github = machine.render_github(found)
+    github = reports.render_github(found)
     hold(github.count("\n") == len(found) and github.count("\r") == 0, "a command each", github)
     starts = all(line.startswith(("::error ", "::warning ")) for line in github.split("\n")[:-1])
     hold(starts, "only commands of our own", github)

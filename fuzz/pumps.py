@@ -19,8 +19,7 @@ from scenelang.compiler.program import ProgramError, parse_program
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.language.formatting import format_text
-from scenelang.language.machine import render_github, render_json, render_sarif
-from scenelang.language.reports import SceneError, render_text
+from scenelang.language.reports import SceneError, render_github, render_json, render_sarif, render_text
 from scenelang.language.session import Defines
 
 NUMBER: Final = "¤"
@@ -98,7 +97,7 @@ def _edit(scene: str) -> None:
     """Requests of an editor when a document is opened, and again when a letter is typed in it."""
     from lsprotocol import types
 
-    from scenelang.editors import completion, context, hover, navigation
+    from scenelang.editors import completion, context, navigation
     from scenelang.editors import completion as tokens
     from scenelang.editors.workspace import Workspace
 
@@ -110,7 +109,7 @@ def _edit(scene: str) -> None:
     navigation.folding(document)
     navigation.selection(document, offset)
     navigation.workspace_symbols(docs, "aaaaaaaab")
-    hover.hover(docs, document, offset)
+    navigation.hover(docs, document, offset)
     document.change(types.TextDocumentContentChangePartial(types.Range(middle, middle), "x"))
     for place in (offset, len(document.text)):
         tokens.semantic_tokens(docs, document)

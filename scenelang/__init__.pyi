@@ -1,8 +1,8 @@
 # The public names, each a line. `__init__.py` reads them too, to fetch a name when it is first used.
-from scenelang.compiler.check import check as check
-from scenelang.compiler.check import check_text as check_text
-from scenelang.compiler.check import fix_text as fix_text
+from scenelang.compiler.compile import check as check
+from scenelang.compiler.compile import check_text as check_text
 from scenelang.compiler.compile import compile as compile
+from scenelang.compiler.compile import fix_text as fix_text
 from scenelang.compiler.program import Place as Place
 from scenelang.compiler.program import Program as Program
 from scenelang.compiler.program import ProgramError as ProgramError

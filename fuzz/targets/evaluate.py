@@ -26,8 +26,7 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import program_bytes
 from scenelang.language import evaluation as evaluating
 from scenelang.language.diagnostics import Diagnostics, SourceFile
-from scenelang.language.machine import render_json
-from scenelang.language.reports import SceneError
+from scenelang.language.reports import SceneError, render_json
 from scenelang.language.scene import Scene
 
 SMALL: Final = {

@@ -151,10 +151,8 @@ class StreamingStudent(Student):
         sizes: dict[str, Any] = asdict(config.streaming) | {"vector": self.vector}
         self.renderer = Streaming(StreamingConfig(**sizes), grown=grown)
 
-    def image(self, scenes: SceneBatch, r: int, blend: float = 1.0) -> Tensor:
-        image: Tensor = self.renderer(
-            self.lifting.lift(scenes), scenes.tokens, scenes.count, resolution=r, blend=blend
-        )
+    def image(self, scenes: SceneBatch, r: int) -> Tensor:
+        image: Tensor = self.renderer(self.lifting.lift(scenes), scenes.tokens, scenes.count, resolution=r)
         return image
 
 

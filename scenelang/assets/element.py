@@ -1,4 +1,4 @@
-"""Elements: shapes and materials that users bring, and ready groups of them. Needs no numpy."""
+"""Elements: shapes and materials that users bring, and ready groups of them; gradients. Needs no numpy."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, NamedTuple
+from itertools import pairwise
+from typing import Any, ClassVar, Final, NamedTuple
 
+from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
 
 MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
@@ -258,3 +260,71 @@ def _volume(rows: tuple[_Numbers, ...]) -> float:
 def entry_of(group: Group) -> list[dict[str, Any]]:
     """Entry of a group in a header."""
     return [{key: value for key, value in part._asdict().items() if value not in ((), "")} for part in group]
+
+
+GRADIENTS: Final = "linear", "radial"
+STOPS: Final = range(2, 9)  # how many a gradient may have
+HARD: Final = 1e-6  # of an offset: stops that are no farther apart are a hard edge
+
+Stops = tuple[tuple[float, float, float, float], ...]
+
+
+class Gradient(Record):
+    """A gradient over the (u, v) of textures.
+
+    Args:
+        name: ``linear``, over u from -1 to 1, or ``radial``, over the distance from the origin, 0 to 1.
+        stops: offset, red, green and blue of each, in [0, 1], in the space that colours are averaged in;
+            offsets rise, and equal neighbours are a hard edge.
+    """
+
+    kind: ClassVar = "texture"  # a model that draws textures draws gradients
+    material: ClassVar = True
+    dimension: ClassVar = 2
+
+    name: str
+    stops: Stops = ()
+
+    @property
+    def digest(self) -> str:
+        """SHA-256, hex, of everything that determines its colours."""
+        return hashlib.sha256(repr((self.name, self.stops)).encode()).hexdigest()
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Offsets of its hard edges."""
+        return tuple([b[0] for a, b in pairwise(self.stops) if b[0] - a[0] <= HARD and a[1:] != b[1:]])
+
+    @property
+    def slope(self) -> float:
+        """The most that a channel changes over a unit of (u, v), apart from hard edges."""
+        rates = [
+            max(abs(p - q) for p, q in zip(a[1:], b[1:], strict=True)) / (b[0] - a[0])
+            for a, b in pairwise(self.stops)
+            if b[0] - a[0] > HARD
+        ]
+        return max(rates, default=0.0) / (2 if self.name == "linear" else 1)
+
+
+def material_fault(name: str, ops: Iterable[Any]) -> tuple[Any, str] | None:
+    """The stop that is wrong among the operations of a material, None where some lack, and why, if one is."""
+    stops = [op for op in ops if op.kind == "stop"]
+    if name not in GRADIENTS:
+        return (stops[0], f"a stop in `{name}`, which is not a gradient") if stops else None
+    fault = stops_fault([stop.offset for stop in stops])
+    return fault and (stops[fault[0]] if fault[0] >= 0 else None, fault[1])
+
+
+def stops_fault(offsets: list[float]) -> tuple[int, str] | None:
+    """The first stop that is wrong by its offset or number, -1 where some are missing, and why, if one is."""
+    for at, offset in enumerate(offsets):
+        if not 0.0 <= offset <= 1.0:
+            return at, f"a stop at {offset:g}, which is outside 0..1"
+        if at and offset < offsets[at - 1]:
+            return at, f"a stop at {offset:g} after one at {offsets[at - 1]:g}"
+        if at >= STOPS[-1]:
+            return at, f"more than {STOPS[-1]} stops in one gradient"
+    if len(offsets) < STOPS[0]:
+        found = "one stop" if offsets else "no stop"
+        return -1 if not offsets else 0, f"a gradient with {found}, at least {STOPS[0]} are needed"
+    return None

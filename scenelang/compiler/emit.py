@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS

@@ -22,8 +22,7 @@ from math import inf, tau
 from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.records import Record
 from scenelang.compiler.spaces import Box, Space, Stage
 from scenelang.compiler.steps import Affine, Rows, Step, composed

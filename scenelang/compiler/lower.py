@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any, Final
 
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.element_file import load_textures
-from scenelang.assets.gradient import Gradient
 from scenelang.assets.records import Record
 from scenelang.compiler import graph, steps
 from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured

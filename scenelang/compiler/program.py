@@ -25,10 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets import notebook
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Gradient, stops_fault
 from scenelang.assets.element_file import MOST_ELEMENT_BYTES, entry_of, read_elements
 from scenelang.assets.files import read_regular, write_output
-from scenelang.assets.gradient import Gradient, stops_fault
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
 from scenelang.compiler.graph import MOST_STEPS, ColourStep
 from scenelang.compiler.groups import OPERATOR, token_fault

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.gradient import HARD, Gradient
+from scenelang.assets.element import HARD, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.emit import tokens_of
 from scenelang.compiler.graph import Graph, Look

@@ -12,8 +12,7 @@ from importlib.resources import files
 from math import degrees
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.records import deep_stack
 from scenelang.compiler.compile import find_model
 from scenelang.compiler.graph import Fold, Graph, Leaf, Link, Look, Move, Node, colour_steps, coloured

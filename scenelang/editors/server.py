@@ -27,7 +27,7 @@ from pygls.protocol import LanguageServerProtocol
 from pygls.protocol.language_server import lsp_method
 
 from scenelang.assets.element import Element
-from scenelang.editors import completion, context, hover, navigation
+from scenelang.editors import completion, context, navigation
 from scenelang.editors.workspace import (
     Checked,
     ClientSettings,
@@ -420,7 +420,7 @@ _SESSION: Final[dict[str, Callable[..., Any]]] = {
 _AT_PLACE: Final[dict[str, Callable[[Server, Document, int], Any]]] = {
     types.TEXT_DOCUMENT_COMPLETION: _completion,
     types.TEXT_DOCUMENT_SIGNATURE_HELP: lambda s, d, at: context.signature_help(s.docs, d, at),
-    types.TEXT_DOCUMENT_HOVER: lambda s, d, at: hover.hover(s.docs, d, at, s.thumbnail),
+    types.TEXT_DOCUMENT_HOVER: lambda s, d, at: navigation.hover(s.docs, d, at, s.thumbnail),
     types.TEXT_DOCUMENT_DEFINITION: lambda s, d, at: navigation.definition(s.docs, d, at),
     types.TEXT_DOCUMENT_PREPARE_RENAME: lambda s, d, at: navigation.prepare_rename(s.docs, d, at),
 }
@@ -446,7 +446,7 @@ _LISTS: Final[dict[str, Callable[[Server, Document, Any], list[Any]]]] = {
     types.TEXT_DOCUMENT_DOCUMENT_COLOR: lambda s, d, p: completion.colours(d),
     types.TEXT_DOCUMENT_COLOR_PRESENTATION: lambda s, d, p: completion.presentations(d, p.color, p.range),
     types.TEXT_DOCUMENT_CODE_ACTION: lambda s, d, p: code_actions(d, p.range, p.context.only),
-    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: hover.inlay_hints(s.docs, d, p.range, s.settings),
+    types.TEXT_DOCUMENT_INLAY_HINT: lambda s, d, p: navigation.inlay_hints(s.docs, d, p.range, s.settings),
     types.TEXT_DOCUMENT_DOCUMENT_LINK: lambda s, d, p: navigation.links(s.docs, d),
 }
 _OPTIONS: Final = {

@@ -23,7 +23,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from scenelang.assets.element_file import SUFFIX, ElementFile, load_element_file
 from scenelang.assets.records import Record
 from scenelang.assets.tensors import TensorError
-from scenelang.compiler.check import check_compiles, check_frames
+from scenelang.compiler.compile import check_compiles, check_frames
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.manifest import Manifest
 from scenelang.language import library, tree

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.element import GRAIN, MOST_CURVES, Facts
-from scenelang.assets.font import MOST_CLASSES, MOST_LETTERS, TENSORS, UNIT, Font
+from scenelang.assets.element_file import MOST_CLASSES, MOST_LETTERS, TENSORS, UNIT, Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact.mesh import FitError, needed
 from scenelang.drawing.exact.outline import winding

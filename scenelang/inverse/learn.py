@@ -18,20 +18,19 @@ from scenelang.assets.element import TEXELS, Element, Facts
 from scenelang.assets.element_file import (
     MOST_ELEMENT_BYTES,
     ElementFile,
+    Font,
     element_file_bytes,
     is_said,
     read_zoo,
 )
 from scenelang.assets.files import NotWritten, output_place, read_regular, write_output
-from scenelang.assets.font import Font
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact import originals, outline
 from scenelang.drawing.exact.mesh import FitError as FitError
 from scenelang.drawing.exact.mesh import Mesh, Sign, read_solids
 from scenelang.drawing.exact.originals import MOST_OF, Shape, said
-from scenelang.inverse.colours import fit_colours
 from scenelang.inverse.fonts import MOST_OF_FONT, ranges_of, read_font
-from scenelang.inverse.grids import NEAR, THIN, Rung, fit
+from scenelang.inverse.grids import NEAR, THIN, Rung, fit, fit_colours
 from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Asked, Hear, SandboxProcess, files_beside, run_alone
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene import Elements, load_elements

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from scenelang.assets.font import ALIGNED, Font, FontError, Placed
+from scenelang.assets.element_file import ALIGNED, Font, FontError, Placed
 from scenelang.language import tree
 from scenelang.language.advice import report_problem
 from scenelang.language.blocks import holds_children, place_called, place_child, prepare_inner

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from scenelang.assets.gradient import STOPS, material_fault
+from scenelang.assets.element import STOPS, material_fault
 from scenelang.assets.records import Record
 from scenelang.language import advice, expressions, nodes, scopes, tree, words
 from scenelang.language.blocks import misplaced, prepare_inner

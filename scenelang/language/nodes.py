@@ -29,7 +29,7 @@ from pydantic import (
     model_validator,
 )
 
-from scenelang.assets.gradient import material_fault
+from scenelang.assets.element import material_fault
 from scenelang.language.diagnostics import plural
 from scenelang.language.refusals import refusal
 from scenelang.language.words import BLEND, RESERVED, Combine

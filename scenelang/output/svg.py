@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Gradient
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError

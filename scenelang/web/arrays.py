@@ -19,8 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.curves import curves_of
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, has_finer, unpacked
 from scenelang.assets.tensors import TensorError

@@ -15,10 +15,8 @@ from dataclasses import field
 from functools import cache
 from typing import Any, Final, TypeVar
 
-from scenelang.assets.element import Element
-from scenelang.assets.element_file import load_textures
-from scenelang.assets.font import name_of
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
+from scenelang.assets.element_file import load_textures, name_of
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import Sky, Stage, stage_data

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.gradient import HARD
+from scenelang.assets.element import HARD
 from scenelang.compiler.graph import LUMA
 from scenelang.compiler.program import STEPS, ProgramError
 from scenelang.drawing.neural import field

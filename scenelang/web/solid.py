@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from scenelang.assets.gradient import HARD
+from scenelang.assets.element import HARD
 from scenelang.compiler.groups import INTERSECT, SUBTRACT
 from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage, stage_data
 from scenelang.drawing.arrays import Smooth

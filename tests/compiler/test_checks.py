@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.compiler import check
+from scenelang.compiler.compile import check_compiles, check_frames
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.passes import check_scene
 from scenelang.drawing.metrics import psnr
@@ -229,8 +229,8 @@ def look(text: str, every: bool = False) -> tuple[list[str], tuple[int, int]]:
     evaluation = Source(text=SourceFile("a.nsg", text)).evaluation(found, replays=True)
     scene, spans = evaluation.run(0)
     if scene is not None:
-        check.check_compiles(scene, spans, found)
-    seen = check.check_frames(evaluation, found, first=scene, every=every)
+        check_compiles(scene, spans, found)
+    seen = check_frames(evaluation, found, first=scene, every=every)
     return [f"{d.code}{d.message.partition('(frame')[2].rstrip(')')}" for d in found], seen
 
 

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.assets.element import Element
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.element_file import ElementFile
-from scenelang.assets.gradient import Gradient
 from scenelang.assets.tensors import read_tensors
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.emit import emit

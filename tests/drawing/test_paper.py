@@ -118,18 +118,6 @@ def test_an_object_less_is_a_shorter_stream() -> None:
         torch.testing.assert_close(padded[1:], network(vectors[1:], tokens[1:]))
 
 
-def test_a_new_level_is_blended_in() -> None:
-    torch.manual_seed(0)
-    network = Streaming(StreamingConfig(resolution=8, width=1 / 32), grown=True)
-    vectors, tokens = torch.randn(1, 2, 64), torch.zeros(1, 2, dtype=torch.int64)
-    with torch.no_grad():
-        old = network(vectors, tokens, resolution=4)
-        new = network(vectors, tokens, resolution=8)
-        half = network(vectors, tokens, resolution=8, blend=0.25)
-    enlarged = old.repeat_interleave(2, 2).repeat_interleave(2, 3)
-    torch.testing.assert_close(half, 0.25 * new + 0.75 * enlarged)
-
-
 Colour = tuple[float, float, float]
 WHITE: Colour = (1.0, 1.0, 1.0)
 

@@ -215,9 +215,9 @@ def test_a_missing_library_is_one_line_that_says_what_to_do() -> None:
 def test_an_internal_error_is_logged_and_the_answer_empty(tmp_path: Path) -> None:
     log = tmp_path / "server.log"
     code = (
-        "import sys, scenelang.editors.hover as hover\n"
+        "import sys\nfrom scenelang.editors import navigation\n"
         "def broken(*_): raise RuntimeError('on purpose')\n"
-        "hover.hover = broken\n"
+        "navigation.hover = broken\n"
         "from scenelang.cli.main import main\n"
         "main(['lsp', '--stdio', '--log', sys.argv[1]])"
     )

@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 
 import scenelang as nsg
 from scenelang.editors.dumps import SCHEMAS, scene_schema
-from scenelang.language.machine import render_json
+from scenelang.language.reports import render_json
 from scenelang.language.scene import to_readable_json
 from tests.strategies import scenes
 

@@ -14,9 +14,8 @@ from scenelang.drawing.render import render
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import loads
 from scenelang.language.formatting import format_text
-from scenelang.language.machine import render_sarif
 from scenelang.language.parser import parse
-from scenelang.language.reports import SceneError, render_text
+from scenelang.language.reports import SceneError, render_sarif, render_text
 from scenelang.language.tables import tables
 from scenelang.language.words import RESERVED
 from tests.work import ends, lines_run

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.assets.element_file import element_file_bytes, load_element_file, read_zoo
-from scenelang.assets.font import Font, FontError
+from scenelang.assets.element_file import Font, FontError, element_file_bytes, load_element_file, read_zoo
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.mesh import FitError

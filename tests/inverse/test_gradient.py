@@ -8,8 +8,7 @@ import torch
 
 from scenelang.compiler.program import Program
 from scenelang.drawing.neural.draw import draw_objects
-from scenelang.inverse.gradient import Rates, SoftPlane, numbers_of, softened
-from scenelang.inverse.problem import FitProblem, Moment
+from scenelang.inverse.problem import FitProblem, Moment, Rates, SoftPlane, numbers_of, softened
 from scenelang.inverse.search import Point, TargetPicture, over, space_of
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source

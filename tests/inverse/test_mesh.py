@@ -27,7 +27,7 @@ from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.image import decoded, encoded
 from scenelang.drawing.render import exact_graph
 from scenelang.inverse import sandbox
-from scenelang.inverse.colours import fit_colours
+from scenelang.inverse.grids import fit_colours
 from scenelang.inverse.learn import LearnOptions, learn_files
 from scenelang.inverse.sandbox import files_beside
 from tests.pictures import psnr_db

@@ -12,8 +12,7 @@ import pytest
 import scenelang as nsg
 from scenelang.assets.element import Part
 from scenelang.assets.element_file import element_file_bytes
-from scenelang.compiler.check import check, check_compiles
-from scenelang.compiler.compile import compile_scene, find_model
+from scenelang.compiler.compile import check, check_compiles, compile_scene, find_model
 from scenelang.compiler.program import parse_program, program_bytes
 from scenelang.drawing.metrics import psnr
 from scenelang.editors.dumps import scene_schema

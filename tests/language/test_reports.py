@@ -15,9 +15,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Edit, Fix, Label, SourceFile, Span
-from scenelang.language.machine import render_concise, render_github, render_json, render_sarif
 from scenelang.language.pages import CODES, read_page
-from scenelang.language.reports import SceneError, render_text
+from scenelang.language.reports import (
+    SceneError,
+    render_concise,
+    render_github,
+    render_json,
+    render_sarif,
+    render_text,
+)
 
 SOURCE = SourceFile("dir/a b.nsg", "nsg 1;\nlet x = 3;\nlet x = 4;\n\tsquare { scale(2) }\n")
 

@@ -2,7 +2,7 @@
 
 from lab.docs.figures import Figure
 from scenelang.drawing.exact import outline
-from scenelang.inverse import colours, sandbox
+from scenelang.inverse import grids, sandbox
 
 CLAIMS = [
     f"at most {Figure(sandbox.READ_S)} s of processor time, and {Figure(sandbox.MEGABYTE_S)} s more for each "
@@ -10,8 +10,8 @@ CLAIMS = [
     f"and {Figure(sandbox.TIMES)} times its size; it measures it in {Figure(sandbox.CPU_S)} s "
     f"(or twice the budget) and {Figure(sandbox.MEMORY / (1 << 30))} GiB",
     f"at most `--max-error`, {Figure(outline.NEAR_COLOUR)}, which",
-    f"at most `--color-error`, {Figure(colours.NEAR)}, up",
-    f"about {Figure(colours.MOST_BYTES / 1000)} KB.",
+    f"at most `--color-error`, {Figure(grids.NEAR_COLOURS)}, up",
+    f"about {Figure(grids.MOST_BYTES / 1000)} KB.",
 ]
 GIVEN = {
     "0.00015 of solids, 0.0001 of flat shapes": "errors that are asked for",

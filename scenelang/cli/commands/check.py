@@ -19,7 +19,8 @@ from scenelang.cli.files import STDIN, scenes_of
 from scenelang.cli.inputs import merged, read_input, read_text, unused_defines
 from scenelang.cli.main import describe
 from scenelang.cli.say import say_trouble, show_difference, wants_color, width_of
-from scenelang.compiler.check import Frames, check_evaluated
+from scenelang.compiler.compile import Frames, check_evaluated
+from scenelang.language import reports
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Settled, SourceFile, plural, settle
 from scenelang.language.reports import in_order, printable, render_text
 from scenelang.language.session import Defines
@@ -121,9 +122,7 @@ def command(
     else:
         from importlib.metadata import version
 
-        from scenelang.language import machine
-
-        render = getattr(machine, f"render_{kind}")
+        render = getattr(reports, f"render_{kind}")
         text = render(in_order(left)[:most], *[version("scenelang")] * (kind == "sarif"))
     click.echo(text, nl=False, err=to_stderr, color=True)
     if all_frames and scenes.unseen:

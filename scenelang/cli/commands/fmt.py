@@ -16,8 +16,7 @@ from scenelang.cli.say import say_diagnostics, say_trouble, show_difference
 from scenelang.language.diagnostics import plural
 from scenelang.language.formatting import format_text
 from scenelang.language.limits import MAX_BYTES
-from scenelang.language.machine import render_concise
-from scenelang.language.reports import SceneError
+from scenelang.language.reports import SceneError, render_concise
 
 
 @click.command("fmt")

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import Gradient
+from scenelang.assets.element import Element, Gradient
 from scenelang.assets.picture import texels
 from scenelang.compiler.geometries import GEOMETRIES, namespace
 from scenelang.compiler.graph import LUMA, ColourStep, Fold, Leaf, Link, Look, Node, leaves

@@ -23,8 +23,7 @@ from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, fea
 
 from scenelang.assets.curves import curves_of
 from scenelang.assets.element import TEXELS, Element, Facts, Painted
-from scenelang.assets.element_file import load_element_file
-from scenelang.assets.font import Font, FontError
+from scenelang.assets.element_file import Font, FontError, load_element_file
 from scenelang.assets.picture import frame_of, painted, texels
 from scenelang.assets.records import Record
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer

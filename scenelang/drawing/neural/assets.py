@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenelang.assets.element import Element
-from scenelang.assets.gradient import HARD, Gradient
+from scenelang.assets.element import HARD, Element, Gradient
 from scenelang.assets.picture import texels
 from scenelang.assets.pyramid import unpacked
 from scenelang.assets.tensors import TensorError

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import interpolate, one_hot
+from torch.nn.functional import one_hot
 
 from scenelang.compiler.groups import OPERATOR
 from scenelang.compiler.program import Program, ProgramError
@@ -205,39 +205,20 @@ class Streaming(nn.Module):
         self.stages = nn.ModuleDict({str(r): Level(config.filters(r)) for r in config.levels if r >= first})
 
     def forward(
-        self,
-        vectors: Tensor,
-        tokens: Tensor,
-        count: Tensor | None = None,
-        *,
-        resolution: int | None = None,
-        blend: float = 1.0,
+        self, vectors: Tensor, tokens: Tensor, count: Tensor | None = None, *, resolution: int | None = None
     ) -> Tensor:
         """Images (B, 3, R, R) of streams, row 0 at the top, of vectors (B, N, D) and tokens (B, N), int64;
-        ``count`` (B,) objects are in use, behind which the state stays as it is.
-
-        In growing, ``resolution`` is the level and ``blend`` its share of the image; the rest is the level
-        below, enlarged.
+        ``count`` (B,) objects are in use, behind which the state stays as it is. In growing, ``resolution``
+        is that of a level.
         """
         r = resolution or self.config.resolution
-        steps = int(math.log2(r))
-        b, n, _ = vectors.shape
-        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)  # (B, N, 4)
-        x = vectors.reshape(b * n, -1, 1, 1)
-        below = None
-        for deconvolution in self.deconvolutions[:steps]:
-            below, x = x, torch.relu(deconvolution(x))  # (B N, F, 2^k, 2^k)
-        new = self._level(r, x, marks, count)
-        if blend >= 1.0:
-            return new
-        assert below is not None
-        old = self._level(r // 2, below, marks, count)
-        return blend * new + (1 - blend) * interpolate(old, scale_factor=2, mode="nearest")
-
-    def _level(self, resolution: int, x: Tensor, marks: Tensor, count: Tensor | None) -> Tensor:
-        level = self.stages[str(resolution)]
+        x = vectors.flatten(0, 1)[..., None, None]
+        for deconvolution in self.deconvolutions[: int(math.log2(r))]:
+            x = torch.relu(deconvolution(x))  # (B N, F, 2^k, 2^k)
+        level = self.stages[str(r)]
         assert isinstance(level, Level)
-        maps = x.view(*marks.shape[:2], *x.shape[1:])  # (B, N, F, R, R)
+        maps = x.view(*vectors.shape[:2], *x.shape[1:])  # (B, N, F, R, R)
+        marks = one_hot(tokens, len(TOKENS)).to(vectors.dtype)  # (B, N, 4)
         image: Tensor = level.pixels(level.states(maps, marks, count)[-1])
         return image
 

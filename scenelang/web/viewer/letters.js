@@ -1,4 +1,4 @@
-// Lines of letters, set as scenelang/assets/font.py does. A font of a form has `letters` by character: the shape
+// Lines of letters, set as assets/element_file.py does. A font of a form has `letters` by character: the shape
 // (-1 for one that shows nothing), its advance, and the middle and radius of its disc; and kerning by `pairs`; em.
 
 import { bare, kindOf, refuse } from "./values.js";
