@@ -414,8 +414,9 @@ def march(field: ExactField, o: Array, d: Array, end: Array, *, exact: bool = Fa
     ray, low, low_d, before, high, high_d, after = (np.concatenate(v) for v in zip(*result, strict=True))
     # Where d passes through 0 a straight line finds the place; where the material alone changes, halving.
     surface = (before == OUT) != (after == OUT)
-    for at, rounds in ((np.nonzero(surface)[0], 2), (np.nonzero(~surface)[0], 20)):
-        for _ in range(rounds if exact and len(at) else 0):
+    halvings = 20 if exact else 11
+    for at, rounds in ((np.nonzero(surface)[0], 2 * exact), (np.nonzero(~surface)[0], halvings)):
+        for _ in range(rounds if len(at) else 0):
             low_at, high_at = low[at], high[at]
             share = low_d[at] / (low_d[at] - high_d[at]) if rounds == 2 else 0.5
             middle = low_at + share * (high_at - low_at)

@@ -404,7 +404,8 @@ class Around:
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
         xp, misty = self.xp, max(MISTY, rays * MISTY // LATTICE_RAYS)
-        each = np.arange(rays).reshape(misty, -1).T.reshape(-1, 1)
+        # the first of them, which go through media, in the middles of equal parts of the hemisphere
+        each = np.roll(np.arange(rays), -(rays // misty // 2)).reshape(misty, -1).T.reshape(-1, 1)
         shift, turn = (TURNS @ numbers + 0.5) % 1.0
         local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)

@@ -17,7 +17,7 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.solid.around import ELSEWHERE, RARE, arriving, to_ground
+from scenelang.drawing.solid.around import CAP, ELSEWHERE, RARE, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
@@ -32,6 +32,7 @@ from scenelang.drawing.solid.march import (
     march,
     parted,
 )
+from scenelang.drawing.solid.mist import ALBEDO
 from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import INF, Passes
 from scenelang.drawing.solid.soft import ASIDE, BEAMS, WIDE, form, shown
@@ -283,6 +284,8 @@ class Lighting:
         colour = register[: self.field.hues] * weight.reshape(-1)
         for index, node, woven in self._textured(way, trail, pieces, px):
             xp.put(colour[:3], index + node * len(ray), woven)
+        if self.around is not None:
+            colour = xp.minimum(colour, ALBEDO * weight.reshape(-1))
         received = AMBIENT[0] if self.around is None else self._twice(self.around.medium(p))
         base = colour * received
         if self.field.glowing:
@@ -442,6 +445,8 @@ class Lighting:
                 ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
                 mean = self._mean(passes.at(xp, some), ways, ts, ns, soft, px)
                 xp.put(colour[:3], some, mean)
+        if self.around is not None:
+            colour = colour.clip(None, CAP)
         if not len(self._bare):
             return p, n, colour, glow, self._bare * p[:1]
         colour, coat = coated(xp, n, -way, colour, self.field.material(result).roughness)
@@ -467,6 +472,8 @@ class Lighting:
         kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
         rgb = np.tile(np.asarray(ground.rgb, np.float32), len(self.horizon) // 3)
         colour = xp.array(rgb, p)[:, None]
+        if self.around is not None:
+            colour = colour.clip(None, CAP)
         return p, n, kept * colour, (1 - kept) * horizon, self._bare * p[:1]
 
     def _cut(self, way: Array, piece: Piece, lamp: Lamp) -> Piece:

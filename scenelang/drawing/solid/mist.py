@@ -33,7 +33,8 @@ Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
 Slices = tuple[slice, ...]
 
-NODES = 20**3  # of a lattice, about
+NODES = 20**3, 32**3  # of a lattice, about, and of dense media,
+FINE = 0.5  # whose optical depth from a node to the next is this
 DEEPEST = 2.5  # optical depth from a node to the next; denser media are drawn thinner
 DEEP = 3.0  # cells by which points move inwards at most, where these are
 ENOUGH = 4e-3  # of the most light there is, by which the last sweep changes it,
@@ -79,10 +80,15 @@ class Mist:
 
     def _place(self, low: np.ndarray, high: np.ndarray) -> None:
         """Lay the lattice around a box; it moves with the box, and has more nodes only where nothing is."""
-        sides, least, most = (high - low).clip(1e-3), 0.0, float((high - low).max()) + 1.0
-        for _ in range(50):
-            h = (least + most) / 2
-            least, most = (h, most) if np.prod(sides / h + 2) > NODES else (least, h)
+        sides, found = (high - low).clip(1e-3), []
+        for count in NODES:
+            least, most = 0.0, float((high - low).max()) + 1.0
+            for _ in range(50):
+                h = (least + most) / 2
+                least, most = (h, most) if np.prod(sides / h + 2) > count else (least, h)
+            found.append(h)
+        densest = float((self.field.density * self.field.looks[-1]).max())
+        h = float(np.clip(FINE / max(densest, 1e-9), *found[::-1]))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
         if ground is not None and high[1] > ground.y:
@@ -215,7 +221,17 @@ class Mist:
         sends = self.albedo * light + self.glow
         for _, sent, _, rgb in self.lamps:
             sends += self.albedo * sent * rgb
-        dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0) * ~self.opaque
+        dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0)
+        if self.opaque.any():  # there as around, lest rays begin and end in less than there is
+            around, count = 0 * sends, 0 * self.d
+            for shift in AROUND:
+                to, on = pair_of(self.sides, shift)
+                around[:, *to] += sends[:, *on] * self.mist[on]
+                count[to] += self.mist[on]
+            sends, dense = (
+                np.where(self.opaque, around / count.clip(1.0), sends),
+                dense * (~self.opaque | (count > 0)),
+            )
         rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
         rows += [dense * sends, dense[None]]
         table = np.concatenate(rows).reshape(13, -1)
