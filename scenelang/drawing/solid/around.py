@@ -32,7 +32,7 @@ from scenelang.drawing.solid.passes import INF
 
 RAYS = 8, 16  # of nodes, and where something may be hollow
 GAP = 0.01  # world units, as of `MarchSettings`
-RARE = 5e-3  # of rays may be given up
+RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
 DOME = 64  # directions to the sky alone
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
@@ -178,6 +178,7 @@ class Around:
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
         self.hollow = hollow(field)
+        self.few = 0.0 if self.hollow else RARE
         n, numbers = self.nodes, np.arange(self.count)
         with xp.inference():
             if self.hollow and self.lookup is not None:
@@ -271,7 +272,7 @@ class Around:
         way = turned(xp, xp.take(n, node), local)
         p = xp.take(nodes.p[:, index] + LIFT * n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=RARE).hit, share
+        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=self.few).hit, share
         if self.mist is not None:
             light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
             xp.add(escaped, node, light * share)
@@ -423,7 +424,7 @@ class Around:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far."""
         xp = self.xp
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit = march(self.field, p, way, limit, 0, GAP, few=RARE).hit
+        hit = march(self.field, p, way, limit, 0, GAP, few=self.few).hit
         met, floor = xp.where(hit < INF), xp.where((hit == INF) & (limit < INF))
         light = self.sky(way)
         if len(floor):

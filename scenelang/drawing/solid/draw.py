@@ -34,6 +34,7 @@ from scenelang.drawing.solid.march import (
 )
 from scenelang.drawing.solid.mist import ALBEDO
 from scenelang.drawing.solid.network import Wanted
+from scenelang.drawing.solid.nodes import hollow
 from scenelang.drawing.solid.passes import INF, Passes
 from scenelang.drawing.solid.soft import ASIDE, BEAMS, WIDE, form, shown
 
@@ -108,6 +109,7 @@ class Lighting:
         def placed(value: object) -> Array:
             return field.xp.array(np.asarray(value, np.float32), like)
 
+        self.few = 0.0 if hollow(field) else RARE
         self.eye, self._four = placed(stage.camera.eye), placed(np.transpose(four)[:, :, None])
         self.horizon, self.zenith = placed(stage.horizon * twice), placed(stage.zenith * twice)
         mirrors = field.rough and stage.sky is not None
@@ -204,7 +206,7 @@ class Lighting:
         xp = self.xp
         way = xp.array(directions(self.stage.camera, canvas, x, y).reshape(3, -1), self.eye)
         limit = self.limit(way)
-        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True, few=2 * RARE)
+        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True, few=2 * self.few)
         surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
         p, n, both = 0 * way + ELSEWHERE, 0 * way, xp.concat([surface, floor], 0)
         if len(both):
@@ -391,7 +393,7 @@ class Lighting:
         way, along = way / r, _dot(start, way) / r
         rim = xp.sqrt(along * along + (radius * radius - _dot(start, start))) - along  # of the lamp
         begin = start + lamp.at[:, None]
-        trail = march(self.hazy, begin, way, r - CLEAR, 0, self.pace.gap, True, start=rim, few=RARE)
+        trail = march(self.hazy, begin, way, r - CLEAR, 0, self.pace.gap, True, start=rim)
         clear, passed = xp.exp(-trail.depth), 0 * p[0]
         beams = count * len(near)
         xp.put(passed, near, clear[:beams].reshape(count, -1).mean(0))
@@ -406,7 +408,7 @@ class Lighting:
         r = _length(xp, way)
         limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
         ways, begin = way / r.clip(1e-9), lamp.light.radius
-        few = 0.0 if exact else 3 * RARE
+        few = 0.0 if exact else 3 * self.few
         trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)
         clear = (trail.hit == INF) * xp.exp(-trail.depth)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))

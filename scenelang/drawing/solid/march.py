@@ -117,8 +117,8 @@ class Rays:
         self._go_on(every, rows, passes)
 
     def run(self, halvings: int, most: int = STEPS, few: float = 0.0) -> None:
-        """Follow the rays to their ends, or for as many steps, or until as small a part of them is under way;
-        what they have not met by then, they miss.
+        """Follow the rays to their ends, or for as many steps, by which they miss what they have not met yet,
+        or until as small a part of them is under way.
         """
         xp = self.xp
         for _ in range(most):
@@ -150,13 +150,18 @@ class Rays:
             self._finish(halvings)
 
     def _give_up(self) -> None:
-        """End the ways through media of rays that are under way."""
-        for batch in self.batches if self.solids.media else ():
-            index = self.xp.where(batch.alive & (batch.rows[WITHIN] > 0))
-            if len(index):
-                ray = self.xp.take(self.ids, self.xp.take(batch.place, index))
-                row = self.xp.take(batch.rows, index)
-                self._close(ray, row, row[T])
+        """Let rays that are under way end where they are, near surfaces, as if they met one."""
+        xp, left = self.xp, [*self.between]
+        for batch in self.batches:
+            index = xp.where(batch.alive)
+            left += [(xp.take(batch.place, index), xp.take(batch.rows, index)), *batch.waiting]
+        places, parts = zip(*left, strict=True)
+        ray, rows = xp.take(self.ids, xp.concat(places, 0)), xp.concat(parts, 1)
+        xp.put(self.trail.hit, ray, rows[T])
+        within = xp.where(rows[WITHIN] > 0) if self.solids.media else ray[:0]
+        if len(within):
+            row = xp.take(rows, within)
+            self._close(xp.take(ray, within), row, row[T])
 
     def _join(self) -> None:
         """Let few rays that meet one object alone go along with as many or more that meet several."""

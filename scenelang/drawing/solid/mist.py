@@ -88,7 +88,7 @@ class Mist:
                 least, most = (h, most) if np.prod(sides / h + 2) > count else (least, h)
             found.append(h)
         densest = float((self.field.density * self.field.looks[-1]).max())
-        h = float(np.clip(FINE / max(densest, 1e-9), *found[::-1]))
+        h = min(max(FINE / max(densest, 1e-9), found[1]), found[0])
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
         if ground is not None and high[1] > ground.y:
