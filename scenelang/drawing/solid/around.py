@@ -179,14 +179,13 @@ class Around:
         self.count = self.nodes.p.shape[1]
         self.hollow = hollow(field)
         self.few = 0.0 if self.hollow else RARE
-        n, numbers = self.nodes, np.arange(self.count)
         with xp.inference():
             if self.hollow and self.lookup is not None:
                 index = self.lookup.index
                 to = xp.take(self.nodes.p + APART * self.nodes.n, index[:, 0])
                 self.lookup.split = ~self._open(xp.stack([to] * index.shape[1], 2), index).all(1)
-            matrix, less = self._row(numbers, np.full(self.count, RAYS[self.hollow]))
-            self.exchange = matrix, self._dome(n.n) + less
+            matrix, less = self._exchange(RAYS[self.hollow])
+            self.exchange = matrix, self._dome(self.nodes.n) + less
         self.light(lamps)
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
@@ -207,10 +206,8 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        self.canvas, self.step = (
-            canvas,
-            max(1, round(min(canvas) / LATTICE[self.hollow or self.emitters.there])),
-        )
+        fine = self.hollow or self.emitters.there
+        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[fine]))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
@@ -254,23 +251,19 @@ class Around:
         high = ((2 * up).clip(0.0, 1.0) * open_).sum(0) / DOME
         return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
 
-    def _row(self, index: np.ndarray, rays: np.ndarray) -> tuple[Array, Array]:
-        """What nodes (k,) see of each node (k, J) by so many rays, and of the horizon less what is hidden of
-        the sky (3, k).
+    def _exchange(self, rays: int) -> tuple[Array, Array]:
+        """What nodes see of each node (J, J) by so many rays, and of the horizon less what is hidden of the
+        sky (3, J).
         """
-        xp, nodes, count = self.xp, self.nodes, len(index)
-        row, escaped = xp.full((1, count * self.count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
+        xp, nodes, count = self.xp, self.nodes, self.count
+        row, escaped = xp.full((1, count * count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
         found: list[tuple[Array, Array]] = []  # places in the row, and shares
-        node = np.repeat(np.arange(count), rays)
-        each = np.arange(len(node)) - np.repeat(np.cumsum(rays) - rays, rays)
-        share = 1 / rays[node]
-        own = np.asarray(xp.to_numpy(nodes.place[:3]), np.float64)[:, index]
-        turns = 2 * np.pi * (SCATTER @ own % 1.0)[node]
-        local = disc(np.sqrt((each + 0.5) * share), GOLDEN * each + turns).astype(np.float32)
-        node, share, local = (xp.array(part, nodes.p) for part in (node, share.astype(np.float32), local))
-        n = nodes.n[:, index]
-        way = turned(xp, xp.take(n, node), local)
-        p = xp.take(nodes.p[:, index] + LIFT * n, node)
+        numbers = np.arange(count * rays)
+        turns = 2 * np.pi * (SCATTER @ np.asarray(xp.to_numpy(nodes.place[:3]), np.float64) % 1.0)
+        r, angle = np.sqrt((numbers % rays + 0.5) / rays), GOLDEN * (numbers % rays) + turns[numbers // rays]
+        node, share = xp.array(numbers // rays, nodes.p), xp.full((count * rays,), 1 / rays, nodes.p)
+        way = turned(xp, xp.take(nodes.n, node), xp.array(disc(r, angle).astype(np.float32), nodes.p))
+        p = xp.take(nodes.p + LIFT * nodes.n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)
         hit, through = march(self.field, p, way, limit, 0, GAP, True, few=self.few).hit, share
         if self.mist is not None:
@@ -282,13 +275,13 @@ class Around:
             ways = xp.take(way, met)
             at = xp.take(p, met) + ways * xp.take(hit, met)
             cell, shares = self._around(at, ways)
-            place = (xp.take(node, met) * self.count)[:, None] + self.lookup.index[cell]
+            place = (xp.take(node, met) * count)[:, None] + self.lookup.index[cell]
             found.append((place.reshape(-1), (shares * xp.take(through, met)[:, None]).reshape(-1)))
         floor = xp.where((hit == INF) & (limit < INF))
         if len(floor):
             at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
             index, shares, kept = self._on_floor(at)
-            place, part = xp.take(node, floor) * self.count + index, xp.take(through, floor)
+            place, part = xp.take(node, floor) * count + index, xp.take(through, floor)
             found.append((place.reshape(-1), (shares * (kept * part)).reshape(-1)))
             xp.add(escaped, xp.take(node, floor), self.horizon * ((1 - kept) * part))
         if found:
@@ -297,7 +290,7 @@ class Around:
         lost = share - through * (hit == INF)
         hidden = xp.where((lost > 0) & ((way[1] >= -FLAT) | (self.stage.ground is None)))
         xp.add(escaped, xp.take(node, hidden), -self.sky(xp.take(way, hidden)) * xp.take(lost, hidden))
-        return row.reshape(count, self.count), escaped
+        return row.reshape(count, count), escaped
 
     def _around(self, at: Array, way: Array) -> tuple[Array, Array]:
         """Cells and shares, as of `Lookup.near`, of nodes around points (3, K) where rays end."""

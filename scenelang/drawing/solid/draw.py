@@ -59,6 +59,10 @@ NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle
 CUTS = (-INF, -14.0, -3.7, -1.0, -0.27, 0.27, 1.0, 3.7, 14.0, INF)  # tangents of angles at the light
 
 
+# of points on surfaces: the centres of pixels, and the rays (F,) that met them
+Beside = tuple[Centres, Array] | None
+
+
 class Shade(NamedTuple):
     """Light along M rays."""
 
@@ -135,13 +139,10 @@ class Lighting:
         if stage.transparent:
             seen = seen * 0
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
-        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-        both, result = xp.concat([surface, floor], 0), []
+        surface, both, met = self._met(way, trail, limit, px)
         beside = None if centres is None else (centres, both)
         work = trail.work + Work(rays=way.shape[1], met=len(surface))
-        if len(both):
-            result.append(self._reflecting(self._met(way, trail, limit, (surface, floor), px), beside))
-        mist = None
+        result, mist = [self._reflecting(met, beside)] if met else [], None
         if trail.pieces:
             pieces = trail.pieces[0] if self.field.sigma is None else parted(self.field, trail, True)
             for lamp in self.lamps:
@@ -207,12 +208,10 @@ class Lighting:
         way = xp.array(directions(self.stage.camera, canvas, x, y).reshape(3, -1), self.eye)
         limit = self.limit(way)
         trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True, few=2 * self.few)
-        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-        p, n, both = 0 * way + ELSEWHERE, 0 * way, xp.concat([surface, floor], 0)
-        if len(both):
-            met = self._met(way, trail, limit, (surface, floor))
-            xp.put(p, both, met[0])
-            xp.put(n, both, met[1])
+        p, n = 0 * way + ELSEWHERE, 0 * way
+        _, both, met = self._met(way, trail, limit)
+        for part, values in zip((p, n), met, strict=False):
+            xp.put(part, both, values)
         return p, n
 
     def limit(self, way: Array) -> Array:
@@ -220,17 +219,12 @@ class Lighting:
         return to_ground(self.xp, self.stage.ground, self.stage.camera.eye[1], way)
 
     def _met(
-        self,
-        way: Array,
-        trail: Trail,
-        limit: Array,
-        index: tuple[Array, Array],
-        px: float = 0.0,
-        origin: Array = None,
-    ) -> list[Array]:
-        """What `surface` tells of the rays that met solids, then of those that met the ground."""
+        self, way: Array, trail: Trail, limit: Array, px: float = 0.0, origin: Array = None
+    ) -> tuple[Array, Array, list[Array]]:
+        """Rays that met solids (F,), these and those that met the ground, what `surface` tells of both."""
         xp, parts = self.xp, []
-        for some, on_ground in zip(index, (False, True), strict=True):
+        surface, floor = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
+        for some, on_ground in ((surface, False), (floor, True)):
             if len(some):
                 ways = xp.take(way, some)
                 start = self.eye[:, None] if origin is None else xp.take(origin, some)
@@ -238,14 +232,10 @@ class Lighting:
                     parts.append(self._ground(ways, xp.take(limit, some), start, origin is None))
                 else:
                     parts.append(self.surface(ways, some, trail, px, start))
-        return [xp.concat(list(each), 1) for each in zip(*parts, strict=True)]
+        both = xp.concat([surface, floor], 0)
+        return surface, both, [xp.concat(list(each), 1) for each in zip(*parts, strict=True)]
 
-    def _reflecting(
-        self,
-        met: list[Array],
-        beside: tuple[Centres, Array] | None = None,
-        mirrors: int = MIRRORS,
-    ) -> Points:
+    def _reflecting(self, met: list[Array], beside: Beside = None, mirrors: int = MIRRORS) -> Points:
         """Points that light, of `_met`; with ``beside`` as of `_lit`."""
         p, n, colour, haze, coat = met
         if self.around is None:
@@ -295,12 +285,7 @@ class Lighting:
         return Points(p, way[:, :0], base, colour, self._bare * p[:1, :0]), weight.sum(0)
 
     def _lit(
-        self,
-        points: Points,
-        soft: Array,
-        seen: Trail,
-        wide: bool = True,
-        beside: tuple[Centres, Array] | None = None,
+        self, points: Points, soft: Array, seen: Trail, wide: bool = True, beside: Beside = None
     ) -> tuple[Array, Array, Work]:
         """Light (R, K) from points, a number (K,) that tells by which lamps they are reached, and what it
         took. Of the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there;
@@ -325,9 +310,7 @@ class Lighting:
             work += took
         return light, free, work
 
-    def _softly(
-        self, number: int, lit: Array, p: Array, n: Array, beside: tuple[Centres, Array] | None
-    ) -> tuple[Array, Work]:
+    def _softly(self, number: int, lit: Array, p: Array, n: Array, beside: Beside) -> tuple[Array, Work]:
         """As `_shared`, of some points (k,) of those that `_lit` has."""
         xp, work, lamp = self.xp, Work(), self.lamps[number]
 

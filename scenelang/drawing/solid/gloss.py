@@ -133,10 +133,9 @@ def arriving(lighting: Any, p: Array, way: Array, mirrors: int) -> Array:
     xp, around = lighting.xp, lighting.around
     light, limit = lighting._twice(around.sky(way)), to_ground(xp, lighting.stage.ground, p[1], way)
     trail = march(lighting.field, p, way, limit, 0, STEP)
-    index = xp.where(trail.hit < INF), xp.where((trail.hit == INF) & (limit < INF))
-    both = xp.concat(list(index), 0)
-    if len(both):
-        points = lighting._reflecting(lighting._met(way, trail, limit, index, origin=p), None, mirrors)
+    _, both, met = lighting._met(way, trail, limit, origin=p)
+    if met:
+        points = lighting._reflecting(met, None, mirrors)
         xp.put(light, both, lighting._lit(points, p[0, :0], trail)[0])
     if around.mist is not None:
         mist = around.mist.along(p, way, xp.minimum(trail.hit, limit))[0]

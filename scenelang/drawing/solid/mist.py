@@ -80,15 +80,13 @@ class Mist:
 
     def _place(self, low: np.ndarray, high: np.ndarray) -> None:
         """Lay the lattice around a box; it moves with the box, and has more nodes only where nothing is."""
-        sides, found = (high - low).clip(1e-3), []
-        for count in NODES:
-            least, most = 0.0, float((high - low).max()) + 1.0
-            for _ in range(50):
-                h = (least + most) / 2
-                least, most = (h, most) if np.prod(sides / h + 2) > count else (least, h)
-            found.append(h)
+        a, b, c = (high - low).clip(1e-3).tolist()
+        coarse, fine = (  # where the product of a / h + 2 and the others is the number of nodes
+            1 / np.roots([a * b * c, 2 * (a * b + b * c + c * a), 4 * (a + b + c), 8 - count]).real.max()
+            for count in NODES
+        )
         densest = float((self.field.density * self.field.looks[-1]).max())
-        h = min(max(FINE / max(densest, 1e-9), found[1]), found[0])
+        h = float(min(max(FINE / max(densest, 1e-9), fine), coarse))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
         if ground is not None and high[1] > ground.y:
@@ -228,10 +226,8 @@ class Mist:
                 to, on = pair_of(self.sides, shift)
                 around[:, *to] += sends[:, *on] * self.mist[on]
                 count[to] += self.mist[on]
-            sends, dense = (
-                np.where(self.opaque, around / count.clip(1.0), sends),
-                dense * (~self.opaque | (count > 0)),
-            )
+            sends = np.where(self.opaque, around / count.clip(1.0), sends)
+            dense = dense * (~self.opaque | (count > 0))
         rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
         rows += [dense * sends, dense[None]]
         table = np.concatenate(rows).reshape(13, -1)
