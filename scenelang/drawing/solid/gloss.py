@@ -17,7 +17,6 @@ import numpy as np
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.around import GOLDEN, to_ground
 from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.passes import INF
 
 GLAZE = 0.04  # of light along the normal, that what is glossy reflects
 ROUGH, BACK, STRAIGHT = 0, slice(1, 4), slice(4, None)  # rows of coats
