@@ -42,6 +42,17 @@ def straight(stage: Stage, count: int = 1) -> np.ndarray:
     return np.asarray(ways(stage, (count, count), range(count), 1))
 
 
+def test_solids_in_media_lose_no_light() -> None:
+    """A ball in a ball of mist, both of which send what they swallow of an even light."""
+    root = fold(
+        look("sphere", "volumetric", (0.9,) * 3, scaled(0.9), glow=(0.1,) * 3, density=4.0),
+        look("sphere", "diffuse", (0.8,) * 3, scaled(0.6), glow=(0.2,) * 3),
+    )
+    stage = Stage(ground=None, lights=(), sky=Sky(1.0, (1.0,) * 3, (1.0,) * 3))
+    light, error = found(root, stage, np.array([[0.0], [-0.2], [-1.0]]) / sqrt(1.04), 2000)
+    assert abs(light - 1.0).max() < max(4.0 * float(error.max()), 5e-3)
+
+
 def test_equilibrium() -> None:
     """Where everything sends what it swallows of an even light, that light is all that there is to see."""
     even = np.array([0.8, 0.5, 0.9])

@@ -18,7 +18,9 @@ from lab.light.families import FAMILIES, scene_text
 from lab.light.field import World, asked, world_of
 from lab.light.measure import scene_of
 from lab.light.paths import fluence, irradiance, light, traced_picture
+from scenelang import render
 from scenelang.drawing.exact.solid import ExactField
+from scenelang.drawing.image import from_light
 from tests.lab.conftest import run
 
 UP, HERE = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
@@ -112,6 +114,17 @@ def test_lamps_in_mist_by_angle_and_by_chance() -> None:
             traced_picture(lit, graph.stage, (8, 8), per_side=1, paths=2048, batch=512).mean[:3].mean()
         )
     assert means[0] == pytest.approx(means[1], rel=0.02)
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.165])
+def test_mist_around_a_lamp_is_drawn_as_bright_as_it_is(radius: float) -> None:
+    lit = f"sky(0.001); ground(none); light([0, 0, 0], 0.5, #fff, {radius}); camera(fov = 20deg);"
+    mist = "sphere { scale(0.9); material volumetric { color([0.9, 0.9, 0.9]); density(3.4); } }"
+    program, graph = scene_of(f"nsg 1; canvas(12, 12); {lit} {mist}")
+    assert graph.stage is not None
+    traced = traced_picture(world_of(graph), graph.stage, (12, 12), paths=1024, batch=256)
+    exact = np.asarray(from_light(traced.mean, False))
+    assert abs(np.asarray(render(program)) - exact).mean() < 0.012
 
 
 def test_every_family_is_drawn_and_measured(tmp_path: Path) -> None:
