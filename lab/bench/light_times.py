@@ -44,7 +44,7 @@ def times(both: list[Program], threads: int) -> list[float]:
     for turn in range(TURNS + 1):
         for at, program in enumerate(both):
             for network in gc.get_objects() if turn else ():
-                if isinstance(network, SolidArrays):
+                if type(network) is SolidArrays:
                     network.last = None  # it keeps the light of the last picture
             began = clock()
             render(program, threads=threads)

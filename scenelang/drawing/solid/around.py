@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from math import isqrt
+from math import ceil, isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +43,8 @@ TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cel
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
-APART, BETWEEN = 0.02, (0.25, 0.5, 0.75)  # world units before surfaces, and where walls are looked for
+# world units before surfaces, where walls are looked for, and how deep these stop light
+APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.01
 LATTICE = 38, 64  # of points along the picture's shorter side, and where something may be hollow
 LATTICE_RAYS, PIXEL_RAYS, MISTY = 40, 8, 4  # of each, of pixels that are asked themselves, and through media
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
@@ -51,8 +52,8 @@ WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face agai
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, above which there are more rays, and how many
-NOISE, MORE = 0.03, 192
+# of the light on the lattice, above which there are more rays, how many times as many, and their turns
+NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
@@ -183,7 +184,7 @@ class Around:
             if self.hollow and self.lookup is not None:
                 index = self.lookup.index
                 to = xp.take(self.nodes.p + APART * self.nodes.n, index[:, 0])
-                self.lookup.split = ~self._open(xp.stack([to] * index.shape[1], 2), index).all(1)
+                self.lookup.split = self._open(xp.stack([to] * index.shape[1], 2), index).min(-1) < 1
             matrix, less = self._exchange(RAYS[self.hollow])
             self.exchange = matrix, self._dome(self.nodes.n) + less
         self.light(lamps)
@@ -220,19 +221,21 @@ class Around:
             there = self.xp.where(p[0] < ELSEWHERE)
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
 
-            def received(rays: int) -> Array:
-                result = 0 * p
-                light = self.gathered(self.xp.take(p, there), self.xp.take(n, there), numbers, rays)
+            def received(turn: int) -> Array:
+                result, at, up = 0 * p, self.xp.take(p, there), self.xp.take(n, there)
+                light = self.gathered(at, up, numbers + turn * FURTHER, LATTICE_RAYS)
                 self.xp.put(result, there, light)
                 return result
 
-            self.seen = Seen(p, n, received(LATTICE_RAYS))
+            self.seen = Seen(p, n, received(0))
             light, even = self.seen.received, self._evened()
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            rays = round(min(max(noise / NOISE - 1, 0.0), 1.0) * MORE / LATTICE_RAYS) * LATTICE_RAYS
-            if rays:  # inside of what is closed
-                share = LATTICE_RAYS / (LATTICE_RAYS + rays)
-                self.seen = self.seen._replace(received=light * share + received(rays) * (1 - share))
+            more, total = min(max(noise / NOISE - 1, 0.0), 1.0) * MORE, 1.0
+            for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
+                part = min(more - turn, 1.0)
+                light, total = light + received(turn + 1) * part, total + part
+            if more:
+                self.seen = self.seen._replace(received=light / total)
                 even = self._evened()
             self.seen = self.seen._replace(received=even)
 
@@ -310,18 +313,17 @@ class Around:
         return cell, shares
 
     def _open(self, p: Array, nodes: Array) -> Array:
-        """Whether no wall stands between points (3, k, m) and nodes (k, m)."""
+        """The part of the light between points (3, k, m) and nodes (k, m) that no wall stops."""
         xp, n = self.xp, self.nodes
         to = (xp.take(n.p + APART * n.n, nodes.reshape(-1))).reshape(p.shape)
-        free = nodes >= 0
+        free = 0 * p[0] + 1
         for t in BETWEEN:
             at = (p + (to - p) * t).reshape(3, -1)
-            wanted = Wanted.KIND if self.field.mixed else Wanted.DISTANCE
-            met = near(self.field, at, 0 * at[0] + GAP, wanted)
-            walled = met.distance < 0
+            met = near(self.field, at, 0 * at[0] + GAP, Wanted.KIND if self.field.mixed else Wanted.DISTANCE)
+            clear = (1 + met.distance * (1 / WALL)).clip(0.0, 1.0)
             if self.field.mixed:
-                walled = walled & (met.register[0] < 0.5)
-            free = free & ~walled.reshape(nodes.shape)
+                clear = xp.maximum(clear, 1.0 * (met.register[0] >= 0.5))
+            free = xp.minimum(free, clear.reshape(nodes.shape))
         return free
 
     def _on_floor(self, at: Array) -> tuple[Array, Array, Array]:
