@@ -184,7 +184,8 @@ class Around:
             if self.hollow and self.lookup is not None:
                 index = self.lookup.index
                 to = xp.take(self.nodes.p + APART * self.nodes.n, index[:, 0])
-                self.lookup.split = self._open(xp.stack([to] * index.shape[1], 2), index).min(-1) < 1
+                free = self._open(xp.stack([to] * index.shape[1], 2), index)
+                self.lookup.split = xp.least(free.T) < 1
             matrix, less = self._exchange(RAYS[self.hollow])
             self.exchange = matrix, self._dome(self.nodes.n) + less
         self.light(lamps)

@@ -90,10 +90,8 @@ class Centres:
         rest = xp.where(~(own | sharp))
         if not len(rest):
             return result
-        for ring in (
-            AROUND,
-            FARTHER,
-        ):  # what is thinner than a pixel takes of what is farther, or else of others
+        # what is thinner than a pixel takes of what is farther, or else of others
+        for ring in (AROUND, FARTHER):
             row, column, down, right = (xp.take(part, rest) for part in at)
             here, up = xp.take(p, rest), xp.take(n, rest)
             total: Any = 0.0
