@@ -44,7 +44,7 @@ ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose pl
 GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # world units before surfaces, where walls are looked for, and how deep these stop light
-APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.01
+APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 LATTICE = 38, 64  # of points along the picture's shorter side, and where something may be hollow
 LATTICE_RAYS, PIXEL_RAYS, MISTY = 40, 8, 4  # of each, of pixels that are asked themselves, and through media
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
