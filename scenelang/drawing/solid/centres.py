@@ -19,7 +19,7 @@ EACH = 3  # pixels, along both sides, from one that asks to the next
 # differences of shares: from one that asks to the next, and to a pixel's neighbours, whose samples take from
 # around, and of small lamps ask themselves
 EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
-APART = 0.35  # sine: so far off each other's planes lie points of one surface at most
+APART = 0.1  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
 UNKNOWN = -1.0
 # of pixels around a sample, steps towards it down and across, and weights; those on other surfaces count less
@@ -53,25 +53,18 @@ class Centres:
         self, lamp: int, small: bool, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]
     ) -> Array:
         """Shares (K,) of a lamp, which may be small, at such points; some are asked by their indices."""
-        xp = self.xp
         if self.pixels is None:
             share = self._spread(rays, 1, lambda index: ask(index)[None], EVEN)[0]
             self.lit[lamp] = share, self._uneven(share.reshape(self.shape))
-            return xp.take(share, rays)
+            return self.xp.take(share, rays)
         if lamp not in self.lit:
-            return ask(xp.where(rays >= 0))
+            return ask(self.xp.where(rays >= 0))
         share, uneven = self.lit[lamp]
         uneven = uneven if small else uneven.clip(0.0, SHARP)
         return self._mixed(share[None], uneven, rays, p, n, lambda rest: ask(rest)[None])[0]
 
     def _mixed(
-        self,
-        values: Array,
-        uneven: Array | None,
-        rays: Array,
-        p: Array,
-        n: Array,
-        ask: Callable[[Array], Array],
+        self, values: Array, uneven: Array, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]
     ) -> Array:
         """Values (R, K) of samples from those (R, M) of pixels on the same surfaces: their own where these
         are not ``uneven``, else of those around them. Where they are very much so, or nothing is known

@@ -53,6 +53,7 @@ LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 SMALL = 0.15  # world units: lamps with shadows that may be sharper than pixels
+SMALLISH = 12.0  # pixels: median radius of objects below which samples share no light
 DISTANT = 6.0  # radii of a lamp: points in media so far from it see the same through media all over its disc
 STEEP = 1.2  # how much more light the last node may get than the first
 NARROW = 0.8  # cosine: pieces of media that the light sees under a larger angle are cut
@@ -213,6 +214,12 @@ class Lighting:
         for part, values in zip((p, n), met, strict=False):
             xp.put(part, both, values)
         return p, n
+
+    def size(self, canvas: tuple[int, int]) -> float:
+        """The median radius of objects as the eye sees them, in pixels."""
+        solids, length = self.field.solids, self.xp.length
+        seen = [s.extent / max(float(length(list(s.centre - self.eye))), 1e-6) for s in solids]
+        return float(np.median(seen or [0.0]) * min(canvas) / 2 / np.tan(self.stage.camera.fov_rad / 2))
 
     def limit(self, way: Array) -> Array:
         """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
@@ -617,6 +624,7 @@ def _band(
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
         xp, like = lighting.xp, lighting.field.network.codes
         useful = lighting.around is not None or any(lamp.light.radius for lamp in lighting.lamps)
+        useful = useful and lighting.size(canvas) > SMALLISH
         centres = Centres(xp, like, (len(near), width)) if useful else None
         once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas), centres)
         band = slice(rows.start - near.start, rows.stop - near.start)
