@@ -1,4 +1,4 @@
-"""What a place means and leads to: definition, references, rename, links, symbols, folding, hover, hints."""
+"""Meaning of a place, and places it leads to: definition, references, rename, links, symbols, folding, hover, hints."""
 
 from __future__ import annotations
 

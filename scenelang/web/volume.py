@@ -34,7 +34,7 @@ PAIRS: Final = ((0, 1), (1, 2), (2, 0), (0, 0), (1, 1))
 
 
 class Detail(NamedTuple):
-    """How many nodes the lattice has, about, the ground's map along a side, and how many rays a node has."""
+    """Numbers of nodes of the lattice, about, of the ground's map along a side, and of rays of a node."""
 
     nodes: int = 14_000
     floor: int = 80

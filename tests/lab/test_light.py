@@ -92,7 +92,7 @@ def test_mist_lets_through_what_its_depth_says() -> None:
 
 
 def test_each_medium_has_its_own_density() -> None:
-    """Where two overlap, the later one's holds."""
+    """The later one's holds where two overlap."""
     ball = "sphere {{ scale(0.5); translate(0, {}, 0); material volumetric {{ color(#000); density({}); }} }}"
     first, second = ball.format(-0.2, 1), ball.format(0.2, 3)
     through = light(world(EVEN + "light(none);" + first + second), 3 * UP, -UP, 16384)

@@ -256,7 +256,7 @@ class Around:
         return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
 
     def _exchange(self, rays: int) -> tuple[Array, Array]:
-        """What nodes see of each node (J, J) by so many rays, and of the horizon less what is hidden of the
+        """Parts of each node that nodes see (J, J) by so many rays, and of the horizon less what is hidden of the
         sky (3, J).
         """
         xp, nodes, count = self.xp, self.nodes, self.count

@@ -323,7 +323,7 @@ def pair_of(sides: tuple[int, ...], shift: Shift) -> tuple[Slices, Slices]:
 
 
 def _received(r: np.ndarray, radius: float) -> np.ndarray:
-    """What media receive of a lamp of power 1 that nothing hides, at distances of its middle."""
+    """Light on media of a lamp of power 1 that nothing hides, at distances of its middle."""
     rim = np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
     result: np.ndarray = (r > radius) / (2 * (1 + rim) * r.clip(1e-6) ** 2)
     return result
