@@ -1,4 +1,4 @@
-"""Meaning of a place, and places it leads to: definition, references, rename, links, symbols, folding, hover, hints."""
+"""Meaning and targets of a place: definition, references, rename, links, symbols, folding, hover, hints."""
 
 from __future__ import annotations
 

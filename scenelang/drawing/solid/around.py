@@ -256,8 +256,8 @@ class Around:
         return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
 
     def _exchange(self, rays: int) -> tuple[Array, Array]:
-        """Parts of each node that nodes see (J, J) by so many rays, and of the horizon less what is hidden of the
-        sky (3, J).
+        """Parts of each node that nodes see (J, J) by so many rays, and of the horizon less what is hidden of
+        the sky (3, J).
         """
         xp, nodes, count = self.xp, self.nodes, self.count
         row, escaped = xp.full((1, count * count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
