@@ -34,7 +34,6 @@ TEXELS = 256  # along a side of a texture's picture
 _GROW, _SHELL, _DISPLACE = 1.0, 2.0, 3.0
 _LEAST = 1e-12
 _SLOPE = 1e-5  # world units from a point to those whose distances tell its gradient
-BALLS, _POINTS = 24, 20_000  # around what glows, of an object, and points that find them
 
 
 def compiled(run: Run) -> Run:
@@ -77,7 +76,9 @@ class World(NamedTuple):
         lamps: (L, 8) position, power times colour, radius, and whether it lies in or near a medium.
         ground: height (-inf for none), colour; ``seen`` horizon and zenith of the eye, with alpha behind;
             ``sky`` of light, times its power.
-        glowing: (B, 5) balls around what glows, and how bright it is, at which paths aim.
+        glowing: (N, 4) centres and radii of balls around objects that glow; others have radius 0.
+        shining: (M, 10) points of those surfaces: place, normal, glow, and the odds of each by area, those of
+            objects' (N,) ``shares``; a tracer finds them.
     """
 
     field: Field
@@ -90,6 +91,8 @@ class World(NamedTuple):
     seen: Array
     sky: Array
     glowing: Array
+    shining: Array
+    shares: Array
 
 
 def world_of(graph: Graph) -> World:
@@ -151,6 +154,8 @@ def world_of(graph: Graph) -> World:
         np.array([*stage.horizon, *stage.zenith, 0.0 if stage.transparent else 1.0]),
         sky.power * np.array([*sky.horizon, *sky.zenith]),
         _glowing(bodies),
+        np.zeros((0, 10)),
+        np.zeros(count),
     )
 
 
@@ -176,20 +181,14 @@ def _near(bodies: Sequence[ExactBody], at: Sequence[float]) -> bool:
 
 
 def _glowing(bodies: Sequence[ExactBody]) -> Array:
-    """Balls (B, 5) around what glows: centre, radius and brightness."""
-    rng, found = np.random.default_rng(0), list[Array]()
-    for body in bodies:
-        if bright := max(body.look.glow):
-            way = rng.normal(size=(3, _POINTS))
-            way *= body.radius * rng.random(_POINTS) ** (1 / 3) / np.linalg.norm(way, axis=0)
-            p = np.linalg.inv(body.first.inverse) @ (body.centre + way - body.first.shift)
-            p = p[:, body.distance(p)[0] < 0.0]
-            centres, gap = list[Array](), np.full(p.shape[1], np.inf)
-            while p.shape[1] and len(centres) < BALLS:
-                centres.append(p[:, gap.argmax()])
-                gap = np.minimum(gap, np.linalg.norm(p - centres[-1][:, None], axis=0))
-            found += [np.array([*centre, 1.1 * gap.max() + 1e-3, bright]) for centre in centres]
-    return np.array(found).reshape(-1, 5)
+    """Balls (N, 4) around opaque objects that glow, of radius 0 around others."""
+    balls = np.zeros((len(bodies), 4))
+    for body, ball in zip(bodies, balls, strict=True):
+        if max(body.look.glow) and not body.medium:
+            back = np.linalg.inv(body.first.inverse)
+            ball[:3] = (back @ (body.centre - body.first.shift))[:, 0]
+            ball[3] = body.radius * np.linalg.norm(back, 2)
+    return balls
 
 
 def _pictured(look: Any) -> Array:

@@ -42,16 +42,20 @@ def reference(text: str, graph: Graph, paths: int, threads: int, cache: Path | N
     """The traced picture of a scene, from a folder where it was kept for the same text and as many paths."""
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     path = cache / f"{name}.npz" if cache is not None else None
+    known: Traced | None = None
     if path is not None and path.is_file():
         with np.load(path) as kept:
             known = Traced(
                 kept["mean"].astype(np.float64), kept["error"].astype(np.float64), int(kept["paths"])
             )
-            if kept["key"] == key and (known.paths >= paths or known.decibels >= ENOUGH):
+            if kept["key"] != key:
+                known = None
+            elif known.paths >= paths or known.decibels >= ENOUGH:
                 return known
     assert graph.stage is not None
     side = round(graph.samples**0.5)
     how: dict[str, Any] = {"per_side": side, "paths": paths, "enough": ENOUGH, "threads": threads}
+    how["known"] = known
     found = traced_picture(world_of(graph), graph.stage, graph.canvas, **how)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,8 @@
 
 Surfaces are found by sphere tracing and a root; ways through media are exact where their extinction is
 constant between steps. Lamps are sampled by the solid angle that they fill, at glossy surfaces by reflected
-directions as well (Veach's balance heuristic). The first numbers of a path come from Sobol' points that each
+directions as well (Veach's balance heuristic); so are surfaces that glow, by points that lie evenly on them, one
+of a few by what it would send (resampled importance sampling: Talbot, Cline and Egbert 2005). The first numbers of a path come from Sobol' points that each
 pixel shifts by its own; independent shifts tell the standard error.
 """
 
@@ -40,9 +41,10 @@ from scenelang.drawing.image import encoded
 STEP = 1e-3  # least step of a ray
 MOST = 4_000  # steps of a ray, and turns of a path
 SURELY = 4  # turns of a path before chance may end it
-AIMED = 0.4  # share of a path's turns that aim at what glows
+CHORDS, CANDIDATES = 20_000, 8  # of balls around what glows; of its points, of which one is asked
 CAPS = 0.98, 0.99  # of colours of surfaces and media
 _INSIDE = 1e-6  # how far behind a surface its colour is asked for
+_BEFORE = 1e-4  # where rays to it end, before it
 _ENDS, _MEETS, _HITS, _STUCK = range(4)  # of a ray's way: its end, a medium's particle, a surface, in a solid
 EYE, RAY, SURFACE, MIDST = range(4)
 ONES = 1.0, 1.0, 1.0
@@ -58,7 +60,7 @@ _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(
 class Room(NamedTuple):
     """What one thread writes to: `scratch`, colour and glow (6,), chance (its state, shift and number of the
     path), f cos (3,), light and alpha (4,), a ray (o, d, its way through balls of media, and how likely it
-    meets a particle where it does); and Sobol' points (K, D).
+    meets a particle where it does), a direction and how far (4,); and Sobol' points (K, D).
     """
 
     d: Array
@@ -69,12 +71,13 @@ class Room(NamedTuple):
     f: Array
     light: Array
     ray: Array
+    aim: Array
     table: Array
 
 
 def room_of(w: World, table: Array) -> Room:
     return Room(
-        *scratch(w), np.empty(6), np.zeros(3, np.uint64), np.empty(3), np.empty(4), np.zeros(9), table
+        *scratch(w), np.empty(6), np.zeros(3, np.uint64), np.empty(3), np.empty(4), np.zeros(9), np.empty(4), table
     )
 
 
@@ -433,7 +436,7 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
     """Write the light and alpha (4,) that come along a ray; ``known`` is how far it goes, or -1."""
     light, through = room.light, (1.0, 1.0, 1.0)
     light[:] = 0.0
-    odds, tau = -1.0, 0.0  # odds of the direction, where lamps are met by it too
+    odds, tau, coated = -1.0, 0.0, False  # odds of the direction, and whether lamps are met by it too
     for turn in range(MOST):
         end = end_of(w, o, d)
         t, ending = known, how
@@ -444,7 +447,7 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
         if w.media and ending != _STUCK and len(w.lamps) and w.lamps[:, 7].any():
             sent = passing(w, o, d, CAPS[1], room)
             gains(light, through, 1.0, sent)
-        if odds >= 0.0:
+        if coated:
             for j in range(len(w.lamps)):
                 lamp = w.lamps[j]
                 way = (lamp[0] - o[0], lamp[1] - o[1], lamp[2] - o[2])
@@ -478,9 +481,10 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
             look = room.look
             x, y, z = plus(p, q, d)
             who = colours(w, x, y, z, room.d, room.stack, look)
-            gains(light, through, 1.0, look[3:6])
             rgb, kind, cap = (look[0], look[1], look[2]), int(w.field.rows[who, 33]), CAPS[0]
+            glow = (look[3], look[4], look[5])
             if ending == _MEETS:
+                gains(light, through, 1.0, glow)
                 kind, cap, lift = VOLUMETRIC, CAPS[1], 0.0
                 room.ray[8] = w.field.rows[who, 34] * math.exp(-tau)
             else:
@@ -488,12 +492,24 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
                 n = slope(w.field, who, p[0], p[1], p[2], room.d, room.stack)
                 if dot(n, d) > 0.0:
                     n = (-n[0], -n[1], -n[2])
+                weight = 1.0
+                if odds > 0.0 and max(glow[0], max(glow[1], glow[2])) > 0.0 and w.shares[who] > 0.0:
+                    ball = w.glowing[who]
+                    off = (p[0] - ball[0], p[1] - ball[1], p[2] - ball[2])
+                    if dot(off, off) < ball[3] * ball[3]:
+                        likely = CANDIDATES * w.shares[who] * t * t / max(-dot(n, d), 1e-9)
+                        weight = odds / (odds + likely)
+                gains(light, through, weight, glow)
         rgb = (min(rgb[0], cap), min(rgb[1], cap), min(rgb[2], cap))
         o = plus(p, lift, n)
         v = (-d[0], -d[1], -d[2])
         sent = lamps_at(w, o, n, v, kind, alpha, rgb, room, dim + 1)
         gains(light, through, 1.0, sent)
-        d, odds, ratio = onward(w, o, n, v, kind, alpha, rgb, room, dim + 4)
+        if len(w.shining):
+            sent = glows_at(w, o, n, v, kind, alpha, rgb, room)
+            gains(light, through, 1.0, sent)
+        d, odds, ratio = onward(w, n, v, kind, alpha, rgb, room, dim + 4)
+        coated = kind == GLOSSY or kind == METAL
         through = times(through, 1.0, ratio)
         most = max(through[0], max(through[1], through[2]))
         if turn >= SURELY:
@@ -508,74 +524,118 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
 
 
 @compiled
-def onward(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room, dim: int) -> Any:
-    """A path's next direction, its odds where lamps are met by it too (else -1), and its weight (3,)."""
+def onward(w: World, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room, dim: int) -> Any:
+    """A path's next direction, its odds, and its weight (3,)."""
     a, b, pick = draw(room, dim), draw(room, dim + 1), draw(room, dim + 2)
-    aims = AIMED if len(w.glowing) else 0.0
-    if pick < aims:
-        d = aimed(w.glowing, p, pick / aims, a, b)
-    else:
-        pick = (pick - aims) / (1.0 - aims)
-        if kind == VOLUMETRIC:
-            d = around(a, b)
-        elif kind == METAL or (kind == GLOSSY and pick < 0.5):
-            d = mirrored(n, v, alpha, a, b)
-        else:
-            d = across(n, a, b)
-    if aims == 0.0 and kind in (VOLUMETRIC, DIFFUSE):
-        return d, -1.0, rgb
-    f = room.f
     if kind == VOLUMETRIC:
-        odds = 1.0 / (4.0 * math.pi)
-        f[0], f[1], f[2] = rgb[0] * odds, rgb[1] * odds, rgb[2] * odds
+        return around(a, b), 1.0 / (4.0 * math.pi), rgb
+    if kind == METAL or (kind == GLOSSY and pick < 0.5):
+        d = mirrored(n, v, alpha, a, b)
     else:
-        odds = reflect(kind, rgb, alpha, n, v, d, f)
+        d = across(n, a, b)
+    if kind == DIFFUSE:
+        return d, max(dot(n, d), 0.0) / math.pi, rgb
+    f = room.f
+    odds = reflect(kind, rgb, alpha, n, v, d, f)
     if max(f[0], max(f[1], f[2])) <= 0.0:
-        return d, -1.0, (0.0, 0.0, 0.0)
-    meets = odds if kind in (GLOSSY, METAL) else -1.0
-    if aims > 0.0:
-        odds = (1.0 - aims) * odds + aims * aim_odds(w.glowing, p, d)
-    return d, meets, (f[0] / odds, f[1] / odds, f[2] / odds)
+        return d, 1.0, (0.0, 0.0, 0.0)
+    return d, odds, (f[0] / odds, f[1] / odds, f[2] / odds)
 
 
 @compiled
-def _seen(balls: Array, j: int, p: Any) -> Any:
-    """The direction of a ball, 1 - the cosine of its rim, and how bright it may be."""
-    way = (balls[j, 0] - p[0], balls[j, 1] - p[1], balls[j, 2] - p[2])
-    r2, radius2 = dot(way, way), balls[j, 3] * balls[j, 3]
-    if r2 <= radius2:
-        return (0.0, 0.0, 1.0), 2.0, balls[j, 4]
-    r, sine = math.sqrt(r2), radius2 / r2
-    return (way[0] / r, way[1] / r, way[2] / r), sine / (1.0 + math.sqrt(1.0 - sine)), balls[j, 4] * sine
+def _shining(glows: int, points: Array, w: World, room: Room, o: Array, d: Array) -> int:
+    """Write points of an object that glows, where chords (K, 3) as long as their directions meet it; return
+    how many.
+    """
+    first, last = 0, len(points)
+    for i in range(len(o)):
+        way = math.sqrt(d[i, 0] ** 2 + d[i, 1] ** 2 + d[i, 2] ** 2)
+        start, to = (o[i, 0], o[i, 1], o[i, 2]), (d[i, 0] / way, d[i, 1] / way, d[i, 2] / way)
+        march(w.field, start, to, way, 0.0, False, room)  # for its spans
+        t = 0.0
+        value, kind, _, ahead = probe(w.field, start, to, t, room)
+        while t < way and first < last:
+            now = min(t + ahead, way)
+            value1, kind1, _, ahead = probe(w.field, start, to, now, room)
+            if (value < 0.0) != (value1 < 0.0):
+                edge = _edge(w.field, start, to, t, value, kind, now, value1, True, room)
+                x, y, z = plus(start, edge + (_INSIDE if value1 < 0.0 else -_INSIDE), to)
+                who = colours(w, x, y, z, room.d, room.stack, room.look)
+                if who == glows and max(room.look[3], max(room.look[4], room.look[5])) > 0.0:
+                    x, y, z = plus(start, edge, to)
+                    points[first, 0], points[first, 1], points[first, 2] = x, y, z
+                    n = slope(w.field, who, x, y, z, room.d, room.stack)
+                    points[first, 3], points[first, 4], points[first, 5] = n
+                    points[first, 6:9] = room.look[3:6]
+                    first += 1
+            t, value, kind = now, value1, kind1
+    return first
+
+
+def shining_of(w: World, seed: int) -> World:
+    """The world with points of what glows, which lie evenly by area."""
+    rng, room = np.random.default_rng([seed, 7]), room_of(w, np.zeros((1, _DIMENSIONS)))
+    found, shares = [np.zeros((0, 10))], np.zeros(len(w.glowing))
+    for i, (*centre, radius) in enumerate(w.glowing):
+        if radius:
+            way, off = rng.normal(size=(2, CHORDS, 3))
+            way /= np.linalg.norm(way, axis=1)[:, None]
+            off = np.cross(way, off)
+            r = np.sqrt(rng.random(CHORDS))[:, None]
+            half = np.sqrt(1.0 - r * r)
+            start = centre + radius * (r * off / np.linalg.norm(off, axis=1)[:, None] - half * way)
+            points = np.zeros((8 * CHORDS, 10))
+            last = _shining(i, points, w, room, start, 2.0 * half * radius * way)
+            # a chord meets an area A in the ball 2 A / (4 pi radius^2) times
+            shares[i] = CHORDS / (2.0 * math.pi * radius**2)
+            points[:last, 9] = shares[i]
+            found.append(points[:last])
+    points, most = np.concatenate(found), max(sum(map(len, found)), 1)
+    points[:, 9] /= most
+    return w._replace(shining=points, shares=shares / most)
 
 
 @compiled
-def aimed(balls: Array, p: Any, pick: float, a: float, b: float) -> Any:
-    """A direction into a ball."""
-    total = 0.0
-    for j in range(len(balls)):
-        total += _seen(balls, j, p)[2]
-    pick *= total
-    for j in range(len(balls)):
-        way, cap, bright = _seen(balls, j, p)
-        pick -= bright
-        if pick < 0.0 or j == len(balls) - 1:
-            cos = 1.0 - a * cap
-            r, phi = math.sqrt(max(1.0 - cos * cos, 0.0)), 2 * math.pi * b
-            return turned(way, r * math.cos(phi), r * math.sin(phi), cos)
-    return p
-
-
-@compiled
-def aim_odds(balls: Array, p: Any, d: Any) -> float:
-    """The odds of a direction as of `aimed`."""
-    total, found = 0.0, 0.0
-    for j in range(len(balls)):
-        way, cap, bright = _seen(balls, j, p)
-        total += bright
-        if dot(way, d) >= 1.0 - cap:
-            found += bright / (2.0 * math.pi * cap)
-    return found / total
+def glows_at(
+    w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room
+) -> Any:
+    """Light (3,) that surfaces that glow send by way of a point, by one point of them."""
+    count = len(w.shining)
+    out = (0.0, 0.0, 0.0)
+    total, chosen = 0.0, 0.0
+    for _ in range(CANDIDATES):
+        row = w.shining[int(draw(room, _DIMENSIONS) * count)]
+        way = (row[0] - p[0], row[1] - p[1], row[2] - p[2])
+        square = max(dot(way, way), 1e-12)
+        far = math.sqrt(square)
+        d = (way[0] / far, way[1] / far, way[2] / far)
+        facing = -dot((row[3], row[4], row[5]), d)
+        if facing <= 0.0:
+            continue
+        if kind == VOLUMETRIC:
+            odds = 1.0 / (4.0 * math.pi)
+            room.f[0], room.f[1], room.f[2] = rgb[0] * odds, rgb[1] * odds, rgb[2] * odds
+        else:
+            odds = reflect(kind, rgb, alpha, n, v, d, room.f)
+        if odds <= 0.0:
+            continue
+        likely = CANDIDATES * row[9] * square / facing
+        weight = facing / square / row[9] * likely / (likely + odds)
+        sent = (room.f[0] * row[6], room.f[1] * row[7], room.f[2] * row[8])
+        size = weight * max(sent[0], max(sent[1], sent[2]))
+        total += size
+        if size > 0.0 and draw(room, _DIMENSIONS) * total < size:
+            chosen = size
+            out = (weight * sent[0], weight * sent[1], weight * sent[2])
+            room.aim[0], room.aim[1], room.aim[2], room.aim[3] = d[0], d[1], d[2], far
+    if chosen == 0.0:
+        return out
+    d, far = (room.aim[0], room.aim[1], room.aim[2]), room.aim[3]
+    _, ending, tau = march(w.field, p, d, far - _BEFORE, np.inf, False, room)
+    if ending != _ENDS:
+        return 0.0, 0.0, 0.0
+    weight = total / chosen / CANDIDATES * math.exp(-tau)
+    return out[0] * weight, out[1] * weight, out[2] * weight
 
 
 @compiled
@@ -665,6 +725,8 @@ def light(
     table = np.asarray(Sobol(_DIMENSIONS, scramble=False).random(count))
     out = np.empty((len(o), 4))
     size = max(block, -(-min(4096, -(-len(o) // (8 * threads))) // block) * block)
+    if w.glowing[:, 3].any():
+        w = shining_of(w, seed)
     key = np.uint64(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
 
     def part(first: int) -> None:
@@ -709,6 +771,7 @@ def traced_picture(
     paths: int = 64,
     batch: int = 64,
     enough: float = np.inf,
+    known: Traced | None = None,
     seed: int = 0,
     threads: int = 2,
 ) -> Traced:
@@ -720,6 +783,7 @@ def traced_picture(
         per_side: samples of a pixel along each side.
         paths: of a pixel at most, in batches of a power of two for each sample, two at least.
         enough: decibels of `Traced` after which no batch begins.
+        known: the same picture of fewer paths, in batches of the same size, to go on from.
     """
     width, height = canvas
     d = ways(stage, canvas, range(height), per_side)
@@ -728,7 +792,12 @@ def traced_picture(
     block = per_side**2
     each = 1 << max(0, round(math.log2(max(batch / block, 1))))
     total, square = np.zeros((2, 4, height, width))
-    for done in range(1, max(paths // (each * block), 2) + 1):
+    begun = known.paths // (each * block) if known is not None else 0
+    traced = known
+    if known is not None:
+        total = known.mean * begun
+        square = begun * (known.error**2 * (begun - 1) + known.mean**2)
+    for done in range(begun + 1, max(paths // (each * block), 2) + 1):
         found = light(w, o, d, each, mode=EYE, block=block, seed=seed * 65_537 + done, threads=threads)
         value = found.reshape(height, width, block, 4).mean(2).transpose(2, 0, 1)
         total, square = total + value, square + value**2
@@ -736,4 +805,5 @@ def traced_picture(
         traced = Traced(total / done, np.sqrt(spread), each * block * done)
         if done > 1 and traced.decibels >= enough:
             break
+    assert traced is not None
     return traced

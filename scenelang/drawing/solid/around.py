@@ -46,7 +46,8 @@ OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less i
 # world units before surfaces, where walls are looked for, and how deep these stop light
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 LATTICE = 38, 64  # of points along the picture's shorter side, and where something may be hollow
-LATTICE_RAYS, PIXEL_RAYS, MISTY = 40, 8, 4  # of each, of pixels that are asked themselves, and through media
+LATTICE_RAYS, PIXEL_RAYS = 40, 8  # of each, and of pixels that are asked themselves
+MISTY = 4, 20  # of those of the lattice, through media, and through those with lamps within
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
@@ -400,7 +401,8 @@ class Around:
         return result
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
-        xp, misty = self.xp, max(MISTY, rays * MISTY // LATTICE_RAYS)
+        xp, mist = self.xp, self.mist
+        misty = max(MISTY[0], rays * MISTY[mist is not None and mist.lit] // LATTICE_RAYS)
         # the first of them, which go through media, in the middles of equal parts of the hemisphere
         each = np.roll(np.arange(rays), -(rays // misty // 2)).reshape(misty, -1).T.reshape(-1, 1)
         shift, turn = (TURNS @ numbers + 0.5) % 1.0

@@ -45,7 +45,7 @@ ALBEDO, WHITEST = 0.99, 0.98  # colours of media and of surfaces count as no mor
 FAR = 6.0  # cells: radius of the balls that surfaces tell apart
 NEAR, SPLIT = 3, 6  # cells around a lamp in which its light is uneven, and parts along their sides
 HALF_UP = 0.135  # share of the zenith's colour in directions about the horizontal: the sky's mean is right
-STEPS = 8  # through media of light for surfaces
+STEPS = 8, 24  # through media of light for surfaces, and of what has lamps within
 GAP = 0.03  # world units, as of `MarchSettings`
 
 AROUND: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
@@ -89,6 +89,7 @@ class Mist:
         h = float(min(max(FINE / max(densest, 1e-9), fine), coarse))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
+        self.lit = any(((low < at) & (at < high)).all() for at in (light.position for light in self.stage.lights))
         if ground is not None and high[1] > ground.y:
             self.low[1] = max(self.low[1], ground.y + 1e-3)
         self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
@@ -132,6 +133,7 @@ class Mist:
             sent[active] = np.where(clear > 0, clear.clip(DARK) ** self.thin.reshape(-1)[active], 0.0)
             at, rgb = np.reshape((light.position, light.rgb), (2, 3, 1, 1, 1)).astype(np.float32)
             r, sent = np.linalg.norm(self.p - at, axis=0), sent.reshape(self.sides)
+            sent = sent * _aside(r, light.radius, sent)
             own, far = sent * _received(r, light.radius), sent * _spread(r, FAR * self.h) / 4
             uneven = r < light.radius + NEAR * self.h  # there cells have the mean
             if uneven.any():
@@ -281,15 +283,15 @@ class Mist:
         """Light (3, K) that media send back along rays from points (3, K) in unit directions (3, K), from as
         far as a reach (K,), and the part (K,) that they let through.
         """
-        xp = self.xp
+        xp, steps = self.xp, STEPS[self.lit]
         low, high = ((side - p) / xp.select(abs(way) > 1e-6, way, 0 * way + 1e-6) for side in self.faces)
         begin = xp.largest(xp.minimum(low, high))[0].clip(0.0)
-        each = (xp.minimum(xp.least(xp.maximum(low, high)), reach) - begin).clip(0.0) / STEPS
+        each = (xp.minimum(xp.least(xp.maximum(low, high)), reach) - begin).clip(0.0) / steps
         light, clear = 0 * p, 0 * each + 1
         some = xp.where(each > 0)
         ahead, on, step = 0 * xp.take(p, some), xp.take(way, some), xp.take(each, some)
         here, through = xp.take(p + way * begin, some), 0 * step + 1
-        for i in range(STEPS):
+        for i in range(steps):
             *sent, dense = self._between(here + on * ((i + 0.5) * step), slice(9, 13))
             dense = dense.clip(1e-9)
             past = through * xp.exp(-dense * step)
@@ -326,6 +328,19 @@ def _received(r: np.ndarray, radius: float) -> np.ndarray:
     """Light on media of a lamp of power 1 that nothing hides, at distances of its middle."""
     rim = np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))  # of a ball, seen from nearby
     result: np.ndarray = (r > radius) / (2 * (1 + rim) * r.clip(1e-6) ** 2)
+    return result
+
+
+def _aside(r: np.ndarray, radius: float, sent: np.ndarray) -> np.ndarray:
+    """How much less arrives of a whole ball at distances from its middle, through even media of which so much
+    comes through from its nearest point.
+    """
+    least, result = (r - radius).clip(1e-6), 0 * r
+    sigma, rim = -np.log(sent.clip(DARK)) / least, np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))
+    for node, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True):
+        cos = 1 - (1 - rim) * (node + 1) / 2
+        way = r * cos - np.sqrt((radius**2 - r * r * (1 - cos * cos)).clip(0.0))
+        result = result + weight / 2 * np.exp(-sigma * (way - least).clip(0.0))
     return result
 
 
