@@ -54,6 +54,8 @@ OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, above which there are more rays, how many times as many, and their turns
+# how much less of what glows some points around see than others where it is asked, and what means so
+EVEN, UNKNOWN = 0.1, 2.0
 NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
@@ -151,7 +153,9 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    received: Array  # (3, L)
+    # (3, L) from everywhere, and the part of what comes straight from what glows, which nothing hides, and its
+    # square, if there is any (5, L)
+    received: Array
 
 
 class Around:
@@ -195,7 +199,7 @@ class Around:
         """Find what nodes send and receive under lamps."""
         n = self.nodes
         with self.xp.inference():
-            direct = lamps(n.p, n.n) + self.emitters.received(n.p, n.n)
+            direct = lamps(n.p, n.n) + self._glowing(n.p, n.n)
             received = self._solved(direct)
             self.sent = n.colour.clip(0.0, CAP) * (direct + received)  # (3, J), without what glows
             self.sent_rows = self.lookup.rows(self.sent) if self.lookup else None
@@ -209,7 +213,7 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        fine = self.hollow or self.emitters.there
+        fine = self.hollow or self.emitters.there or (self.mist is not None and self.mist.lit)
         self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[fine]))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
@@ -223,23 +227,30 @@ class Around:
             there = self.xp.where(p[0] < ELSEWHERE)
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
 
-            def received(turn: int) -> Array:
-                result, at, up = 0 * p, self.xp.take(p, there), self.xp.take(n, there)
-                light = self.gathered(at, up, numbers + turn * FURTHER, LATTICE_RAYS)
-                self.xp.put(result, there, light)
+            def everywhere(values: Array) -> Array:
+                result = 0 * p[: len(values)]
+                self.xp.put(result, there, values)
                 return result
 
-            self.seen = Seen(p, n, received(0))
-            light, even = self.seen.received, self._evened()
+            at, up = self.xp.take(p, there), self.xp.take(n, there)
+
+            def received(turn: int) -> Array:
+                return everywhere(self.gathered(at, up, numbers + turn * FURTHER, LATTICE_RAYS))
+
+            self.seen, light = Seen(p, n, p), received(0)
+            even = self._evened(light)
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
             more, total = min(max(noise / NOISE - 1, 0.0), 1.0) * MORE, 1.0
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light, total = light + received(turn + 1) * part, total + part
-            if more:
-                self.seen = self.seen._replace(received=light / total)
-                even = self._evened()
-            self.seen = self.seen._replace(received=even)
+            light = light / total
+            even = self._evened(light)
+            even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
+            if self.emitters.there:
+                free = everywhere(self.emitters.received(at, up)[1][None])
+                even = self.xp.concat([even, free, free * free], 0)
+            self.seen = Seen(p, n, even)
 
     def sky(self, way: Array) -> Array:
         """Light of the sky (3, …) from directions (3, …)."""
@@ -375,7 +386,8 @@ class Around:
         """What surfaces receive (3, K) at points (3, K) with unit normals (3, K)."""
         xp = self.xp
         if self.seen is None:
-            return self.gathered(p, n, np.stack([np.arange(p.shape[1])] * 2), LATTICE_RAYS)
+            numbers = np.stack([np.arange(p.shape[1])] * 2)
+            return self.gathered(p, n, numbers, LATTICE_RAYS) + self._glowing(p, n)
         places = self._places(p)
         result, fits = self._between(p, n, *places, NEXT)
         rest = xp.where(~fits)
@@ -383,18 +395,28 @@ class Around:
             side, u, v = (xp.take(part, rest) for part in places)
             few = xp.take(p, rest), xp.take(n, rest)
             values, fits = self._between(*few, side, u, v, AROUND)
-            xp.put(result, rest, values)
             alone = xp.where(~fits)
             if len(alone):
                 at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
                 numbers = np.rint(at * (EIGHTHS * self.step))
-                p, n = (xp.take(part, alone) for part in few)
-                xp.put(result, xp.take(rest, alone), self.gathered(p, n, numbers, PIXEL_RAYS))
-        return result
+                xp.put(values[:3], alone, self.gathered(*(xp.take(part, alone) for part in few), numbers, PIXEL_RAYS))
+                xp.put(values[3:], alone, 0 * xp.take(values[3:], alone) + UNKNOWN)
+            xp.put(result, rest, values)
+        if not self.emitters.there:
+            return result
+        free, some = result[3], xp.where(result[4] > result[3] * result[3] + EVEN**2)
+        if len(some):
+            xp.put(free, some, self.emitters.received(xp.take(p, some), xp.take(n, some))[1])
+        return result[:3] + free * self.emitters.received(p, n, 0)[0]
+
+    def _glowing(self, p: Array, n: Array) -> Array:
+        """What points (3, K) with unit normals receive (3, K) straight from what glows."""
+        light, free = self.emitters.received(p, n)
+        return light * free
 
     def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
         """What points (3, K) with unit normals receive (3, K) by so many rays, which numbers (2, K) turn."""
-        result = self.emitters.received(p, n)
+        result = 0 * p
         for start in range(0, p.shape[1], BATCH // rays):
             band = slice(start, start + BATCH // rays)
             result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays)
@@ -459,24 +481,24 @@ class Around:
         fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
         return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
 
-    def _evened(self) -> Array:
-        """What points of the lattice receive (3, L), mixed with those around on the same surface."""
+    def _evened(self, values: Array) -> Array:
+        """Values (R, L) of points of the lattice, mixed with those around on the same surface."""
         xp, seen = self.xp, self.seen
-        side, result, total = self._places(seen.p)[0], 0 * seen.p, 0 * seen.p[0]
+        side, result, total = self._places(seen.p)[0], 0 * values, 0 * seen.p[0]
         row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
         for below, right in np.ndindex(3, 3):
             index = (row + below - 1).clip(0, self.rows - 1) * self.columns
             index = xp.array(index + (column + right - 1).clip(0, self.columns - 1), seen.p)
             weight = (1, 2, 1)[below] * (1, 2, 1)[right] * self._alike(seen.p, seen.n, index, side)
-            total, result = total + weight, result + weight * xp.take(seen.received, index)
+            total, result = total + weight, result + weight * xp.take(values, index)
         return result / total.clip(1e-9)
 
     def _between(
         self, p: Array, n: Array, side: Array, u: Array, v: Array, corners: tuple[tuple[int, int], ...]
     ) -> tuple[Array, Array]:
-        """Light (3, K) that corners of cells receive on the same surface, and where there are any."""
-        xp, i, j = self.xp, self.xp.floor(u), self.xp.floor(v)
-        total, result, most = 0 * u, 0 * p, 0 * u
+        """What `Seen` tells (R, K) of corners of cells on the same surface, and where there are any."""
+        xp, i, j, values = self.xp, self.xp.floor(u), self.xp.floor(v), self.seen.received
+        total, result, most = 0 * u, 0 * xp.take(values, xp.whole(0 * u)), 0 * u
         for right, below in corners:
             column, row = (
                 (k + step).clip(0, count - 1)
@@ -486,7 +508,7 @@ class Around:
             fit = self._alike(p, n, index, side)
             weight = fit * ((1 - abs(u - column)).clip(0.0) * (1 - abs(v - row)).clip(0.0) + 0.02)
             total, most = total + weight, xp.maximum(most, fit)
-            result = result + weight * xp.take(self.seen.received, index)
+            result = result + weight * xp.take(values, index)
         return result / total.clip(1e-9), most > 0.5
 
 

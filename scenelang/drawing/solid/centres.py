@@ -38,13 +38,17 @@ class Centres:
         self.p, self.n, self.light = (xp.full((3, count), 0.0, like) for _ in range(3))
         self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and how uneven they are
 
-    def received(self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array]) -> Array:
-        """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met."""
+    def received(
+        self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array], every: bool
+    ) -> Array:
+        """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met, of which ``every``
+        one asks or some.
+        """
         xp = self.xp
         if self.pixels is None:
             xp.put(self.p, rays, p)
             xp.put(self.n, rays, n)
-            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), INF)
+            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), INF * (not every))
             xp.put(self.light, rays, xp.take(light, rays))
             return xp.take(self.light, rays)
         return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))

@@ -251,7 +251,8 @@ class Lighting:
             received = self._twice(self.around.surface(p, n))
         else:
             centres, rays = beside
-            received = self._twice(centres.received(rays, p, n, self.around.surface))
+            every = self.around.emitters.there
+            received = self._twice(centres.received(rays, p, n, self.around.surface, every))
         base = colour * received + haze
         if len(coat):
             base = base + reflected(self, p, n, coat, received, mirrors)

@@ -17,7 +17,7 @@ from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.nodes import Nodes
 from scenelang.drawing.solid.passes import INF
 
-DISCS, CLUSTER = 1024, 8  # of all that glows, and of one cluster
+DISCS, CLUSTER = 1024, 16  # of all that glows, and of one cluster
 TURNED = 0.3  # how far apart opposite normals count, twice
 BAND = 1024  # points at once
 CLEAR = 0.02  # world units before a disc where rays to it end
@@ -58,20 +58,24 @@ class Emitters:
         discs = self.xp.array(np.reshape(np.array(discs, np.float32).T, shape), nodes.p) if discs else nodes.p
         self.p, self.n, self.glow, self.area = discs[:3], discs[3:6], discs[6:9], discs[-1]
 
-    def received(self, p: Array, n: Array) -> Array:
-        """What points (3, K) with unit normals receive straight from what glows (3, K)."""
-        result = 0 * p
+    def received(self, p: Array, n: Array, every: int = 1) -> tuple[Array, Array]:
+        """What points (3, K) with unit normals would receive straight from what glows (3, K) if nothing hid it,
+        and the part of it (K,) that arrives; ``every`` as of `seen`.
+        """
+        result, part = 0 * p, 0 * p[0]
         for start in range(0, p.shape[1] if self.there else 0, BAND):
             band = slice(start, start + BAND)
-            point, _, light = self.seen(p[:, band], n[:, band])
+            point, _, light, clear = self.seen(p[:, band], n[:, band], every)
             self.xp.add(result[:, band], point, light)
-        return result
+            self.xp.add(part[None, band], point, (light.sum(0) * clear)[None])
+        return result, part / result.sum(0).clip(1e-9)
 
-    def seen(self, p: Array, n: Array | None, every: int = 1) -> tuple[Array, Array, Array]:
+    def seen(self, p: Array, n: Array | None, every: int = 1) -> tuple[Array, Array, Array, Array]:
         """Clusters that points (3, K) see: numbers (k,) of the points, unit directions (3, k), and what
-        surfaces with unit normals (3, K) receive of them (3, k); without normals those that face them.
+        surfaces with unit normals (3, K) receive of them if nothing hides them (3, k), without normals those
+        that face them, and the part of it (k,) that arrives.
 
-        Rays go to each ``every``th cluster, by turns; others are hidden as much as these.
+        Rays go to each ``every``th cluster, by turns; others are hidden as much as these, and none with 0.
         """
         xp = self.xp
         to = [self.p[axis] - p[axis][:, None, None] for axis in range(3)]  # (K, G, m) each
@@ -92,6 +96,8 @@ class Emitters:
         way = xp.take(self.p.reshape(3, -1), disc) - begin
         far = xp.sqrt((way * way).sum(0)).clip(1e-6)
         way, light = way / far, xp.take(light.reshape(3, -1), some)
+        if not every:
+            return point, way, light, 0 * far + 1
         asked = xp.where((point + cluster) % every == 0)
         begin, ways = xp.take(begin, asked), xp.take(way, asked)
         trail = march(self.field, begin, ways, xp.take(far, asked) - CLEAR, 0, GAP, True)
@@ -100,4 +106,4 @@ class Emitters:
             sums, at, bright = xp.full((2, p.shape[1]), 0.0, p), xp.take(point, asked), light.sum(0)[asked]
             xp.add(sums, at, xp.stack([bright * clear, bright], 0))
             clear = xp.take(sums[0] / sums[1].clip(1e-9), point)
-        return point, way, light * clear
+        return point, way, light, clear

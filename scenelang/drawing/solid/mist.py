@@ -42,7 +42,6 @@ FIRST = 5e-2  # and where the ground's light is not known
 SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
 DARK = 1e-30
 ALBEDO, WHITEST = 0.99, 0.98  # colours of media and of surfaces count as no more
-FAR = 6.0  # cells: radius of the balls that surfaces tell apart
 NEAR, SPLIT = 3, 6  # cells around a lamp in which its light is uneven, and parts along their sides
 HALF_UP = 0.135  # share of the zenith's colour in directions about the horizontal: the sky's mean is right
 STEPS = 8, 24  # through media of light for surfaces, and of what has lamps within
@@ -124,7 +123,7 @@ class Mist:
         self.thinned = self.density * self.thin
         active = np.flatnonzero(((count > 0) | self.mist) & ~self.opaque)
         self.slopes = np.array(np.gradient(d, self.h))
-        # what arrives (n…,), the same as surfaces see it, and colours with their power
+        # what arrives (n…,), where it is uneven, and colours with their power
         self.lamps: list[tuple[Any, ...]] = []
         self.received = 0 * self.albedo  # from lamps, by surfaces next to nodes
         for light in self.stage.lights:
@@ -134,13 +133,13 @@ class Mist:
             at, rgb = np.reshape((light.position, light.rgb), (2, 3, 1, 1, 1)).astype(np.float32)
             r, sent = np.linalg.norm(self.p - at, axis=0), sent.reshape(self.sides)
             sent = sent * _aside(r, light.radius, sent)
-            own, far = sent * _received(r, light.radius), sent * _spread(r, FAR * self.h) / 4
+            own = sent * _received(r, light.radius)
             uneven = r < light.radius + NEAR * self.h  # there cells have the mean
             if uneven.any():
                 parts = (np.mgrid[:SPLIT, :SPLIT, :SPLIT].reshape(3, -1, 1) + 0.5) / SPLIT - 0.5
                 away = self.p[:, None, uneven] - at.reshape(3, 1, 1) + self.h * parts
                 own[uneven] = sent[uneven] * _received(np.linalg.norm(away, axis=0), light.radius).mean(0)
-            self.lamps.append((own, far, uneven, light.power * rgb))
+            self.lamps.append((own, uneven, light.power * rgb))
             facing = (self.slopes * (at - self.p)).sum(0).clip(0.0) / r.clip(1e-6)
             self.received += 4 * light.power * rgb * own * facing
 
@@ -176,7 +175,7 @@ class Mist:
             parts[:, *to] = np.stack([e0 - following, following]) * (m0 | m1)
             base = self.glow * parts[0]
             base[:, *to] += self.glow[:, *on] * parts[1][to]
-            for sent, _, uneven, rgb in self.lamps:
+            for sent, uneven, rgb in self.lamps:
                 first = sent[to].clip(DARK)
                 last = np.where(stop, first, sent[on].clip(DARK))
                 x = (1 + (np.log(first / last) / t).clip(-8.0, 50.0)) * t
@@ -219,7 +218,7 @@ class Mist:
         self._solve(base, FIRST if floor is None else ENOUGH)
         light = np.where(self.opaque, 0.0, self.light).astype(np.float32)
         sends = self.albedo * light + self.glow
-        for _, sent, _, rgb in self.lamps:
+        for sent, _, rgb in self.lamps:
             sends += self.albedo * sent * rgb
         dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0)
         if self.opaque.any():  # there as around, lest rays begin and end in less than there is
@@ -342,13 +341,6 @@ def _aside(r: np.ndarray, radius: float, sent: np.ndarray) -> np.ndarray:
         way = r * cos - np.sqrt((radius**2 - r * r * (1 - cos * cos)).clip(0.0))
         result = result + weight / 2 * np.exp(-sigma * (way - least).clip(0.0))
     return result
-
-
-def _spread(r: np.ndarray, radius: float) -> np.ndarray:
-    """The mean of 1 / r² over balls of a radius whose centres are at distances r."""
-    d = r.clip(1e-3 * radius) / radius
-    near = 0.75 * (2 + (1 - d * d) / d * np.log((1 + d) / abs(1 - d).clip(1e-6)))
-    return np.where(d > 30, 1 / (d * d), near) / radius**2
 
 
 def box_of(field: SolidField, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from scenelang.drawing.solid.network import Wanted
 
 ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
 COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
-CHORDS, GLOWING = 1500, 400  # of those that glow, and nodes of the light on each
+CHORDS, GLOWING = 24000, 400  # of those that glow, and nodes of the light on each
 NODES, LEAST, MOST = 200, 20, 400  # on all objects, on one at least and at most
 ALL = 2400  # at most
 HOLLOW = 3  # times as many where something may be hollow
