@@ -52,6 +52,7 @@ SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' r
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
+SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, above which there are more rays, how many times as many, and their turns
 # how much less of what glows some points around see than others where it is asked, and what means so
@@ -455,6 +456,7 @@ class Around:
             at = xp.take(p, met) + ways * xp.take(hit, met)
             seen = self._around(at, ways)
             xp.put(light, met, self.lookup.mixed(self.sent_rows, *seen))
+        light = light * (hit * (1 / SHUT)).clip(None, 1.0)
         return light, xp.minimum(hit, limit)
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:

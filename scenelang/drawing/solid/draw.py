@@ -17,7 +17,7 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.solid.around import CAP, ELSEWHERE, RARE, arriving, to_ground
+from scenelang.drawing.solid.around import CAP, ELSEWHERE, OFF, RARE, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
@@ -440,6 +440,12 @@ class Lighting:
                 xp.put(colour[:3], some, mean)
         if self.around is not None:
             colour = colour.clip(None, CAP)
+            some = xp.where(~sharp)
+            if len(some):  # there normals are the medium's too; light that begins within what is opaque is none
+                off = xp.take(p + OFF * n, some)
+                met = self.field.meet(passes.at(xp, some), xp.take(t, some), Wanted.KIND, p=off)
+                inside = (met.distance < 0) & (met.register[0] < 0.5)
+                xp.put(colour, some, xp.take(colour, some) * ~inside)
         if not len(self._bare):
             return p, n, colour, glow, self._bare * p[:1]
         colour, coat = coated(xp, n, -way, colour, self.field.material(result).roughness)
