@@ -17,7 +17,7 @@ from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.mesh import FitError
 from scenelang.drawing.exact.outline import drawn
 from scenelang.drawing.neural.outlines import OutlineShapes
-from scenelang.inverse.fonts import ranges_of, read_font
+from scenelang.inverse.learn import ranges_of, read_font
 from scenelang.language import library
 from tests.assets.shapes import ball, element
 
