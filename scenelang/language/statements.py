@@ -1,4 +1,4 @@
-"""Statements of the top level, params, statements headed by a name, and the tables of what prepares what."""
+"""Statements of the top level, params, texts, statements headed by a name, and what prepares what."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from numbers import Real
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from scenelang.assets.element_file import ElementFile
+from scenelang.assets.element_file import ALIGNED, ElementFile, Font, FontError, Placed
 from scenelang.language import (
     advice,
     blocks,
     expressions,
     foreign,
-    letters,
     library,
     modifiers,
     scopes,
@@ -32,13 +31,14 @@ from scenelang.language.diagnostics import (
     Span,
     did_you_mean,
     instead,
+    listing,
     removal,
 )
 from scenelang.language.expressions import VARIES, bind, lookup, prepare, prepare_arguments, wrong_kind
 from scenelang.language.library import Written
-from scenelang.language.limits import MAX_BYTES
+from scenelang.language.limits import MAX_BYTES, MODULE_CALL, OBJECT
 from scenelang.language.modifiers import LEFT_OUT, Spec, prepare_move, prepare_value_use, spread
-from scenelang.language.nodes import LAMPS, MOST, camera_fault
+from scenelang.language.nodes import LAMPS, MOST, Object, Scale, Translate, camera_fault
 from scenelang.language.parser import parse
 from scenelang.language.reporter import Advice, Reporter, find_damage
 from scenelang.language.scene import MAX_FRAMES, Animation, Camera, Elements
@@ -259,9 +259,9 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
             size = Binding("let", stmt.alias.span, value=element.size, known=True)
             brought.scope.names[f"{name}_size"] = size
     if zoo.font is not None:
-        font = letters.Letters(zoo.font, known)
+        font = Letters(zoo.font, known)
         brought.scope.names["text"] = Binding("text", stmt.alias.span, value=font)
-        width = partial(letters.prepare_width, font)
+        width = partial(prepare_width, font)
         brought.scope.names["width"] = Binding("width", stmt.alias.span, value=width)
     brought.materials.update({name: f"{known}.{name}" for name in zoo.materials})
     return brought
@@ -455,6 +455,97 @@ def _is_literal(expr: tree.Expr) -> bool:
             return False
 
 
+MAX_TEXT: Final = 10_000  # characters
+
+
+class Letters(NamedTuple):
+    """A font and the name that a Scene has its file by."""
+
+    font: Font
+    file: str
+
+
+def _line(font: Font, text: Any, size: Any) -> tuple[list[Placed], float]:
+    """The line of a text at a size of 1, and its width; raises Problem."""
+    if text.__class__ is not str:
+        raise values.unexpected("a string", text, operand=0)
+    if values.number(size, 1) <= 0.0:
+        raise Problem("E0311", f"a size of {values.show(size)} is not above 0", operand=1)
+    if len(text) > MAX_TEXT:
+        raise Problem("E0370", f"a text of more than {MAX_TEXT:,} characters", operand=0)
+    try:
+        return font.line(text)
+    except FontError as error:
+        help = "texts are one line each; write one for each line" if "break" in str(error) else None
+        raise Problem("E0370", str(error), help, operand=0, letter=error.at) from None
+
+
+def laid_out(font: Font, text: Any, size: Any = 1.0, align: Any = "left") -> list[Placed]:
+    """The letters of a text in world units; raises Problem."""
+    line, width = _line(font, text, size)
+    if align.__class__ is not str:
+        raise values.unexpected("a string", align, operand=2)
+    if align not in ALIGNED:
+        known = listing(ALIGNED)
+        raise Problem("E0311", f"no text is aligned to `{align[:40]}`", f"align is {known}", operand=2)
+    left = width * ALIGNED[align]
+    return [Placed(name, size * (x - left), size * y, size * radius) for name, x, y, radius in line]
+
+
+def width_of(font: Font) -> Callable[..., float]:
+    """The function ``width`` of a font."""
+    return lambda text, size=1.0: size * _line(font, text, size)[1]
+
+
+def prepare_text(stmt: tree.Call, place: Site, letters: Letters) -> Action | None:
+    """``abc.text("Ag", size = 0.5) { transforms }``: one child, a union of letters."""
+    session, where, word = place.session, Written(stmt.name.span, stmt.span), words.LETTERS["text"]
+    fits = blocks.holds_children(place, where.name, "a call of `{}`", stmt.name.text)
+    given = prepare_arguments(stmt.args, place)
+    block = blocks.prepare_inner(stmt.body, place.inner("object")) if stmt.body is not None else None
+    if (bound := bind(place.report, stmt.name, word.params, word.required, given)) is None or not fits:
+        return None
+    place.file.weight += MODULE_CALL
+    names = [name for name, one in zip(word.params, bound, strict=True) if one is not None]
+    getters = [one.code.run for one in bound if one is not None]
+    operands = tuple([None if one is None else one.arg.value for one in bound])
+    font, file = letters
+
+    def action(env: Env, out: Builder) -> None:
+        values = [get(env) for get in getters]
+        if POISON in values:
+            return
+        try:
+            line = laid_out(font, **dict(zip(names, values, strict=True)))
+        except Problem as problem:
+            advice.report_problem(session.report, problem, where.name, operands)
+            return
+        session.tick(OBJECT * len(values[0]), where.name)
+        session.count_objects(len(line), where.name)
+        session.count_parts(2 * len(line), where.name)
+        inside = Builder()
+        for name, x, y, radius in line:
+            scale = make(Scale, {"kind": "scale", "x": radius, "y": radius, "z": radius})
+            moves = scale, make(Translate, {"kind": "translate", "x": x, "y": y, "z": 0.0})
+            fields = {"kind": "object", "geometry": f"{file}.{name}", "transforms": moves, "material": None}
+            blocks.place_child(make(Object, fields), where, inside, session)
+        blocks.place_called(inside, block, env, where, out, session)
+
+    return action
+
+
+def prepare_width(
+    letters: Letters, expr: tree.CallExpr, given: list[expressions.Given], place: Site
+) -> expressions.Code | None:
+    """``abc.width("Ag", size = 0.5)``, a number; None after a report."""
+    word = words.LETTERS["width"]
+    if (bound := bind(place.report, expr.name, word.params, word.required, given)) is None:
+        return None
+    codes = [one.code for one in bound if one is not None]
+    exprs = [one.arg.value for one in bound if one is not None]
+    return expressions.computed(place, width_of(letters.font), expr.span, exprs, codes)
+
+
 def prepare_headed(stmt: tree.Call, place: Site) -> Action | None:
     name = stmt.name.text
     binding = None if name in words.LANGUAGE else lookup(stmt.name, place)
@@ -474,7 +565,7 @@ def prepare_headed(stmt: tree.Call, place: Site) -> Action | None:
     if binding.kind == "module":
         return blocks.prepare_module_call(stmt, binding.value, place)
     if binding.kind == "text":
-        return letters.prepare_text(stmt, place, binding.value)
+        return prepare_text(stmt, place, binding.value)
     if binding.kind == "element":
         return blocks.prepare_element(stmt, place, binding.value)
     if binding.kind in scopes.VALUES:
