@@ -13,7 +13,7 @@ import pytest
 from scenelang.compiler.graph import Fold, Leaf, Look
 from scenelang.compiler.spaces import Camera, Ground, Light, Sky, Stage
 from scenelang.compiler.steps import Displace, Shell, Step, Twist
-from scenelang.drawing.exact import light, solid
+from scenelang.drawing.exact import picture, solid
 from scenelang.drawing.exact.solid import ExactField, radiance, ways
 from scenelang.drawing.image import Image
 from tests.drawing.solids import fold, leaf, moved, scaled, turned
@@ -32,8 +32,8 @@ def found(root: Fold, stage: Stage, d: np.ndarray, paths: int) -> tuple[np.ndarr
     """Light (3, M) along ways (3, M) under the stage's sky, and its standard errors."""
     random, field, count = np.random.default_rng(3), ExactField(root), d.shape[1]
     many = np.repeat(d, paths, 1)
-    even = (random.random((light._NUMBERS, 1)) + np.arange(many.shape[1]) * light._EVEN) % 1.0
-    out = light.paths_light(field, stage, many, random, even)[:3].reshape(3, count, paths)
+    even = (random.random((picture._NUMBERS, 1)) + np.arange(many.shape[1]) * picture._EVEN) % 1.0
+    out = picture.paths_light(field, stage, many, random, even)[:3].reshape(3, count, paths)
     return out.mean(2), out.std(2) / sqrt(paths)
 
 
@@ -244,7 +244,7 @@ def test_same_again() -> None:
     stage = Stage(lights=(Light((2.5, 4.0, 3.0), 20.0, (1.0, 1.0, 1.0), 0.5),), sky=Sky(0.5))
 
     def drawn(stage: Stage, paths: int) -> Image:
-        return solid.solid_image(root, stage, (12, 8), light=partial(light.sky_light, paths=paths))
+        return solid.solid_image(root, stage, (12, 8), light=partial(picture.sky_light, paths=paths))
 
     one, other = (drawn(stage, 4) for _ in range(2))
     assert (one == other).all()
