@@ -12,7 +12,7 @@ from PIL import Image
 
 import scenelang as nsg
 from lab.frontier.record import FrameErrors, Frontier
-from scenelang.cli import choosing
+from scenelang.cli import inputs
 from scenelang.compiler.compile import compile_scene
 from scenelang.drawing.small import load_of
 from scenelang.output import frontier as frontier_file
@@ -135,7 +135,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
             options["diagnostics"].add("W0501", "4 objects, trained on 3", None)  # type: ignore[attr-defined]
         return made
 
-    monkeypatch.setattr(choosing, "compile_scene", warns)
+    monkeypatch.setattr(inputs, "compile_scene", warns)
     text = said(shipped, "--max-flip 0.05")
     assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text

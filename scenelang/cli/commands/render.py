@@ -148,7 +148,7 @@ def command(
     )
     able = [(job, path) for job, path in zip(every, paths, strict=True) if job and not job.failed(strict)]
     if limits and able:
-        from scenelang.cli.choosing import choose_all
+        from scenelang.cli.inputs import choose_all
         from scenelang.output.frontier import Limits
 
         with clock("choose"):
