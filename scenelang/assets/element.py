@@ -45,7 +45,7 @@ FORMS: Final = {
     "outline": Encoding(("curves",), ("plain",), {2: "element of the plane"}),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
     "picture": Encoding(("height", "width"), ("webp", "av1"), {2: "texture"}),
-    # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.colours`)
+    # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.pyramid`)
     "colours": Encoding(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
 }
 

@@ -126,9 +126,9 @@ def texels(element: Element) -> npt.NDArray[np.float32]:
     import numpy as np
 
     if element.form == "colours":
-        from scenelang.assets.colours import unpacked
+        from scenelang.assets.pyramid import unpacked_colours
 
-        return np.moveaxis(unpacked(element), 0, -1)
+        return np.moveaxis(unpacked_colours(element), 0, -1)
     flat = np.frombuffer(pixels(element), np.uint8).reshape((*element.sizes, 3))
     return flat.astype(np.float32) / np.float32(255)
 

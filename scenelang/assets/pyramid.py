@@ -1,12 +1,17 @@
-"""Signed distances as a pyramid of grids over [-1, 1]^d, and the codec that makes it small.
+"""Elements as arrays: distances and colours as pyramids of grids over [-1, 1]^d, with their codecs; curves.
 
 Each grid has twice as many cells as the one before. What it adds to that one is a step at each node: a whole
-number from -127 to 127, times a width that grows with the distance, so that nodes far from the surface mostly
-have the step 0, and packing makes little of them. Between the nodes of a grid the next one expects what the
-cubic through four of them gives (Deslauriers and Dubuc 1989). Nothing here is learned.
+number from -127 to 127. Of signed distances it counts times a width that grows with the distance, so that
+nodes far from the surface mostly have the step 0, and packing makes little of them. Between the nodes of a
+grid the next one expects what the cubic through four of them gives (Deslauriers and Dubuc 1989). Nothing here
+is learned.
 
 Of two codings, ``deflate`` has one width for all grids; ``bzip2`` has finer steps in the last grid, at the
 nodes that normals on the surface are made of. Without, a smooth surface looks hammered in the light.
+
+Colours have steps for luma and for both differences of colour (YCoCg, Malvar and Sullivan 2003), which take
+steps twice as wide, and nodes between are expected linearly. Only nodes beside a surface take any but 0, so
+that bzip2 makes little of the others.
 """
 
 from __future__ import annotations
@@ -14,14 +19,15 @@ from __future__ import annotations
 import bz2
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import MOST_SIDE, Element, Facts
+from scenelang.assets.element import GRAIN, MOST_SIDE, Element, Facts
 
-Grid = npt.NDArray[np.float32]
+Grid = npt.NDArray[np.float32]  # of colours (3, n, n, n)
 FINE: Final = 24.0  # steps in a cell's side near the surface
 FINER: Final = 64.0  # the same in the last grid of the coding with finer steps,
 NEAR: Final = 2.0  # within so many cells of the surface
@@ -29,6 +35,8 @@ NEAR: Final = 2.0  # within so many cells of the surface
 FAR: Final = 8.0
 FIRST: Final = 400.0
 FARTHEST: Final = 4.0  # larger than any distance in the cube
+Mask = npt.NDArray[np.bool_]
+_LUMA: Final = np.array([[0.25, 0.5, 0.25], [1.0, 0.0, -1.0], [-0.5, 1.0, -0.5]], np.float32)
 
 
 def between(grid: Grid, linear: bool = False) -> Grid:
@@ -112,3 +120,61 @@ def unpacked(element: Element) -> Grid:
 def finest(grid: Grid) -> Grid:
     """The last grid of a pyramid as it is drawn: once more refined where it is small."""
     return between(grid) if 2 * len(grid) - 1 <= MOST_SIDE[grid.ndim] else grid
+
+
+def _turned(matrix: npt.NDArray[np.float32], grid: Grid) -> Grid:
+    return np.asarray((matrix @ grid.reshape(3, -1)).reshape(grid.shape), np.float32)
+
+
+def _colour_widths(element: Element) -> Grid:
+    """Size of a step, for luma and for both differences."""
+    return np.array([1.0, 2.0, 2.0], np.float32).reshape(3, 1, 1, 1) / np.float32(element.sizes[1])
+
+
+def packed_colours(name: str, colours: Grid, near: Mask, about: Facts, steps: int = 40) -> Element:
+    """The element of colours, 0 to 1; ``near`` (n, n, n) is true where a node counts.
+
+    A node of a coarser grid counts where any around it does; in the coarsest grid all count. There are
+    ``steps`` of luma from 0 to 1; nodes that count are off by half a step at most.
+    """
+    element = Element(name, "colours", (len(near), steps), "bzip2", b"", about)
+    true, widths, grid = _turned(_LUMA, colours), _colour_widths(element), None
+    result: list[bytes] = []
+    for side in element.sides:
+        apart = (len(near) - 1) // (side - 1)
+        expected = np.zeros((3, side, side, side), np.float32) if grid is None else between(grid, linear=True)
+        wanted = np.rint((true[:, ::apart, ::apart, ::apart] - expected) / widths)
+        clipped = (wanted.clip(-127, 127) * (_around(near, apart) if result else True)).astype(np.int8)
+        grid = expected + clipped * widths
+        result.append(clipped.tobytes())
+    return replace(element, data=bz2.compress(b"".join(result), 9))
+
+
+def _around(near: Mask, apart: int) -> Mask:
+    """Mask of every ``apart``-th node: true where a node of ``near`` is closer than that along each axis."""
+    for axis in (0, 1, 2) if apart > 1 else ():
+        padded = np.pad(np.moveaxis(near, axis, 0), [(apart - 1, apart - 1), (0, 0), (0, 0)])
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * apart - 1, axis=0)
+        near = np.moveaxis(np.asarray(windows[::apart].any(-1)), 0, axis)
+    return near
+
+
+def unpacked_colours(element: Element) -> Grid:
+    """The colours (3, n, n, n), 0 to 1; any bytes give finite numbers. Raises `TensorError` for damage."""
+    flat, first, grid = np.frombuffer(element.inflated(), np.int8), 0, None
+    widths = _colour_widths(element)
+    for side in element.sides:
+        shape = (3, side, side, side)
+        steps = flat[first : first + 3 * side**3].reshape(shape)
+        expected = np.zeros(shape, np.float32) if grid is None else between(grid, linear=True)
+        grid, first = expected + steps * widths, first + steps.size
+    assert grid is not None
+    return _turned(np.linalg.inv(_LUMA), grid).clip(0.0, 1.0)
+
+
+def curves_of(element: Element) -> npt.NDArray[np.float64]:
+    """Curves (n, 3, 2) of an outline: start, control point and end, leaf units; any bytes give some."""
+    curves = np.frombuffer(element.data, "<i2").reshape(-1, 3, 2) / GRAIN
+    straight = (curves[:, 1] == curves[:, 0]).all(1) | (curves[:, 1] == curves[:, 2]).all(1)
+    curves[straight, 1] = curves[straight][:, ::2].mean(1)
+    return curves

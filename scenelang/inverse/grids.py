@@ -19,9 +19,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets import colours as codec
 from scenelang.assets.element import MOST_SIDE, Element, Facts
-from scenelang.assets.pyramid import Grid, finest, packed, refine, unpacked
+from scenelang.assets.pyramid import Grid, finest, packed, packed_colours, refine, unpacked, unpacked_colours
 from scenelang.assets.records import Record
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.mesh import Mesh, Points
@@ -232,8 +231,8 @@ def fit_colours(
         late = time.monotonic() - started > budget_s if steps is None else count >= steps
         if best is not None and late:
             break
-        element = codec.packed(name, *_grid(mesh, side), {}, fine)
-        drawn = _weights(points, side) @ codec.unpacked(element).reshape(3, -1).T
+        element = packed_colours(name, *_grid(mesh, side), {}, fine)
+        drawn = _weights(points, side) @ unpacked_colours(element).reshape(3, -1).T
         error = float(np.sqrt(np.square(drawn - true).mean()))
         report(side, len(element.data), error)
         if best is not None and len(element.data) > MOST_BYTES:
@@ -256,7 +255,7 @@ def _weights(points: npt.NDArray[np.float64], side: int) -> Any:
     return csr_matrix(result, shape=(len(points), side**3))
 
 
-def _grid(mesh: Mesh, side: int) -> tuple[codec.Grid, npt.NDArray[np.bool_]]:
+def _grid(mesh: Mesh, side: int) -> tuple[Grid, npt.NDArray[np.bool_]]:
     """Colours (3, n, n, n), and a mask (n, n, n) of the nodes next to the surface."""
     from scipy.ndimage import distance_transform_edt
 

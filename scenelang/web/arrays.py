@@ -18,10 +18,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.curves import curves_of
 from scenelang.assets.element import Element, Gradient
 from scenelang.assets.picture import texels
-from scenelang.assets.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, has_finer, unpacked
+from scenelang.assets.pyramid import FAR, FARTHEST, FINE, FINER, FIRST, NEAR, curves_of, has_finer, unpacked
 from scenelang.assets.tensors import TensorError
 from scenelang.compiler.groups import OPERATOR, widths_of
 from scenelang.compiler.lifting import LAYOUTS, Layout

@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from scenelang.assets.colours import packed as packed_colours
 from scenelang.assets.element import Element
 from scenelang.assets.picture import painted
-from scenelang.assets.pyramid import Grid, packed, refine
+from scenelang.assets.pyramid import Grid, packed, packed_colours, refine
 
 Formula = Callable[..., np.ndarray]
 

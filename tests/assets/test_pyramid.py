@@ -10,12 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenelang.assets.colours import packed as packed_colours
-from scenelang.assets.colours import unpacked as unpacked_colours
 from scenelang.assets.element import Element
 from scenelang.assets.element_file import element_file_bytes, read_zoo
 from scenelang.assets.picture import texels
-from scenelang.assets.pyramid import between, unpacked
+from scenelang.assets.pyramid import between, packed_colours, unpacked, unpacked_colours
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.assets import GridShape

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.assets.curves import curves_of
 from scenelang.assets.element_file import load_element_file
+from scenelang.assets.pyramid import curves_of
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import parse_program, program_bytes
 from scenelang.drawing.arrays import NUMPY

@@ -17,9 +17,9 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.assets.colours import unpacked
 from scenelang.assets.element_file import element_file_bytes, load_element_file
 from scenelang.assets.picture import texels
+from scenelang.assets.pyramid import unpacked_colours
 from scenelang.drawing.exact.mesh import FitError, Mesh, Tints, mesh_of, read_solids, white, whole
 from scenelang.drawing.exact.originals import FOLDER
 from scenelang.drawing.exact.outline import read_outline, read_picture
@@ -215,7 +215,7 @@ def test_the_smallest_grid_that_is_near_enough_is_kept() -> None:
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     beside = abs(np.sqrt(x * x + y * y + z * z) - 1) < 1 / side
     red = 0.5 + 0.5 * np.tanh(3 * x / np.sqrt(x * x + y * y + z * z + 1e-9))
-    assert abs(unpacked(element)[0] - red)[beside].mean() < 0.02
+    assert abs(unpacked_colours(element)[0] - red)[beside].mean() < 0.02
     inside = texels(element)[side // 2, side // 2, side // 2]
     assert inside.sum() == pytest.approx(1.2, abs=0.2)  # filled from the surface, not black
 

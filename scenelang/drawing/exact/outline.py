@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
 
-from scenelang.assets.curves import curves_of
 from scenelang.assets.element import TEXELS, Element, Facts, Painted
 from scenelang.assets.element_file import Font, FontError, load_element_file
 from scenelang.assets.picture import frame_of, painted, texels
+from scenelang.assets.pyramid import curves_of
 from scenelang.assets.records import Record
 from scenelang.drawing.exact.mesh import FitError, Points, needed, outer
 from scenelang.language import library

@@ -16,8 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.curves import curves_of
 from scenelang.assets.element import GRAIN, Element
+from scenelang.assets.pyramid import curves_of
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.network import CELLS, RADII, Slopes
 

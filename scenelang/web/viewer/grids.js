@@ -71,7 +71,7 @@ function halfway(grid, n, inner) {
 }
 
 /**
- * The colours of a paint of kind "colours", as in scenelang/assets/colours.py: linear, whole numbers up to `unit`,
+ * The colours of a paint of kind "colours", as in scenelang/assets/pyramid.py: linear, whole numbers up to `unit`,
  * at n^3 nodes, z first to change, a Uint16Array of three a node.
  */
 export function spaceColours({ sides, steps, fineness }, unit) {
