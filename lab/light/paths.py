@@ -2,9 +2,10 @@
 
 Surfaces are found by sphere tracing and a root; ways through media are exact where their extinction is
 constant between steps. Lamps are sampled by the solid angle that they fill, at glossy surfaces by reflected
-directions as well (Veach's balance heuristic); so are surfaces that glow, by points that lie evenly on them, one
-of a few by what it would send (resampled importance sampling: Talbot, Cline and Egbert 2005). The first numbers of a path come from Sobol' points that each
-pixel shifts by its own; independent shifts tell the standard error.
+directions as well (Veach's balance heuristic). Surfaces that glow are sampled by directions and by points that
+lie evenly on them, one of a few by what it would send (resampled importance sampling: Talbot, Cline and Egbert
+2005). The first numbers of a path come from Sobol' points that each pixel shifts by its own; independent
+shifts tell the standard error.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from lab.light.field import (
     scratch,
     slope,
 )
+from lab.light.vectors import across, around, dot, frame, gains, plus, times, turned
 from scenelang.compiler.spaces import FADE, LIFT, NEAREST, Stage
 from scenelang.drawing.exact.solid import FAR, ways
 from scenelang.drawing.image import encoded
@@ -77,7 +79,14 @@ class Room(NamedTuple):
 
 def room_of(w: World, table: Array) -> Room:
     return Room(
-        *scratch(w), np.empty(6), np.zeros(3, np.uint64), np.empty(3), np.empty(4), np.zeros(9), np.empty(4), table
+        *scratch(w),
+        np.empty(6),
+        np.zeros(3, np.uint64),
+        np.empty(3),
+        np.empty(4),
+        np.zeros(9),
+        np.empty(4),
+        table,
     )
 
 
@@ -202,48 +211,6 @@ def _edge(
             side = 2
         at = low + (high - low) * low_d / (low_d - high_d)
     return at
-
-
-@compiled
-def frame(n: Any) -> Any:
-    """Two unit vectors across a unit vector (Duff et al. 2017)."""
-    sign = 1.0 if n[2] >= 0.0 else -1.0
-    a = -1.0 / (sign + n[2])
-    b = n[0] * n[1] * a
-    return (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1])
-
-
-@compiled
-def turned(n: Any, x: float, y: float, z: float) -> Any:
-    """A vector of the frame about ``n`` in the world."""
-    t, b = frame(n)
-    return (
-        x * t[0] + y * b[0] + z * n[0],
-        x * t[1] + y * b[1] + z * n[1],
-        x * t[2] + y * b[2] + z * n[2],
-    )
-
-
-@compiled
-def dot(a: Any, b: Any) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@compiled
-def plus(a: Any, s: float, b: Any) -> Any:
-    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
-
-
-@compiled
-def times(a: Any, s: float, b: Any) -> Any:
-    return (a[0] * s * b[0], a[1] * s * b[1], a[2] * s * b[2])
-
-
-@compiled
-def gains(light: Array, a: Any, s: float, b: Any) -> None:
-    """Add ``a`` times ``s`` times ``b`` to light."""
-    for c in range(3):
-        light[c] += a[c] * s * b[c]
 
 
 @compiled
@@ -509,7 +476,7 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
             sent = glows_at(w, o, n, v, kind, alpha, rgb, room)
             gains(light, through, 1.0, sent)
         d, odds, ratio = onward(w, n, v, kind, alpha, rgb, room, dim + 4)
-        coated = kind == GLOSSY or kind == METAL
+        coated = kind in (GLOSSY, METAL)
         through = times(through, 1.0, ratio)
         most = max(through[0], max(through[1], through[2]))
         if turn >= SURELY:
@@ -596,9 +563,7 @@ def shining_of(w: World, seed: int) -> World:
 
 
 @compiled
-def glows_at(
-    w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room
-) -> Any:
+def glows_at(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room) -> Any:
     """Light (3,) that surfaces that glow send by way of a point, by one point of them."""
     count = len(w.shining)
     out = (0.0, 0.0, 0.0)
@@ -636,21 +601,6 @@ def glows_at(
         return 0.0, 0.0, 0.0
     weight = total / chosen / CANDIDATES * math.exp(-tau)
     return out[0] * weight, out[1] * weight, out[2] * weight
-
-
-@compiled
-def across(n: Any, a: float, b: float) -> Any:
-    """A direction by the cosine with ``n``."""
-    r, phi = math.sqrt(a), 2 * math.pi * b
-    return turned(n, r * math.cos(phi), r * math.sin(phi), math.sqrt(1.0 - a))
-
-
-@compiled
-def around(a: float, b: float) -> Any:
-    """A direction of the sphere."""
-    z = 1.0 - 2.0 * a
-    r = math.sqrt(max(1.0 - z * z, 0.0))
-    return (r * math.cos(2 * math.pi * b), r * math.sin(2 * math.pi * b), z)
 
 
 @compiled

@@ -45,9 +45,11 @@ GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # world units before surfaces, where walls are looked for, and how deep these stop light
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
-LATTICE = 38, 64  # of points along the picture's shorter side, and where something may be hollow
-LATTICE_RAYS, PIXEL_RAYS = 40, 8  # of each, and of pixels that are asked themselves
-MISTY = 4, 20  # of those of the lattice, through media, and through those with lamps within
+# points along the picture's shorter side and rays of each, where something glows, and where something may be
+# hollow or has lamps within
+LATTICE = (38, 40), (64, 40), (96, 24)
+PIXEL_RAYS = 8  # of pixels that are asked themselves
+MISTY = 0.1, 0.5  # of rays, those that go through media, and through those with lamps within
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
@@ -154,8 +156,7 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    # (3, L) from everywhere, and the part of what comes straight from what glows, which nothing hides, and its
-    # square, if there is any (5, L)
+    # (3, L) from everywhere, and if something glows the part of its light that nothing hides, and its square
     received: Array
 
 
@@ -214,8 +215,9 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        fine = self.hollow or self.emitters.there or (self.mist is not None and self.mist.lit)
-        self.canvas, self.step = canvas, max(1, round(min(canvas) / LATTICE[fine]))
+        uneven = self.hollow or (self.mist is not None and self.mist.lit)
+        side, rays = LATTICE[2 if uneven else int(self.emitters.there)]
+        self.canvas, self.step = canvas, max(1, round(min(canvas) / side))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
@@ -236,7 +238,7 @@ class Around:
             at, up = self.xp.take(p, there), self.xp.take(n, there)
 
             def received(turn: int) -> Array:
-                return everywhere(self.gathered(at, up, numbers + turn * FURTHER, LATTICE_RAYS))
+                return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
             self.seen, light = Seen(p, n, p), received(0)
             even = self._evened(light)
@@ -388,7 +390,7 @@ class Around:
         xp = self.xp
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
-            return self.gathered(p, n, numbers, LATTICE_RAYS) + self._glowing(p, n)
+            return self.gathered(p, n, numbers, LATTICE[0][1]) + self._glowing(p, n)
         places = self._places(p)
         result, fits = self._between(p, n, *places, NEXT)
         rest = xp.where(~fits)
@@ -400,8 +402,9 @@ class Around:
             if len(alone):
                 at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
                 numbers = np.rint(at * (EIGHTHS * self.step))
-                xp.put(values[:3], alone, self.gathered(*(xp.take(part, alone) for part in few), numbers, PIXEL_RAYS))
-                xp.put(values[3:], alone, 0 * xp.take(values[3:], alone) + UNKNOWN)
+                here, up = (xp.take(part, alone) for part in few)
+                xp.put(values[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
+                values[3:, alone] = UNKNOWN
             xp.put(result, rest, values)
         if not self.emitters.there:
             return result
@@ -425,7 +428,7 @@ class Around:
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
         xp, mist = self.xp, self.mist
-        misty = max(MISTY[0], rays * MISTY[mist is not None and mist.lit] // LATTICE_RAYS)
+        misty = max(4, int(rays * MISTY[mist is not None and mist.lit]))
         # the first of them, which go through media, in the middles of equal parts of the hemisphere
         each = np.roll(np.arange(rays), -(rays // misty // 2)).reshape(misty, -1).T.reshape(-1, 1)
         shift, turn = (TURNS @ numbers + 0.5) % 1.0
@@ -433,6 +436,7 @@ class Around:
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
         light, reach = self.arriving(begin, way)
+        light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         result = light.reshape(3, rays, -1).mean(1)
         if self.mist is None:
             return result
@@ -456,7 +460,6 @@ class Around:
             at = xp.take(p, met) + ways * xp.take(hit, met)
             seen = self._around(at, ways)
             xp.put(light, met, self.lookup.mixed(self.sent_rows, *seen))
-        light = light * (hit * (1 / SHUT)).clip(None, 1.0)
         return light, xp.minimum(hit, limit)
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:

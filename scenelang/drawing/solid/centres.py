@@ -41,14 +41,15 @@ class Centres:
     def received(
         self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array], every: bool
     ) -> Array:
-        """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met, of which ``every``
-        one asks or some.
+        """Light (3, K) from everywhere on points (3, K) at unit normals that rays (K,) met; ``every`` centre
+        asks, or some.
         """
         xp = self.xp
         if self.pixels is None:
             xp.put(self.p, rays, p)
             xp.put(self.n, rays, n)
-            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), INF * (not every))
+            most = 0.0 if every else INF
+            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), most)
             xp.put(self.light, rays, xp.take(light, rays))
             return xp.take(self.light, rays)
         return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))

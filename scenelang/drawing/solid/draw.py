@@ -441,7 +441,7 @@ class Lighting:
         if self.around is not None:
             colour = colour.clip(None, CAP)
             some = xp.where(~sharp)
-            if len(some):  # there normals are the medium's too; light that begins within what is opaque is none
+            if len(some):  # normals may be the medium's, and no light begins within what is opaque
                 off = xp.take(p + OFF * n, some)
                 met = self.field.meet(passes.at(xp, some), xp.take(t, some), Wanted.KIND, p=off)
                 inside = (met.distance < 0) & (met.register[0] < 0.5)

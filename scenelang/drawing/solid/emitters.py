@@ -59,8 +59,8 @@ class Emitters:
         self.p, self.n, self.glow, self.area = discs[:3], discs[3:6], discs[6:9], discs[-1]
 
     def received(self, p: Array, n: Array, every: int = 1) -> tuple[Array, Array]:
-        """What points (3, K) with unit normals would receive straight from what glows (3, K) if nothing hid it,
-        and the part of it (K,) that arrives; ``every`` as of `seen`.
+        """The light (3, K) that points with unit normals (3, K) receive straight from what glows if nothing
+        hides it, and the part (K,) that arrives; ``every`` as of `seen`.
         """
         result, part = 0 * p, 0 * p[0]
         for start in range(0, p.shape[1] if self.there else 0, BAND):

@@ -88,7 +88,9 @@ class Mist:
         h = float(min(max(FINE / max(densest, 1e-9), fine), coarse))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
-        self.lit = any(((low < at) & (at < high)).all() for at in (light.position for light in self.stage.lights))
+        self.lit = any(
+            bool(((low < light.position) & (light.position < high)).all()) for light in self.stage.lights
+        )
         if ground is not None and high[1] > ground.y:
             self.low[1] = max(self.low[1], ground.y + 1e-3)
         self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
