@@ -2,10 +2,10 @@
 
 Surfaces are found by sphere tracing and a root; ways through media are exact where their extinction is
 constant between steps. Lamps are sampled by the solid angle that they fill, at glossy surfaces by reflected
-directions as well (Veach's balance heuristic). Surfaces that glow are sampled by directions and by points that
-lie evenly on them, one of a few by what it would send (resampled importance sampling: Talbot, Cline and Egbert
-2005). The first numbers of a path come from Sobol' points that each pixel shifts by its own; independent
-shifts tell the standard error.
+directions as well (Veach's balance heuristic). Surfaces that glow are sampled by directions and by points
+that lie evenly on them, one of a few by what it would send (resampled importance sampling: Talbot, Cline and
+Egbert 2005). The first numbers of a path come from Sobol' points that each pixel shifts by its own;
+independent shifts tell the standard error.
 """
 
 from __future__ import annotations
