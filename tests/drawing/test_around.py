@@ -44,6 +44,38 @@ def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
     assert light[2, 0] == pytest.approx(0.6 * (1 - (0.5 / 1.3) ** 2), rel=0.03)
 
 
+@pytest.mark.parametrize("wide", [0.3, 0.02])
+def test_a_thin_ring_that_glows_sends_what_all_of_it_does(wide: float) -> None:
+    """By an integral over the surface of a tube around the point's normal; its far side hides nothing."""
+    scene = nsg.loads(f"""nsg 1; canvas(16, 16); ground(none); light(none); sky(0);
+        torus {{ grow({wide / 2 - 0.3}); material diffuse {{ glow(#fff); }} }}
+        sphere {{ translate(0, -40, 0); }}""")
+    shown: list[np.ndarray] = []
+    before, p, n = (
+        Around.look,
+        np.array([[0.1], [-1.2], [0.0]], np.float32),
+        np.eye(3, dtype=np.float32)[:, 1:2],
+    )
+
+    def look(around: Around, *more: object) -> None:
+        light, free = around.emitters.received(p, n)
+        shown.append(np.asarray(light * free))
+        before(around, *more)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Around, "look", look)
+        nsg.render(nsg.compile(scene))
+    turn, roll = (np.linspace(0, 2 * np.pi, 512, endpoint=False) for _ in range(2))
+    turn, roll = turn[:, None], roll[None]
+    out = np.stack([np.cos(roll) * np.cos(turn), np.sin(roll) + 0 * turn, np.cos(roll) * np.sin(turn)])
+    ring = 0.7 * np.stack([np.cos(turn), 0 * turn, np.sin(turn)]) + wide / 2 * out
+    area = wide / 2 * (0.7 + wide / 2 * np.cos(roll)) * (2 * np.pi / 512) ** 2
+    to = ring - p[:, :, None]
+    far = np.linalg.norm(to, axis=0)
+    facing = (-(to * out).sum(0) / far).clip(0)
+    assert shown[0][0, 0] == pytest.approx((to[1] / far * facing / far**2 * area).sum() / np.pi, rel=0.03)
+
+
 @pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
 def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""

@@ -9,13 +9,23 @@ import pytest
 from scipy.special import exp1
 
 from scenelang.compiler.spaces import Ground, Light, Sky, Stage
-from scenelang.drawing.solid.mist import Mist
+from scenelang.drawing.solid.mist import Mist, _aside
 from tests.drawing.solids import Object, everywhere, moved, network, scaled, torch_network
 from tests.drawing.test_lamps import field_of
 
 WHITE = (1.0, 1.0, 1.0)
 EVEN = Stage(lights=(), ground=None, sky=Sky(1.0, WHITE, WHITE))  # the same from everywhere
 GREY = (0.9, 0.7, 0.4)
+
+
+@pytest.mark.parametrize(("r", "radius", "sigma"), [(0.5, 0.25, 4.8), (0.3, 0.25, 2.0), (2.0, 0.1, 1.0)])
+def test_a_soft_lamp_in_a_medium_arrives_by_all_of_its_disc(r: float, radius: float, sigma: float) -> None:
+    """Along its rim the way is longer; by a million directions."""
+    cos = np.linspace((1 - (radius / r) ** 2) ** 0.5, 1, 1_000_001)
+    way = r * cos - np.sqrt((radius**2 - r * r * (1 - cos * cos)).clip(0))
+    nearest = np.exp(-sigma * (r - radius))
+    found = nearest * _aside(np.array([r]), radius, np.array([nearest]))[0]
+    assert found == pytest.approx(np.exp(-sigma * way).mean(), rel=0.01)
 
 
 def in_a_ball(sigma: float, albedo: float, r: np.ndarray, cells: int = 400) -> np.ndarray:

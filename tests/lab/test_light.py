@@ -67,6 +67,15 @@ def test_furnace_neither_gains_nor_loses() -> None:
     assert found == pytest.approx(1 / (1 - albedo), rel=0.03)
 
 
+@pytest.mark.parametrize("far", [0.5, 3.0])
+def test_what_glows_is_met_by_chance_and_asked_once(far: float) -> None:
+    """A ball of radius a and radiance 1 at a distance d sends (a / d)² to a level point below."""
+    lit = world(f"""sky(0); light(none); ground(0, #fff); sphere {{ scale(0.3); translate(0, {far}, 0);
+        material diffuse {{ color(#000); glow(#fff); }} }} sphere {{ translate(0, -50, 0); }}""")
+    seen = light(lit, HERE + 0.1 * UP + [0.0, 0.0, 1e-9], -UP, 8192)[0, 0]
+    assert seen == pytest.approx(0.98 * (0.3 / far) ** 2, rel=0.01)
+
+
 @pytest.mark.parametrize("radius", [0.0, 0.5])
 def test_lamps_over_a_plane_and_in_a_point(radius: float) -> None:
     lit = world(f"sky(0); ground(none); light([1, 2, 0.5], 7, #fff, {radius});" + AWAY)
