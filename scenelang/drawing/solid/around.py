@@ -247,8 +247,9 @@ class Around:
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light, total = light + received(turn + 1) * part, total + part
-            light = light / total
-            even = self._evened(light)
+            if more:
+                light = light / total
+                even = self._evened(light)
             even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
             if self.emitters.there:
                 free = everywhere(self.emitters.received(at, up)[1][None])
