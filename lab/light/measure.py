@@ -55,8 +55,7 @@ def reference(text: str, graph: Graph, paths: int, threads: int, cache: Path | N
     assert graph.stage is not None
     side = round(graph.samples**0.5)
     how: dict[str, Any] = {"per_side": side, "paths": paths, "enough": ENOUGH, "threads": threads}
-    how["known"] = known
-    found = traced_picture(world_of(graph), graph.stage, graph.canvas, **how)
+    found = traced_picture(world_of(graph), graph.stage, graph.canvas, known=known, **how)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
         data = io.BytesIO()

@@ -49,16 +49,16 @@ APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 # hollow or has lamps within
 LATTICE = (38, 40), (64, 40), (96, 24)
 PIXEL_RAYS = 8  # of pixels that are asked themselves
-MISTY = 0.1, 0.5  # of rays, those that go through media, and through those with lamps within
+FEWEST, MISTY = 4, (0.1, 0.5)  # rays through media, as parts of all, and where lamps are within
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, above which there are more rays, how many times as many, and their turns
 # how much less of what glows some points around see than others where it is asked, and what means so
 EVEN, UNKNOWN = 0.1, 2.0
+# of the light on the lattice, above which there are more rays, how many times as many, and their turns
 NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
@@ -415,7 +415,7 @@ class Around:
         return result[:3] + free * self.emitters.received(p, n, 0)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
-        """What points (3, K) with unit normals receive (3, K) straight from what glows."""
+        """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""
         light, free = self.emitters.received(p, n)
         return light * free
 
@@ -429,7 +429,7 @@ class Around:
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
         xp, mist = self.xp, self.mist
-        misty = max(4, int(rays * MISTY[mist is not None and mist.lit]))
+        misty = max(FEWEST, int(rays * MISTY[mist is not None and mist.lit]))
         # the first of them, which go through media, in the middles of equal parts of the hemisphere
         each = np.roll(np.arange(rays), -(rays // misty // 2)).reshape(misty, -1).T.reshape(-1, 1)
         shift, turn = (TURNS @ numbers + 0.5) % 1.0
@@ -502,7 +502,7 @@ class Around:
     def _between(
         self, p: Array, n: Array, side: Array, u: Array, v: Array, corners: tuple[tuple[int, int], ...]
     ) -> tuple[Array, Array]:
-        """What `Seen` tells (R, K) of corners of cells on the same surface, and where there are any."""
+        """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any."""
         xp, i, j, values = self.xp, self.xp.floor(u), self.xp.floor(v), self.seen.received
         total, result, most = 0 * u, 0 * xp.take(values, xp.whole(0 * u)), 0 * u
         for right, below in corners:

@@ -41,8 +41,8 @@ class Centres:
     def received(
         self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array], every: bool
     ) -> Array:
-        """Light (3, K) from everywhere on points (3, K) at unit normals that rays (K,) met; ``every`` centre
-        asks, or some.
+        """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met. With ``every``
+        all centres ask, else some.
         """
         xp = self.xp
         if self.pixels is None:

@@ -333,8 +333,8 @@ def _received(r: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _aside(r: np.ndarray, radius: float, sent: np.ndarray) -> np.ndarray:
-    """How much less arrives of a whole ball at distances from its middle, through even media of which so much
-    comes through from its nearest point.
+    """The transmittance of even media to a whole ball, at distances from its middle, as a part of that to its
+    nearest point, which is given.
     """
     least, result = (r - radius).clip(1e-6), 0 * r
     sigma, rim = -np.log(sent.clip(DARK)) / least, np.sqrt((1 - (radius / r.clip(1e-6)) ** 2).clip(0.0))
