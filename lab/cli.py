@@ -638,6 +638,7 @@ def _say_begin(model: str, reached: str, done: int, device: str, out: Path) -> N
 @_count("--size", 128, 16, 1024, "Side of pictures in pixels.")
 @_count("--paths", 1024, 8, 1 << 20, "Most paths of a pixel; fewer where the noise is below 52 dB.")
 @click.option("--cache", type=_FOLDER, metavar="FOLDER", help="Folder of traced pictures.")
+@click.option("--points", is_flag=True, help="Trace with points of all surfaces that send light.")
 @click.option("--trace", is_flag=True, help="Trace what the folder lacks, and draw nothing.")
 @_threads
 @_seed
@@ -649,6 +650,7 @@ def light(
     size: int,
     paths: int,
     cache: Path | None,
+    points: bool,
     trace: bool,
     threads: int,
     seed: int,
@@ -669,6 +671,7 @@ def light(
     _check_names("family", families, {**FAMILIES, **PROBES})
     for family in families or FAMILIES:
         how: dict[str, Any] = {"threads": threads, "cache": cache, "first": first, "drawn": not trace}
+        how["points"] = points
         result, worst = measure(
             family, scenes, size, paths, seed, say=lambda s: click.echo(s, err=True), **how
         )

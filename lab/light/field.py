@@ -77,8 +77,10 @@ class World(NamedTuple):
         ground: height (-inf for none), colour; ``seen`` horizon and zenith of the eye, with alpha behind;
             ``sky`` of light, times its power.
         glowing: (N, 4) centres and radii of balls around objects that glow; others have radius 0.
-        shining: (M, 10) points of those surfaces: place, normal, glow, and the odds of each by area, those of
-            objects' (N,) ``shares``; a tracer finds them.
+        bounds: the like around all that is diffuse, a medium, or glows.
+        shining: (M, 14) points of what glows, or if ``all_send`` of all in ``bounds``: place, normal (0 in a
+            medium), light that is sent, the odds of each by area or volume, those of objects' (N,)
+            ``shares``, extinction or 1, and colour; a tracer finds them.
     """
 
     field: Field
@@ -91,8 +93,10 @@ class World(NamedTuple):
     seen: Array
     sky: Array
     glowing: Array
+    bounds: Array
     shining: Array
     shares: Array
+    all_send: bool
 
 
 def world_of(graph: Graph) -> World:
@@ -153,9 +157,11 @@ def world_of(graph: Graph) -> World:
         np.array([-math.inf, 0, 0, 0] if ground is None else [ground.y, *ground.rgb]),
         np.array([*stage.horizon, *stage.zenith, 0.0 if stage.transparent else 1.0]),
         sky.power * np.array([*sky.horizon, *sky.zenith]),
-        _glowing(bodies),
-        np.zeros((0, 10)),
+        _balls(bodies, lambda look: max(look.glow) > 0.0, False),
+        _balls(bodies, lambda look: not look.roughness or max(look.glow) > 0.0, True),
+        np.zeros((0, 14)),
         np.zeros(count),
+        False,
     )
 
 
@@ -180,11 +186,11 @@ def _near(bodies: Sequence[ExactBody], at: Sequence[float]) -> bool:
     return any(float(np.linalg.norm(way)) < 1.2 * radius for way, radius in balls)
 
 
-def _glowing(bodies: Sequence[ExactBody]) -> Array:
-    """Balls (N, 4) around opaque objects that glow, of radius 0 around others."""
+def _balls(bodies: Sequence[ExactBody], wanted: Callable[[Any], bool], media: bool) -> Array:
+    """Balls (N, 4) around the objects of wanted looks, of radius 0 around others."""
     balls = np.zeros((len(bodies), 4))
     for body, ball in zip(bodies, balls, strict=True):
-        if max(body.look.glow) and not body.medium:
+        if wanted(body.look) and (media or not body.medium):
             back = np.linalg.inv(body.first.inverse)
             ball[:3] = (back @ (body.centre - body.first.shift))[:, 0]
             ball[3] = body.radius * np.linalg.norm(back, 2)

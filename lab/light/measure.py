@@ -27,6 +27,7 @@ from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.language.diagnostics import Diagnostics
 
 ENOUGH = 52.0  # decibels of a traced picture's own noise
+BATCH = 64  # paths of a pixel in a batch
 WORST = 3  # pictures that are shown
 
 
@@ -38,8 +39,12 @@ def scene_of(text: str) -> tuple[Program, Graph]:
     return program, lower(scene.model_copy(update=model), load_manifest(program.model), None, Diagnostics())
 
 
-def reference(text: str, graph: Graph, paths: int, threads: int, cache: Path | None, name: str) -> Traced:
-    """The traced picture of a scene, from a folder where it was kept for the same text and as many paths."""
+def reference(
+    text: str, graph: Graph, paths: int, threads: int, cache: Path | None, name: str, points: bool = False
+) -> Traced:
+    """The traced picture of a scene, from a folder where it was kept for the same text and as many paths;
+    ``points`` as of `traced_picture`.
+    """
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     path = cache / f"{name}.npz" if cache is not None else None
     known: Traced | None = None
@@ -55,6 +60,7 @@ def reference(text: str, graph: Graph, paths: int, threads: int, cache: Path | N
     assert graph.stage is not None
     side = round(graph.samples**0.5)
     how: dict[str, Any] = {"per_side": side, "paths": paths, "enough": ENOUGH, "threads": threads}
+    how |= {"points": points, "batch": BATCH}
     found = traced_picture(world_of(graph), graph.stage, graph.canvas, known=known, **how)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -76,6 +82,7 @@ def measure(
     cache: Path | None = None,
     first: int = 0,
     drawn: bool = True,
+    points: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> tuple[dict[str, Any], list[np.ndarray]]:
     """Figures of a family's scenes, and the worst pictures beside what they should be (H, 3 W, 3)."""
@@ -85,7 +92,7 @@ def measure(
         text = scene_text(family, seed, index, size)
         program, graph = scene_of(text)
         began = time.perf_counter()
-        truth = reference(text, graph, paths, threads, cache, f"{family}-{seed}-{size}-{index:03}")
+        truth = reference(text, graph, paths, threads, cache, f"{family}-{seed}-{size}-{index:03}", points)
         traced_s = time.perf_counter() - began
         row = {"scene": index, "paths": truth.paths, "own": round(truth.decibels, 2), "traced_s": traced_s}
         if drawn:

@@ -4,8 +4,9 @@ Surfaces are found by sphere tracing and a root; ways through media are exact wh
 constant between steps. Lamps are sampled by the solid angle that they fill, at glossy surfaces by reflected
 directions as well (Veach's balance heuristic). Surfaces that glow are sampled by directions and by points
 that lie evenly on them, one of a few by what it would send (resampled importance sampling: Talbot, Cline and
-Egbert 2005). The first numbers of a path come from Sobol' points that each pixel shifts by its own;
-independent shifts tell the standard error.
+Egbert 2005). Where asked, points of all surfaces and media send what a few paths of their own brought them
+(as Keller's instant radiosity, 1997, has it, with points that lie evenly). The first numbers of a path come
+from Sobol' points that each pixel shifts by its own; independent shifts tell the standard error.
 """
 
 from __future__ import annotations
@@ -17,200 +18,40 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from lab.light.field import (
-    DIFFUSE,
-    GLOSSY,
-    MEDIUM,
-    METAL,
-    OPAQUE,
-    OUT,
-    VOLUMETRIC,
-    Array,
-    Field,
-    World,
-    body_distance,
-    colours,
-    compiled,
-    folded,
-    scratch,
-    slope,
+from lab.light.field import DIFFUSE, GLOSSY, METAL, VOLUMETRIC, Array, World, colours, compiled, slope
+from lab.light.rays import (
+    DIMENSIONS,
+    ENDS,
+    GOLDEN,
+    HITS,
+    MEETS,
+    MOST,
+    ONE,
+    STUCK,
+    TWO,
+    Room,
+    draw,
+    edge_of,
+    end_of,
+    march,
+    probe,
+    room_of,
+    scrambled,
 )
 from lab.light.vectors import across, around, dot, frame, gains, plus, times, turned
 from scenelang.compiler.spaces import FADE, LIFT, NEAREST, Stage
-from scenelang.drawing.exact.solid import FAR, ways
+from scenelang.drawing.exact.solid import ways
 from scenelang.drawing.image import encoded
 
-STEP = 1e-3  # least step of a ray
-MOST = 4_000  # steps of a ray, and turns of a path
 SURELY = 4  # turns of a path before chance may end it
 CHORDS, CANDIDATES = 20_000, 8  # of balls around what glows; of its points, of which one is asked
+FEW, EACH, ASKS = 3_000, 8, 4  # where all send: chords or places; paths to each; points asked at first
 CAPS = 0.98, 0.99  # of colours of surfaces and media
 _INSIDE = 1e-6  # how far behind a surface its colour is asked for
 _BEFORE = 1e-4  # where rays to it end, before it
-_ENDS, _MEETS, _HITS, _STUCK = range(4)  # of a ray's way: its end, a medium's particle, a surface, in a solid
 EYE, RAY, SURFACE, MIDST = range(4)
 ONES = 1.0, 1.0, 1.0
-_DIMENSIONS, _TURN = 32, 8  # numbers of a Sobol' point, and of a turn of a path
-_GOLDEN, _ONE, _TWO = (
-    np.uint64(0x9E3779B97F4A7C15),
-    np.uint64(0xBF58476D1CE4E5B9),
-    np.uint64(0x94D049BB133111EB),
-)
-_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
-
-
-class Room(NamedTuple):
-    """What one thread writes to: `scratch`, colour and glow (6,), chance (its state, shift and number of the
-    path), f cos (3,), light and alpha (4,), a ray (o, d, its way through balls of media, and how likely it
-    meets a particle where it does), a direction and how far (4,); and Sobol' points (K, D).
-    """
-
-    d: Array
-    stack: Array
-    spans: Array
-    look: Array
-    chance: Array
-    f: Array
-    light: Array
-    ray: Array
-    aim: Array
-    table: Array
-
-
-def room_of(w: World, table: Array) -> Room:
-    return Room(
-        *scratch(w),
-        np.empty(6),
-        np.zeros(3, np.uint64),
-        np.empty(3),
-        np.empty(4),
-        np.zeros(9),
-        np.empty(4),
-        table,
-    )
-
-
-@compiled
-def scrambled(z: Any) -> Any:
-    """A hash of 64 bits (SplitMix64: Steele, Lea and Flood 2014)."""
-    z = (z ^ (z >> _S30)) * _ONE
-    z = (z ^ (z >> _S27)) * _TWO
-    return z ^ (z >> _S31)
-
-
-@compiled
-def draw(room: Room, dimension: int) -> float:
-    """A number in [0, 1): of a shifted Sobol' point while it has any left, then at random."""
-    if dimension < room.table.shape[1]:
-        shift = scrambled(room.chance[1] + np.uint64(dimension) * _GOLDEN) >> _S11
-        value: float = room.table[int(room.chance[2]), dimension] + shift * 2.0**-53
-        return value - 1.0 if value >= 1.0 else value
-    room.chance[0] += _GOLDEN
-    return float((scrambled(room.chance[0]) >> _S11) * 2.0**-53)
-
-
-@compiled
-def probe(field: Field, o: Any, d: Any, t: float, room: Room) -> tuple[float, int, float, float]:
-    """Distance, kind, extinction and how far the ray may go from t."""
-    x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
-    spans, fastest, most, following = room.spans, 1e-9, FAR, FAR
-    for i in range(len(room.d)):
-        room.d[i] = FAR
-        if spans[0, i] <= t:
-            if t <= spans[1, i]:
-                room.d[i], rate, reach = body_distance(field.rows, field.back, field.grids, i, x, y, z)
-                fastest, most = max(fastest, rate * spans[2, i]), min(most, reach)
-        elif spans[0, i] < following:
-            following = spans[0, i]
-    value, near, who = folded(field.code, field.width, room.d, room.stack)
-    way = abs(value)
-    if value < 0.0 and field.mixed:
-        way = min(way, near)
-    way = min(max(min(way / fastest, most), STEP), following - t)
-    if value >= 0.0:
-        return value, OUT, 0.0, way
-    sigma = field.rows[who, 34]
-    return value, MEDIUM if sigma > 0.0 else OPAQUE, sigma, way
-
-
-@compiled
-def march(
-    field: Field, o: Any, d: Any, end: float, target: float, fine: bool, room: Room
-) -> tuple[float, int, float]:
-    """Follow a ray to its end, a surface, or an optical depth; how far it came, how it ended, the depth."""
-    rows, spans, stop = field.rows, room.spans, -1.0
-    for i in range(len(room.d)):
-        a, b, c = 0.0, 0.0, -rows[i, 20] * rows[i, 20]
-        for row in range(3):
-            e, f, g = rows[i, 4 * row], rows[i, 4 * row + 1], rows[i, 4 * row + 2]
-            p = e * o[0] + f * o[1] + g * o[2] + rows[i, 4 * row + 3] - rows[i, 17 + row]
-            v = e * d[0] + f * d[1] + g * d[2]
-            a, b, c = a + v * v, b + p * v, c + p * p
-        root = b * b - a * c
-        spans[0, i], spans[1, i], spans[2, i] = np.inf, -np.inf, math.sqrt(a)
-        if root > 0.0:
-            root = math.sqrt(root)
-            leave = min((root - b) / a, end)
-            if leave > 0.0 and (-b - root) / a < leave:
-                spans[0, i], spans[1, i] = (-b - root) / a, leave
-                stop = max(stop, leave)
-    if stop < 0.0:
-        return end, _ENDS, 0.0
-    t, tau = 0.0, 0.0
-    value, kind, sigma, way = probe(field, o, d, t, room)
-    if kind == OPAQUE:
-        return t, _STUCK, tau
-    for _ in range(MOST):
-        now = min(t + way, stop)
-        value1, kind1, sigma1, way = probe(field, o, d, now, room)
-        edge = now
-        if kind1 != kind:
-            edge = _edge(field, o, d, t, value, kind, now, value1, fine and kind1 == OPAQUE, room)
-        if sigma > 0.0:
-            if tau + sigma * (edge - t) >= target:
-                return t + (target - tau) / sigma, _MEETS, target
-            tau += sigma * (edge - t)
-        if kind1 == OPAQUE:
-            return edge, _HITS, tau
-        if sigma1 > 0.0 and edge < now:
-            if tau + sigma1 * (now - edge) >= target:
-                return edge + (target - tau) / sigma1, _MEETS, target
-            tau += sigma1 * (now - edge)
-        if now >= stop:
-            break
-        t, value, kind, sigma = now, value1, kind1, sigma1
-    return end, _ENDS, tau
-
-
-@compiled
-def _edge(
-    field: Field, o: Any, d: Any, low: float, low_d: float, kind: int, high: float, high_d: float, fine: bool,
-    room: Room,
-) -> float:  # fmt: skip
-    """The place between two points of a ray where kinds change, to about 1e-9 if ``fine``."""
-    if low_d < 0.0 and high_d < 0.0:
-        for _ in range(16 if fine else 0):
-            middle = (low + high) / 2
-            if probe(field, o, d, middle, room)[1] == kind:
-                low = middle
-            else:
-                high = middle
-        return (low + high) / 2
-    side, at = 0, low + (high - low) * low_d / (low_d - high_d)
-    for _ in range(8 if fine else 0):  # the Illinois rule
-        here = probe(field, o, d, at, room)[0]
-        if abs(here) < 1e-9:
-            break
-        if (here < 0.0) == (high_d < 0.0):
-            high, high_d = at, here
-            low_d = low_d / 2 if side == 1 else low_d
-            side = 1
-        else:
-            low, low_d = at, here
-            high_d = high_d / 2 if side == 2 else high_d
-            side = 2
-        at = low + (high - low) * low_d / (low_d - high_d)
-    return at
+_TURN = 8  # numbers of a turn of a path
 
 
 @compiled
@@ -325,7 +166,7 @@ def lamps_at(
         f = room.f[0], room.f[1], room.f[2]
         if weight * max(f[0], max(f[1], f[2])) > 0.0:
             _, ending, tau = march(w.field, p, d, far, np.inf, False, room)
-            if ending == _ENDS:
+            if ending == ENDS:
                 weight *= math.exp(-tau)
                 lamp = w.lamps[j]
                 out = plus(out, weight, (f[0] * lamp[3], f[1] * lamp[4], f[2] * lamp[5]))
@@ -349,7 +190,21 @@ def beside(w: World, j: int, ray: Array, p: Any) -> Any:
 
 
 @compiled
-def passing(w: World, o: Any, d: Any, cap: float, room: Room) -> Any:
+def by_direction(w: World, who: int, p: Any, t: float, facing: float, odds: float) -> Any:
+    """The share of what a point sends to one t away that counts where a direction of these odds meets it, not
+    where it is chosen among points; ``facing`` is its cosine, or the extinction of a medium.
+    """
+    if odds <= 0.0 or w.shares[who] <= 0.0:
+        return 1.0
+    ball = w.glowing[who]
+    off = (p[0] - ball[0], p[1] - ball[1], p[2] - ball[2])
+    if dot(off, off) >= ball[3] * ball[3]:
+        return 1.0
+    return odds / (odds + CANDIDATES * w.shares[who] * t * t / max(facing, 1e-9))
+
+
+@compiled
+def passing(w: World, o: Any, d: Any, odds: float, cap: float, room: Room) -> Any:
     """Light (3,) that media along a ray scatter of lamps in or near them, by points chosen by the angle."""
     ray, out = room.ray, (0.0, 0.0, 0.0)
     ray[0], ray[1], ray[2], ray[3], ray[4], ray[5] = o[0], o[1], o[2], d[0], d[1], d[2]
@@ -361,7 +216,7 @@ def passing(w: World, o: Any, d: Any, cap: float, room: Room) -> Any:
         if w.lamps[j, 7] == 0.0 or ray[7] <= ray[6]:
             continue
         low, _, wide, foot, off = beside(w, j, ray, o)
-        t = foot + off * math.tan(low + wide * draw(room, _DIMENSIONS))
+        t = foot + off * math.tan(low + wide * draw(room, DIMENSIONS))
         t = min(max(t, ray[6]), ray[7])
         p = plus(o, t, d)
         who = colours(w, p[0], p[1], p[2], room.d, room.stack, room.look)
@@ -369,16 +224,17 @@ def passing(w: World, o: Any, d: Any, cap: float, room: Room) -> Any:
         if room.stack[0, 0] >= 0.0 or sigma == 0.0:
             continue
         rgb = (min(room.look[0], cap), min(room.look[1], cap), min(room.look[2], cap))
-        way, far, strength, _ = to_lamp(w, j, p, draw(room, _DIMENSIONS), draw(room, _DIMENSIONS))
+        way, far, strength, _ = to_lamp(w, j, p, draw(room, DIMENSIONS), draw(room, DIMENSIONS))
         if strength == 0.0:
             continue
         _, ending, before = march(w.field, o, d, t, np.inf, False, room)
-        if ending != _ENDS:
+        if ending != ENDS:
             continue
         _, ending, after = march(w.field, p, way, far, np.inf, False, room)
-        if ending == _ENDS:
+        if ending == ENDS:
             meets = sigma * math.exp(-before)
             share = meets * math.exp(-after) * strength / 4.0 / (meets + beside(w, j, ray, p)[1])
+            share *= by_direction(w, who, p, t, sigma, odds)
             lamp = w.lamps[j]
             out = plus(out, share, (rgb[0] * lamp[3], rgb[1] * lamp[4], rgb[2] * lamp[5]))
     return out
@@ -390,12 +246,6 @@ def _guess(w: World, j: int, p: Any) -> Any:
     lamp = w.lamps[j]
     way = (lamp[0] - p[0], lamp[1] - p[1], lamp[2] - p[2])
     return max(lamp[3], lamp[4], lamp[5]) / max(dot(way, way), 0.01 + lamp[6] * lamp[6])
-
-
-@compiled
-def end_of(w: World, o: Any, d: Any) -> Any:
-    """How far away a ray meets the ground."""
-    return (w.ground[0] - o[1]) / d[1] if d[1] < 0.0 and o[1] > w.ground[0] else np.inf
 
 
 @compiled
@@ -411,8 +261,8 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
             target = -math.log(1.0 - draw(room, dim)) if w.media else np.inf
             t, ending, tau = march(w.field, o, d, end, target, True, room)
         known = -1.0
-        if w.media and ending != _STUCK and len(w.lamps) and w.lamps[:, 7].any():
-            sent = passing(w, o, d, CAPS[1], room)
+        if w.media and ending != STUCK and len(w.lamps) and w.lamps[:, 7].any():
+            sent = passing(w, o, d, odds if w.all_send else -1.0, CAPS[1], room)
             gains(light, through, 1.0, sent)
         if coated:
             for j in range(len(w.lamps)):
@@ -426,55 +276,59 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
                     angle = 2 * math.pi * sine / (1.0 + math.sqrt(1.0 - sine))
                     weight = odds * angle / (1.0 + odds * angle) / lamp[6] ** 2
                     gains(light, through, weight, lamp[3:6])
-        if ending == _STUCK:
+        if ending == STUCK:
             break
         p = plus(o, t, d)
         sky = w.seen if eye else w.sky
-        if ending == _ENDS and end == np.inf:
+        if ending == ENDS and end == np.inf:
             up = min(max(d[1] / 0.5, 0.0), 1.0)
             for c in range(3):
                 light[c] += through[c] * (sky[c] + (sky[3 + c] - sky[c]) * up) * (w.seen[6] if eye else 1.0)
             light[3] = max(light[3], w.seen[6])
             break
         light[3] = 1.0
-        kind, alpha, n, lift = DIFFUSE, 0.0, (0.0, 1.0, 0.0), LIFT
-        if ending == _ENDS:
+        kind, alpha, n, lift, share = DIFFUSE, 0.0, (0.0, 1.0, 0.0), LIFT, 1.0
+        if ending == ENDS:
             clear = math.exp(-(p[0] * p[0] + p[2] * p[2]) / FADE)
             gains(light, through, 1.0 - clear, sky)
             through = times(through, clear, ONES)
             rgb, cap = (w.ground[1], w.ground[2], w.ground[3]), CAPS[0]
         else:
-            q = _INSIDE if ending == _HITS else 0.0
+            q = _INSIDE if ending == HITS else 0.0
             look = room.look
             x, y, z = plus(p, q, d)
             who = colours(w, x, y, z, room.d, room.stack, look)
             rgb, kind, cap = (look[0], look[1], look[2]), int(w.field.rows[who, 33]), CAPS[0]
             glow = (look[3], look[4], look[5])
-            if ending == _MEETS:
+            if ending == MEETS:
                 gains(light, through, 1.0, glow)
                 kind, cap, lift = VOLUMETRIC, CAPS[1], 0.0
                 room.ray[8] = w.field.rows[who, 34] * math.exp(-tau)
+                if w.all_send:
+                    share = by_direction(w, who, p, t, w.field.rows[who, 34], odds)
             else:
                 alpha = w.look[who, 6] ** 2
                 n = slope(w.field, who, p[0], p[1], p[2], room.d, room.stack)
                 if dot(n, d) > 0.0:
                     n = (-n[0], -n[1], -n[2])
-                weight = 1.0
-                if odds > 0.0 and max(glow[0], max(glow[1], glow[2])) > 0.0 and w.shares[who] > 0.0:
-                    ball = w.glowing[who]
-                    off = (p[0] - ball[0], p[1] - ball[1], p[2] - ball[2])
-                    if dot(off, off) < ball[3] * ball[3]:
-                        likely = CANDIDATES * w.shares[who] * t * t / max(-dot(n, d), 1e-9)
-                        weight = odds / (odds + likely)
-                gains(light, through, weight, glow)
+                share = by_direction(w, who, p, t, -dot(n, d), odds)
+                if w.media and share < 1.0:  # points lie on what borders on nothing
+                    x, y, z = plus(p, -_INSIDE, d)
+                    colours(w, x, y, z, room.d, room.stack, look)
+                    share = share if room.stack[0, 0] >= 0.0 else 1.0
+                gains(light, through, share, glow)
+                if kind != DIFFUSE or not w.all_send:
+                    share = 1.0
         rgb = (min(rgb[0], cap), min(rgb[1], cap), min(rgb[2], cap))
+        through = times(through, share, ONES)
         o = plus(p, lift, n)
         v = (-d[0], -d[1], -d[2])
         sent = lamps_at(w, o, n, v, kind, alpha, rgb, room, dim + 1)
         gains(light, through, 1.0, sent)
-        if len(w.shining):
+        asks = ASKS if w.all_send and turn == 0 else 1
+        for _ in range(asks if len(w.shining) else 0):
             sent = glows_at(w, o, n, v, kind, alpha, rgb, room)
-            gains(light, through, 1.0, sent)
+            gains(light, through, 1.0 / asks, sent)
         d, odds, ratio = onward(w, n, v, kind, alpha, rgb, room, dim + 4)
         coated = kind in (GLOSSY, METAL)
         through = times(through, 1.0, ratio)
@@ -510,9 +364,9 @@ def onward(w: World, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Ro
 
 
 @compiled
-def _shining(glows: int, points: Array, w: World, room: Room, o: Array, d: Array) -> int:
-    """Write points of an object that glows, where chords (K, 3) as long as their directions meet it; return
-    how many.
+def _shining(which: int, points: Array, w: World, room: Room, o: Array, d: Array) -> int:
+    """Write points of an object that glows, or if all send of one that is diffuse, where chords (K, 3) as
+    long as their directions meet it; return how many.
     """
     first, last = 0, len(points)
     for i in range(len(o)):
@@ -525,36 +379,58 @@ def _shining(glows: int, points: Array, w: World, room: Room, o: Array, d: Array
             now = min(t + ahead, way)
             value1, kind1, _, ahead = probe(w.field, start, to, now, room)
             if (value < 0.0) != (value1 < 0.0):
-                edge = _edge(w.field, start, to, t, value, kind, now, value1, True, room)
+                edge = edge_of(w.field, start, to, t, value, kind, now, value1, True, room)
                 x, y, z = plus(start, edge + (_INSIDE if value1 < 0.0 else -_INSIDE), to)
                 who = colours(w, x, y, z, room.d, room.stack, room.look)
-                if who == glows and max(room.look[3], max(room.look[4], room.look[5])) > 0.0:
+                if who == which and (w.all_send or max(room.look[3], max(room.look[4], room.look[5])) > 0.0):
+                    points[first, 6:9], points[first, 11:14] = room.look[3:6], room.look[:3]
                     x, y, z = plus(start, edge, to)
                     points[first, 0], points[first, 1], points[first, 2] = x, y, z
                     n = slope(w.field, who, x, y, z, room.d, room.stack)
                     points[first, 3], points[first, 4], points[first, 5] = n
-                    points[first, 6:9] = room.look[3:6]
+                    points[first, 10] = 1.0
                     first += 1
             t, value, kind = now, value1, kind1
     return first
 
 
+@compiled
+def _midst(which: int, points: Array, w: World, room: Room, p: Array) -> int:
+    """Write those of places (K, 3) that lie in an object's medium; return how many."""
+    count = 0
+    for i in range(len(p)):
+        who = colours(w, p[i, 0], p[i, 1], p[i, 2], room.d, room.stack, room.look)
+        if who == which and room.stack[0, 0] < 0.0:
+            points[count, :3], points[count, 11:14] = p[i], room.look[:3]
+            points[count, 10] = w.field.rows[who, 34]
+            count += 1
+    return count
+
+
 def shining_of(w: World, seed: int) -> World:
-    """The world with points of what glows, which lie evenly by area."""
-    rng, room = np.random.default_rng([seed, 7]), room_of(w, np.zeros((1, _DIMENSIONS)))
-    found, shares = [np.zeros((0, 10))], np.zeros(len(w.glowing))
+    """The world with points of what glows, or of all if ``all_send``, which lie evenly by area or volume."""
+    rng, room, count = np.random.default_rng([seed, 7]), room_of(w, np.zeros((1, DIMENSIONS))), CHORDS
+    if w.all_send:
+        count = FEW
+    found, shares = [np.zeros((0, 14))], np.zeros(len(w.glowing))
     for i, (*centre, radius) in enumerate(w.glowing):
         if radius:
-            way, off = rng.normal(size=(2, CHORDS, 3))
-            way /= np.linalg.norm(way, axis=1)[:, None]
-            off = np.cross(way, off)
-            r = np.sqrt(rng.random(CHORDS))[:, None]
-            half = np.sqrt(1.0 - r * r)
-            start = centre + radius * (r * off / np.linalg.norm(off, axis=1)[:, None] - half * way)
-            points = np.zeros((8 * CHORDS, 10))
-            last = _shining(i, points, w, room, start, 2.0 * half * radius * way)
-            # a chord meets an area A in the ball 2 A / (4 pi radius^2) times
-            shares[i] = CHORDS / (2.0 * math.pi * radius**2)
+            points = np.zeros((8 * count, 14))
+            if w.field.rows[i, 34]:
+                ways = rng.normal(size=(count, 3))
+                ways *= np.cbrt(rng.random((count, 1))) / np.linalg.norm(ways, axis=1)[:, None]
+                last = _midst(i, points, w, room, centre + radius * ways)
+                shares[i] = count / (4.0 / 3.0 * math.pi * radius**3)
+            else:
+                way, off = rng.normal(size=(2, count, 3))
+                way /= np.linalg.norm(way, axis=1)[:, None]
+                off = np.cross(way, off)
+                r = np.sqrt(rng.random(count))[:, None]
+                half = np.sqrt(1.0 - r * r)
+                start = centre + radius * (r * off / np.linalg.norm(off, axis=1)[:, None] - half * way)
+                last = _shining(i, points, w, room, start, 2.0 * half * radius * way)
+                # a chord meets an area A in the ball 2 A / (4 pi radius^2) times
+                shares[i] = count / (2.0 * math.pi * radius**2)
             points[:last, 9] = shares[i]
             found.append(points[:last])
     points, most = np.concatenate(found), max(sum(map(len, found)), 1)
@@ -562,19 +438,38 @@ def shining_of(w: World, seed: int) -> World:
     return w._replace(shining=points, shares=shares / most)
 
 
+def all_sending(w: World, seed: int, threads: int) -> World:
+    """The world with points of all that is diffuse or a medium, which send what they glow and scatter."""
+    if not w.bounds[:, 3].any():
+        return w
+    out = shining_of(w._replace(glowing=w.bounds, all_send=True), seed)
+    rows = out.shining
+    solid = rows[:, 3:6].any(1)
+    how: dict[str, Any] = {"seed": seed + 1, "threads": threads}
+    if solid.any():
+        came = irradiance(w, rows[solid, :3], rows[solid, 3:6], EACH, **how)
+        rows[solid, 6:9] += np.minimum(rows[solid, 11:14], CAPS[0]) * came
+    if not solid.all():
+        came = fluence(w, rows[~solid, :3], EACH, **how)
+        rows[~solid, 6:9] = rows[~solid, 10:11] * np.minimum(rows[~solid, 11:14], CAPS[1]) * came
+    return out
+
+
 @compiled
 def glows_at(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any, room: Room) -> Any:
-    """Light (3,) that surfaces that glow send by way of a point, by one point of them."""
+    """Light (3,) that what glows sends by way of a point, by one point of it."""
     count = len(w.shining)
     out = (0.0, 0.0, 0.0)
     total, chosen = 0.0, 0.0
     for _ in range(CANDIDATES):
-        row = w.shining[int(draw(room, _DIMENSIONS) * count)]
+        row = w.shining[int(draw(room, DIMENSIONS) * count)]
         way = (row[0] - p[0], row[1] - p[1], row[2] - p[2])
         square = max(dot(way, way), 1e-12)
         far = math.sqrt(square)
         d = (way[0] / far, way[1] / far, way[2] / far)
         facing = -dot((row[3], row[4], row[5]), d)
+        if row[3] == 0.0 and row[4] == 0.0 and row[5] == 0.0:
+            facing = 1.0  # a medium's
         if facing <= 0.0:
             continue
         if kind == VOLUMETRIC:
@@ -584,12 +479,12 @@ def glows_at(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any
             odds = reflect(kind, rgb, alpha, n, v, d, room.f)
         if odds <= 0.0:
             continue
-        likely = CANDIDATES * row[9] * square / facing
+        likely = CANDIDATES * row[9] * square / (facing * row[10])
         weight = facing / square / row[9] * likely / (likely + odds)
         sent = (room.f[0] * row[6], room.f[1] * row[7], room.f[2] * row[8])
         size = weight * max(sent[0], max(sent[1], sent[2]))
         total += size
-        if size > 0.0 and draw(room, _DIMENSIONS) * total < size:
+        if size > 0.0 and draw(room, DIMENSIONS) * total < size:
             chosen = size
             out = (weight * sent[0], weight * sent[1], weight * sent[2])
             room.aim[0], room.aim[1], room.aim[2], room.aim[3] = d[0], d[1], d[2], far
@@ -597,7 +492,7 @@ def glows_at(w: World, p: Any, n: Any, v: Any, kind: int, alpha: float, rgb: Any
         return out
     d, far = (room.aim[0], room.aim[1], room.aim[2]), room.aim[3]
     _, ending, tau = march(w.field, p, d, far - _BEFORE, np.inf, False, room)
-    if ending != _ENDS:
+    if ending != ENDS:
         return 0.0, 0.0, 0.0
     weight = total / chosen / CANDIDATES * math.exp(-tau)
     return out[0] * weight, out[1] * weight, out[2] * weight
@@ -611,15 +506,15 @@ def traced(
     """Write the mean light (M, 4) of ``count`` paths for each of M rays or points; see `light`."""
     up = (0.0, 1.0, 0.0)
     for m in range(len(o)):
-        own = scrambled(seed + np.uint64((first + m) // block) * _GOLDEN)
-        room.chance[1] = scrambled(own + _ONE)
-        room.chance[0] = scrambled(own + np.uint64((first + m) % block) * _TWO)
+        own = scrambled(seed + np.uint64((first + m) // block) * GOLDEN)
+        room.chance[1] = scrambled(own + ONE)
+        room.chance[0] = scrambled(own + np.uint64((first + m) % block) * TWO)
         p, n = (o[m, 0], o[m, 1], o[m, 2]), (d[m, 0], d[m, 1], d[m, 2])
         known, how, paths = -1.0, 0, count
         out[m] = 0.0
         if mode == EYE and not w.media:
             known, how, _ = march(w.field, p, n, end_of(w, p, n), np.inf, True, room)
-            if how == _ENDS and known == np.inf:
+            if how == ENDS and known == np.inf:
                 paths = 1
         for i in range(paths):
             room.chance[2] = np.uint64((first + m) % block * count + i)
@@ -672,10 +567,10 @@ def light(
 
     o, d = (np.ascontiguousarray(v, np.float64) for v in (origins, directions))
     count = block * paths
-    table = np.asarray(Sobol(_DIMENSIONS, scramble=False).random(count))
+    table = np.asarray(Sobol(DIMENSIONS, scramble=False).random(count))
     out = np.empty((len(o), 4))
     size = max(block, -(-min(4096, -(-len(o) // (8 * threads))) // block) * block)
-    if w.glowing[:, 3].any():
+    if w.glowing[:, 3].any() and not w.all_send:
         w = shining_of(w, seed)
     key = np.uint64(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
 
@@ -722,6 +617,7 @@ def traced_picture(
     batch: int = 64,
     enough: float = np.inf,
     known: Traced | None = None,
+    points: bool = False,
     seed: int = 0,
     threads: int = 2,
 ) -> Traced:
@@ -734,6 +630,7 @@ def traced_picture(
         paths: of a pixel at most, in batches of a power of two for each sample, two at least.
         enough: decibels of `Traced` after which no batch begins.
         known: the same picture of fewer paths, in batches of the same size, to go on from.
+        points: whether points of all surfaces and media send to paths, found anew for each batch.
     """
     width, height = canvas
     d = ways(stage, canvas, range(height), per_side)
@@ -748,7 +645,9 @@ def traced_picture(
         total = known.mean * begun
         square = begun * (known.error**2 * (begun - 1) + known.mean**2)
     for done in range(begun + 1, max(paths // (each * block), 2) + 1):
-        found = light(w, o, d, each, mode=EYE, block=block, seed=seed * 65_537 + done, threads=threads)
+        key = seed * 65_537 + done
+        world = all_sending(w, key, threads) if points else w
+        found = light(world, o, d, each, mode=EYE, block=block, seed=key, threads=threads)
         value = found.reshape(height, width, block, 4).mean(2).transpose(2, 0, 1)
         total, square = total + value, square + value**2
         spread = np.maximum(square / done - (total / done) ** 2, 0.0) / max(done - 1, 1)

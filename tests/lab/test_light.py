@@ -136,6 +136,30 @@ def test_mist_around_a_lamp_is_drawn_as_bright_as_it_is(radius: float) -> None:
     assert abs(np.asarray(render(program)) - exact).mean() < 0.012
 
 
+def test_points_that_send_light_change_no_mean() -> None:
+    """A lamp within a cut shell, mist that a solid sticks in, and what mirrors, with and without points."""
+    look = "material diffuse { color([0.9, 0.8, 0.7]); }"
+    _, graph = scene_of(
+        f"""nsg 1; light([0, 0.3, 0], 2, #fff, 0.1); sky(0.2);
+        subtract {{ sphere {{ shell(0.2); }} box {{ scale(0.6); translate(0.5, 0.3, 0.6); }} {look} }}
+        sphere {{ scale(0.6); translate(0.9, 0.5, 0.9); material volumetric {{ density(3); }} }}
+        box {{ scale(0.4); translate(1.0, 0.2, 0.9); {look} }}
+        sphere {{ scale(0.4); translate(-0.9, -0.4, 0.9); material glossy {{ roughness(0.3); }} }}"""
+    )
+    assert graph.stage is not None
+    for seed in range(2):
+        plain, points = (
+            traced_picture(
+                world_of(graph), graph.stage, (12, 12), paths=4096, batch=512, points=on, seed=seed
+            )
+            for on in (False, True)
+        )
+        spread = np.hypot(plain.error, points.error)[:3] + 1e-4
+        assert abs((points.mean - plain.mean)[:3] / spread).mean() < 1.2
+        assert abs(points.mean[:3].mean() / plain.mean[:3].mean() - 1.0) < 0.01
+        assert points.decibels > plain.decibels
+
+
 def test_every_family_is_drawn_and_measured(tmp_path: Path) -> None:
     how = f"--scenes 1 --size 16 --paths 8 --cache {tmp_path} -o {tmp_path}"
     assert run("light", *FAMILIES, "--trace", *how.split()).exit_code == 0
