@@ -30,7 +30,7 @@ from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.nodes import Nodes, ground_places, hollow, on_ground, on_objects, turned
 from scenelang.drawing.solid.passes import INF
 
-RAYS = 8, 16  # of nodes, and where something may be hollow
+RAYS = (8, 8), (64, 16)  # of nodes on objects and of the ground, and where something may be hollow
 GAP = 0.01  # world units, as of `MarchSettings`
 RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
 DOME = 64  # directions to the sky alone
@@ -271,17 +271,19 @@ class Around:
         high = ((2 * up).clip(0.0, 1.0) * open_).sum(0) / DOME
         return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
 
-    def _exchange(self, rays: int) -> tuple[Array, Array]:
-        """Parts of each node that nodes see (J, J) by so many rays, and of the horizon less what is hidden of
-        the sky (3, J).
+    def _exchange(self, rays: tuple[int, int]) -> tuple[Array, Array]:
+        """Parts of each node that nodes see (J, J) by rays, so many on objects and on the ground, and of the
+        horizon less what is hidden of the sky (3, J).
         """
         xp, nodes, count = self.xp, self.nodes, self.count
         row, escaped = xp.full((1, count * count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
         found: list[tuple[Array, Array]] = []  # places in the row, and shares
-        numbers = np.arange(count * rays)
+        each = np.repeat(rays, (self.first, count - self.first))
+        owner, among = np.repeat(np.arange(count), each), np.repeat(each, each)
+        number = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
         turns = 2 * np.pi * (SCATTER @ np.asarray(xp.to_numpy(nodes.place[:3]), np.float64) % 1.0)
-        r, angle = np.sqrt((numbers % rays + 0.5) / rays), GOLDEN * (numbers % rays) + turns[numbers // rays]
-        node, share = xp.array(numbers // rays, nodes.p), xp.full((count * rays,), 1 / rays, nodes.p)
+        r, angle = np.sqrt((number + 0.5) / among), GOLDEN * number + turns[owner]
+        node, share = xp.array(owner, nodes.p), xp.array((1 / among).astype(np.float32), nodes.p)
         way = turned(xp, xp.take(nodes.n, node), xp.array(disc(r, angle).astype(np.float32), nodes.p))
         p = xp.take(nodes.p + LIFT * nodes.n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)

@@ -36,9 +36,10 @@ from scenelang.drawing.solid.mist import ALBEDO
 from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.nodes import hollow
 from scenelang.drawing.solid.passes import INF, Passes
-from scenelang.drawing.solid.soft import ASIDE, BEAMS, WIDE, form, shown
+from scenelang.drawing.solid.soft import ASIDE, BEAMS, MORE_BEAMS, WIDE, form, shown
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
+UNEVEN = 0.1  # difference of beams of a lamp through media for which more are asked
 EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
 BUSY = 8.0  # texels that a piece may cross with `FEW` panels of two points each
 FEW, MANY = 4, 12
@@ -369,27 +370,32 @@ class Lighting:
         return part, work + Work(lights=len(part))
 
     def _hazed(self, lamp: Lamp, p: Array, n: Array) -> tuple[Array, Work]:
-        """Parts of a lamp's light (K,) that media let through to points as of `_shared`, along `BEAMS`; from
-        the middle alone to points in media that are far from it.
+        """Parts of a lamp's light (K,) that media let through to points as of `_shared`, along `BEAMS`, more
+        where these differ; from the middle alone to points in media that are far from it.
         """
-        xp, radius, count = self.xp, lamp.light.radius, len(BEAMS)
-        single = (_dot(n, n) < 0.5) & (_length(xp, p - lamp.at[:, None]) > DISTANT * radius)
-        near, far = xp.where(~single), xp.where(single)
-        starts = np.repeat(
-            radius * np.concatenate([BEAMS, 0 * BEAMS[:1]]).T, [len(near)] * count + [len(far)], 1
-        )
-        start = xp.array(starts.astype(np.float32), p)
-        way = xp.take(p, xp.concat([near] * count + [far], 0)) - (start + lamp.at[:, None])
+        xp, passed, work = self.xp, 0 * p[0], Work()
+        single = (_dot(n, n) < 0.5) & (_length(xp, p - lamp.at[:, None]) > DISTANT * lamp.light.radius)
+        more: list[tuple[Array, Any]] = [(xp.where(single), 0 * BEAMS[:1]), (xp.where(~single), BEAMS)]
+        while more:
+            some, beams = more.pop()
+            clear, took = self._through(lamp, xp.take(p, some), beams)
+            xp.put(passed, some, clear.mean(0))
+            work += took
+            if len(beams) == len(BEAMS):
+                uneven = xp.where(xp.largest(clear)[0] - xp.least(clear) > UNEVEN)
+                more.append((xp.take(some, uneven), MORE_BEAMS))
+        return passed, work
+
+    def _through(self, lamp: Lamp, p: Array, beams: np.ndarray) -> tuple[Array, Work]:
+        """Parts (B, K) of light that media let through from a lamp's points (B, 3) to points (3, K)."""
+        xp, radius = self.xp, lamp.light.radius
+        start = xp.array(np.repeat(radius * beams.T, p.shape[1], 1).astype(np.float32), p)
+        way = xp.concat([p] * len(beams), 1) - (start + lamp.at[:, None])
         r = _length(xp, way)
         way, along = way / r, _dot(start, way) / r
         rim = xp.sqrt(along * along + (radius * radius - _dot(start, start))) - along  # of the lamp
-        begin = start + lamp.at[:, None]
-        trail = march(self.hazy, begin, way, r - CLEAR, 0, self.pace.gap, True, start=rim)
-        clear, passed = xp.exp(-trail.depth), 0 * p[0]
-        beams = count * len(near)
-        xp.put(passed, near, clear[:beams].reshape(count, -1).mean(0))
-        xp.put(passed, far, clear[beams:])
-        return passed, trail.work
+        trail = march(self.hazy, start + lamp.at[:, None], way, r - CLEAR, 0, self.pace.gap, True, start=rim)
+        return xp.exp(-trail.depth).reshape(len(beams), -1), trail.work
 
     def _reached(self, lamp: Lamp, p: Array, edge: Array, seen: Trail, exact: bool) -> tuple[Array, Work]:
         """Parts of a lamp's light (K,) that arrive at points (3, K), and what it took; of ``edge`` as `_lit`

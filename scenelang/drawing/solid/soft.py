@@ -26,6 +26,10 @@ HASTE = 0.03  # and of the way that is left
 # points of a unit ball from which rays go through media: a tetrahedron, whose first and second moments are,
 # from everywhere, those of a disc
 BEAMS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / 2
+# the like of an icosahedron, where the four differ
+MORE_BEAMS = np.array(
+    [np.roll((0, a, b * 1.618034), k) for k in range(3) for a in (-1, 1) for b in (-1, 1)], np.float32
+) * np.float32(0.4553)
 FLOOR = 0.012  # what is added to all steps, in world units; rays end so far before a point
 # what rays carry along: the cone's radius over the way that is left, the whole way, the least distance over
 # the radius and where it is, those of other things before, whether it falls, and its last
