@@ -30,7 +30,7 @@ from scenelang.drawing.metrics import (
 from scenelang.drawing.neural.load import Model
 from scenelang.language.scene import Scene
 from scenelang.language.words import COMBINE, TOKENS
-from scenelang.output.cost import reference_of
+from scenelang.output.frontier import reference_of
 
 SHOWN = 12  # worst cases
 

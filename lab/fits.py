@@ -21,7 +21,7 @@ from scenelang.drawing.metrics import over_white, psnr
 from scenelang.inverse.fit import FittedNumber, fit
 from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import loads
-from scenelang.output.cost import reference_of
+from scenelang.output.frontier import reference_of
 
 FAR_DB: Final = 25.0
 """A start's picture is at most so near to the target."""

@@ -20,7 +20,7 @@ from scenelang.drawing.neural.load import Model
 from scenelang.drawing.torch_backend import open_model
 from scenelang.language.evaluation import load
 from scenelang.language.scene import Scene
-from scenelang.output.cost import plan_of, reference_of
+from scenelang.output.frontier import plan_of, reference_of
 
 REPEATS = 2
 

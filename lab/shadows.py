@@ -22,7 +22,7 @@ from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, UNCAPPED_DB, psnr, side_by_side
 from scenelang.drawing.neural.load import Model
 from scenelang.language.scene import Scene
-from scenelang.output.cost import reference_of
+from scenelang.output.frontier import reference_of
 
 SEEN = 4 / 255  # by how much light has to change where there is a shadow
 LEAST = 0.01  # share of the canvas that is in shadow

@@ -38,7 +38,7 @@ from scenelang.drawing.neural.draw import draw
 from scenelang.drawing.neural.load import Framed, Model, Solids
 from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.scene import Chain, Object, Scene
-from scenelang.output.cost import reference_of
+from scenelang.output.frontier import reference_of
 
 EDGE = 2 / 255  # a pixel of an edge differs by more from a neighbour
 FRAMES = 8

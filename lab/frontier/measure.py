@@ -33,8 +33,7 @@ from scenelang.drawing.metrics import flip, over_white, psnr
 from scenelang.drawing.small import Load, load_of
 from scenelang.drawing.torch_backend import open_model
 from scenelang.language.scene import Scene
-from scenelang.output.cost import reference_of
-from scenelang.output.frontier import Cost, error_scale, yardstick
+from scenelang.output.frontier import Cost, error_scale, reference_of, yardstick
 
 SHOWN = 4  # scenes whose pictures are kept
 CONVERGED = 8  # scenes compared with 64 samples a pixel

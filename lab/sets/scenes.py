@@ -24,7 +24,7 @@ from scenelang.drawing.neural.load import Model, load_model
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.torch_backend import draw_program
 from scenelang.language.scene import Scene
-from scenelang.output.cost import reference_of
+from scenelang.output.frontier import reference_of
 
 PROBE = 48  # pixels along a side of the picture that tells how much a scene covers
 LEAST_COVER = 0.02  # share of the canvas

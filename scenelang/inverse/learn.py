@@ -51,7 +51,7 @@ from scenelang.inverse.grids import NEAR, THIN, Rung, fit, fit_colours
 from scenelang.inverse.sandbox import CPU_S, LIBRARIES, Asked, Hear, SandboxProcess, files_beside, run_alone
 from scenelang.language.diagnostics import plural
 from scenelang.language.scene import Elements, load_elements
-from scenelang.output.roots import crossed
+from scenelang.output.mesh import crossed
 from scenelang.output.workers import GivenUp, by_workers
 
 FilePath = str | os.PathLike[str]

@@ -24,7 +24,7 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.assets import stepped
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
 from scenelang.drawing.neural.meetings import Pairs, meetings_of
-from scenelang.output.roots import crossed, zeros
+from scenelang.output.mesh import crossed, zeros
 
 Floats = npt.NDArray[np.float64]
 

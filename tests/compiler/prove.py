@@ -30,7 +30,7 @@ from scenelang.drawing.exact.field import carry_back, distance_scale, evaluate, 
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS
-from scenelang.output.cost import stages as sizes
+from scenelang.output.frontier import stages as sizes
 from tests.compiler.random_scenes import full_scene
 
 EDGE = 1e-9  # world units

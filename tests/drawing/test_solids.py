@@ -13,7 +13,7 @@ from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import enlarged
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.torch_backend import draw_program, open_model
-from scenelang.output.cost import plan_of
+from scenelang.output.frontier import plan_of
 from tests.pictures import psnr_db
 
 TEXT = """nsg 1;

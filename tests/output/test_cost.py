@@ -18,7 +18,7 @@ from scenelang.drawing.neural.draw import draw
 from scenelang.drawing.neural.field import SLACK
 from scenelang.drawing.neural.load import load_model
 from scenelang.drawing.torch_backend import draw_program
-from scenelang.output.cost import choice, drawing_cost, stages, token_counts
+from scenelang.output.frontier import choice, drawing_cost, stages, token_counts
 
 SCENE = """
 subtract { pentagon { scale(0.4); } triangle { scale(0.1); } }

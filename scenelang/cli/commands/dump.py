@@ -169,7 +169,7 @@ def _picture(kind: str, text: str) -> bytes:
 def _plan(job: Input, request: options.Request, how: How) -> dict[str, Any]:
     """Draw the scene and say what that took."""
     from scenelang.drawing.torch_backend import choose_device, open_model
-    from scenelang.output.cost import plan_of
+    from scenelang.output.frontier import plan_of
 
     assert job.scene is not None
     assert job.program is not None
