@@ -30,7 +30,8 @@ from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.nodes import Nodes, ground_places, hollow, on_ground, on_objects, turned
 from scenelang.drawing.solid.passes import INF
 
-RAYS = (8, 8), (64, 16)  # of nodes on objects and of the ground, and where something may be hollow
+RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
+DIFFER, AGAIN = 0.15, 8  # light by which nodes around a place differ, above which it sends so many rays
 GAP = 0.01  # world units, as of `MarchSettings`
 RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
 DOME = 64  # directions to the sky alone
@@ -47,7 +48,7 @@ OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less i
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 # points along the picture's shorter side and rays of each, where something glows, and where something may be
 # hollow or has lamps within
-LATTICE = (38, 40), (64, 40), (96, 24)
+LATTICE = (38, 40), (64, 40), (96, 24), (64, 72)
 PIXEL_RAYS = 8  # of pixels that are asked themselves
 FEWEST, MISTY = 4, (0.1, 0.5)  # rays through media, as parts of all, and where lamps are within
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
@@ -199,7 +200,7 @@ class Around:
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
         """Find what nodes send and receive under lamps."""
-        n = self.nodes
+        n, self.lamps = self.nodes, lamps
         with self.xp.inference():
             direct = lamps(n.p, n.n) + self._glowing(n.p, n.n)
             received = self._solved(direct)
@@ -216,7 +217,7 @@ class Around:
         by places of the picture in pixels.
         """
         uneven = self.hollow or (self.mist is not None and self.mist.lit)
-        side, rays = LATTICE[2 if uneven else int(self.emitters.there)]
+        side, rays = LATTICE[2 if self.hollow else 3 if uneven else int(self.emitters.there)]
         self.canvas, self.step = canvas, max(1, round(min(canvas) / side))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
@@ -243,13 +244,12 @@ class Around:
             self.seen, light = Seen(p, n, p), received(0)
             even = self._evened(light)
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            more, total = min(max(noise / NOISE - 1, 0.0), 1.0) * MORE, 1.0
+            more, total = min(max(noise / NOISE - 1, 0.0), 3.0 if self.hollow else 1.0) * MORE, 1.0
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
-                light, total = light + received(turn + 1) * part, total + part
-            if more:
-                light = light / total
-                even = self._evened(light)
+                total += part
+                light = light + (received(turn + 1) - light) * (part / total)
+            even = self._evened(light) if more else even
             even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
             if self.emitters.there:
                 free = everywhere(self.emitters.received(at, up)[1][None])
@@ -296,7 +296,7 @@ class Around:
         if len(met) and self.lookup is not None:
             ways = xp.take(way, met)
             at = xp.take(p, met) + ways * xp.take(hit, met)
-            cell, shares = self._around(at, ways)
+            cell, shares, _ = self._around(at, ways)
             place = (xp.take(node, met) * count)[:, None] + self.lookup.index[cell]
             found.append((place.reshape(-1), (shares * xp.take(through, met)[:, None]).reshape(-1)))
         floor = xp.where((hit == INF) & (limit < INF))
@@ -314,8 +314,10 @@ class Around:
         xp.add(escaped, xp.take(node, hidden), -self.sky(xp.take(way, hidden)) * xp.take(lost, hidden))
         return row.reshape(count, count), escaped
 
-    def _around(self, at: Array, way: Array) -> tuple[Array, Array]:
-        """Cells and shares, as of `Lookup.near`, of nodes around points (3, K) where rays end."""
+    def _around(self, at: Array, way: Array) -> tuple[Array, Array, Array]:
+        """Cells and shares, as of `Lookup.near`, of nodes around points (3, K) where rays end, and normals
+        along these.
+        """
         xp = self.xp
         g = near(self.field, at, 0 * at[0] + GAP, gradient=True).gradient
         against = (g * way).sum(0) > 0
@@ -329,7 +331,7 @@ class Around:
             own, near_by = (xp.take(part, some) for part in (at - APART * g, shares.T))
             free = self._open(xp.stack([own] * nodes.shape[1], 2), nodes).T * near_by
             shares[some] = (free / free.sum(0).clip(OPEN)).T
-        return cell, shares
+        return cell, shares, g
 
     def _open(self, p: Array, nodes: Array) -> Array:
         """The part of the light between points (3, k, m) and nodes (k, m) that no wall stops."""
@@ -378,10 +380,29 @@ class Around:
                 break
         return x
 
-    def _floored(self, at: Array) -> Array:
+    def _floored(self, at: Array, finer: bool = False) -> Array:
         """What the ground sends (3, K) from points (3, K) of it."""
         index, shares, kept = self._on_floor(at)
-        return self._mixed(self.sent, index, shares) * kept + self.horizon * (1 - kept)
+        sent = self._mixed(self.sent, index, shares)
+        if finer:
+            sent = sent + self._finer(at, self.xp.take(self.nodes.n, index[0]), index, shares)
+        return sent * kept + self.horizon * (1 - kept)
+
+    def _finer(self, p: Array, n: Array, index: Array, shares: Array) -> Array:
+        """How much more points (3, K) with unit normals send (3, K) than nodes around them do, by their
+        indices and shares (k, K); where these differ much, as few rays tell.
+        """
+        xp, result = self.xp, 0 * p
+        sent = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
+        off = xp.sqrt((shares * (sent - (sent * shares).sum(0)) ** 2).sum(0))
+        if len(some := xp.where(off > DIFFER)):
+            p, n, index, shares = (xp.take(part, some) for part in (p, n, index, shares))
+            at = SCATTER[:, None] * np.asarray(xp.to_numpy(p), np.float64)
+            here = self.lamps(p, n) + self._glowing(p, n) + self.gathered(p, n, at[:2] + at[2], AGAIN, False)
+            more = self._mixed(self.nodes.colour.clip(0.0, CAP), index, shares) * here
+            part = (xp.take(off, some) * (1 / DIFFER) - 1).clip(None, 1.0)
+            xp.put(result, some, part * (more - self._mixed(self.sent, index, shares)))
+        return result
 
     def _mixed(self, values: Array, index: Array, shares: Array) -> Array:
         """Values (3, K) of those of nodes (3, J) by their indices and shares (k, K)."""
@@ -421,15 +442,15 @@ class Around:
         light, free = self.emitters.received(p, n)
         return light * free
 
-    def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
+    def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool = True) -> Array:
         """What points (3, K) with unit normals receive (3, K) by so many rays, which numbers (2, K) turn."""
         result = 0 * p
         for start in range(0, p.shape[1], BATCH // rays):
             band = slice(start, start + BATCH // rays)
-            result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays)
+            result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer)
         return result
 
-    def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int) -> Array:
+    def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
         xp, mist = self.xp, self.mist
         misty = max(FEWEST, int(rays * MISTY[mist is not None and mist.lit]))
         # the first of them, which go through media, in the middles of equal parts of the hemisphere
@@ -438,7 +459,7 @@ class Around:
         local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
-        light, reach = self.arriving(begin, way)
+        light, reach = self.arriving(begin, way, finer and self.hollow)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         result = light.reshape(3, rays, -1).mean(1)
         if self.mist is None:
@@ -448,8 +469,10 @@ class Around:
         more, clear = (part.reshape(*part.shape[:-1], misty, -1).mean(-2) for part in parts)
         return result * clear + more
 
-    def arriving(self, p: Array, way: Array) -> tuple[Array, Array]:
-        """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far."""
+    def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
+        """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
+        ``finer``, places where nodes differ send rays of their own.
+        """
         xp = self.xp
         limit = to_ground(xp, self.stage.ground, p[1], way)
         hit = march(self.field, p, way, limit, 0, GAP, few=self.few).hit
@@ -457,12 +480,15 @@ class Around:
         light = self.sky(way)
         if len(floor):
             at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
-            xp.put(light, floor, self._floored(at))
+            xp.put(light, floor, self._floored(at, finer))
         if len(met) and self.lookup is not None:
             ways = xp.take(way, met)
             at = xp.take(p, met) + ways * xp.take(hit, met)
-            seen = self._around(at, ways)
-            xp.put(light, met, self.lookup.mixed(self.sent_rows, *seen))
+            cell, shares, g = self._around(at, ways)
+            sent = self.lookup.mixed(self.sent_rows, cell, shares)
+            if finer:
+                sent = sent + self._finer(at, -g, self.lookup.index[cell].T, shares.T)
+            xp.put(light, met, sent)
         return light, xp.minimum(hit, limit)
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:

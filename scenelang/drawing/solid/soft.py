@@ -28,8 +28,8 @@ HASTE = 0.03  # and of the way that is left
 BEAMS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / 2
 # the like of an icosahedron, where the four differ
 MORE_BEAMS = np.array(
-    [np.roll((0, a, b * 1.618034), k) for k in range(3) for a in (-1, 1) for b in (-1, 1)], np.float32
-) * np.float32(0.4553)
+    [np.roll((0, a, b), k) for k in range(3) for a in (-0.455, 0.455) for b in (-0.737, 0.737)], np.float32
+)
 FLOOR = 0.012  # what is added to all steps, in world units; rays end so far before a point
 # what rays carry along: the cone's radius over the way that is left, the whole way, the least distance over
 # the radius and where it is, those of other things before, whether it falls, and its last
@@ -92,7 +92,7 @@ def form(xp: Arrays, cos: Array, far: Array, radius: float) -> Array:
 
 def shown(solids: SolidField, at: Array, radius: float, p: Array, n: Array) -> tuple[Array, Work]:
     """Shares (K,) of a lamp's light that what is opaque lets through to points (3, K) outside of the lamp,
-    and what it took. Surfaces have normals n (3, K), others 0.
+    and what it took. Surfaces have normals n (3, K); in media, where one edge is enough, 0.
     """
     xp = solids.xp
     way = p - at[:, None]
@@ -109,8 +109,8 @@ def shown(solids: SolidField, at: Array, radius: float, p: Array, n: Array) -> t
     axes = Cones(solids, trail, xp.take(spread, ids), xp.take(far, ids))
     axes.run(0)
     least = xp.minimum(axes.told[0], axes.told[2])
-    xp.put(part, ids, 0 * least + (least > -1))
-    half = xp.where((least > -1) & (least < 1))
+    xp.put(part, ids, share(xp, least))
+    half = xp.where((abs(least) < 1) & (abs(xp.take(n, ids)).sum(0) > 0))
     if len(half):
         some = xp.take(ids, half)
         seen = [xp.take(each, some) for each in (way / far, far, spread, n)]
@@ -136,8 +136,7 @@ def _parted(
     spread = WIDE * spread
     way = ray - aside
     way = way / xp.sqrt((way * way).sum(0))
-    facing, surface = -(n * way).sum(0) / spread, (n * n).sum(0) > 0.5
-    own = xp.select(surface, facing, 0 * facing + 1)
+    facing = -(n * way).sum(0) / spread
     beside = 0 * far + 1
     for least, t in (told[:2], told[2:]):
         near = xp.where(xp.concat([least] * PARTS, 0) < 1)
@@ -171,9 +170,9 @@ def _parted(
         # what is nearest within the lamp hides nothing
         edge = xp.select((d > 0) & (t - along * d < radius), 0 * d + 1, edge)
         xp.put(beside, near, xp.minimum(xp.take(beside, near), edge))
-    open_ = share(xp, own)
-    lit = xp.minimum(share(xp, xp.minimum(beside, own)) / open_.clip(1e-6), 0 * open_ + 1)
+    open_ = share(xp, facing)
+    lit = xp.minimum(share(xp, xp.minimum(beside, facing)) / open_.clip(1e-6), 0 * open_ + 1)
     rest = xp.sqrt((1 - facing * facing).clip(0.0))
     # the mean of max(0, facing + y) over a unit disc
-    weight = xp.select(surface, facing * open_ + rest * rest * rest * (2 / 3 / np.pi), 0 * open_ + 1)
+    weight = facing * open_ + rest * rest * rest * (2 / 3 / np.pi)
     return (lit * weight).reshape(PARTS, -1).sum(0) / weight.reshape(PARTS, -1).sum(0).clip(1e-9)
