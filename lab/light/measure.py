@@ -29,6 +29,7 @@ from scenelang.language.diagnostics import Diagnostics
 ENOUGH = 52.0  # decibels of a traced picture's own noise
 BATCH = 64  # paths of a pixel in a batch
 WORST = 3  # pictures that are shown
+FIGURES = "psnr", "clean", "flip", "own_flip", "seconds"  # whose means are told
 
 
 def scene_of(text: str) -> tuple[Program, Graph]:
@@ -103,6 +104,10 @@ def measure(
             exact = over_white(from_light(truth.mean, program.background is None))
             picture = over_white(image)
             row |= {"psnr": psnr(picture, exact), "flip": flip(picture, exact)}
+            # what a renderer without error would have, if the traced picture's noise were Gaussian
+            noise = np.random.default_rng(seed).standard_normal(truth.mean.shape) * truth.error
+            noisy = over_white(from_light(truth.mean + noise, program.background is None))
+            row["own_flip"] = flip(noisy, exact)
             # without the traced picture's noise, whose square adds to that of the error
             square = float(np.mean((picture - exact) ** 2)) - 10 ** (-truth.decibels / 10)
             row["clean"] = min(-10 * math.log10(max(square, 1e-12)), MOST_DB)
@@ -116,7 +121,7 @@ def measure(
     result: dict[str, Any] = {"family": family, "seed": seed, "size": size}
     result["own"] = round(float(np.mean([row["own"] for row in rows])), 2)
     if drawn:
-        every = {name: np.array([row[name] for row in rows]) for name in ("psnr", "clean", "flip", "seconds")}
+        every = {name: np.array([row[name] for row in rows]) for name in FIGURES}
         result |= {f"mean_{name}": round(float(values.mean()), 4) for name, values in every.items()}
         result |= {f"{name}_5": round(float(np.percentile(every[name], 5)), 2) for name in ("psnr", "clean")}
     pictures.sort(key=lambda pair: pair[0])
