@@ -187,7 +187,7 @@ class Around:
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
         self.hollow = hollow(field)
-        self.few = 0.0 if self.hollow else RARE
+        self.few, self.uneven = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
         with xp.inference():
             if self.hollow and self.lookup is not None:
                 index = self.lookup.index
@@ -459,7 +459,7 @@ class Around:
         local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
-        light, reach = self.arriving(begin, way, finer and self.hollow)
+        light, reach = self.arriving(begin, way, finer and self.uneven)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         result = light.reshape(3, rays, -1).mean(1)
         if self.mist is None:
