@@ -27,7 +27,7 @@ from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.mist import Mist
 from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.nodes import Nodes, ground_places, hollow, on_ground, on_objects, turned
+from scenelang.drawing.solid.nodes import SCATTER, Nodes, ground_places, hollow, on_ground, on_objects, turned
 from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
@@ -51,14 +51,11 @@ APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 LATTICE = (38, 40), (64, 40), (96, 24), (64, 72)
 PIXEL_RAYS = 8  # of pixels that are asked themselves
 FEWEST, MISTY = 4, (0.1, 0.5)  # rays through media, as parts of all, and where lamps are within
-SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of nodes' rays
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# how much less of what glows some points around see than others where it is asked, and what means so
-EVEN, UNKNOWN = 0.1, 2.0
 # of the light on the lattice, above which there are more rays, how many times as many, and their turns
 NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
 BATCH = 1 << 16  # rays at once
@@ -157,7 +154,7 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    # (3, L) from everywhere, and if something glows the part of its light that nothing hides, and its square
+    # (3, L) from everywhere, and if something glows the part of its light that nothing hides
     received: Array
 
 
@@ -253,7 +250,7 @@ class Around:
             even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
             if self.emitters.there:
                 free = everywhere(self.emitters.received(at, up)[1][None])
-                even = self.xp.concat([even, free, free * free], 0)
+                even = self.xp.concat([even, self._evened(free)], 0)
             self.seen = Seen(p, n, even)
 
     def sky(self, way: Array) -> Array:
@@ -428,14 +425,11 @@ class Around:
                 numbers = np.rint(at * (EIGHTHS * self.step))
                 here, up = (xp.take(part, alone) for part in few)
                 xp.put(values[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
-                values[3:, alone] = UNKNOWN
+                values[3:, alone] = self.emitters.received(here, up)[1]
             xp.put(result, rest, values)
         if not self.emitters.there:
             return result
-        free, some = result[3], xp.where(result[4] > result[3] * result[3] + EVEN**2)
-        if len(some):
-            xp.put(free, some, self.emitters.received(xp.take(p, some), xp.take(n, some))[1])
-        return result[:3] + free * self.emitters.received(p, n, 0)[0]
+        return result[:3] + result[3] * self.emitters.received(p, n, 0)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""

@@ -1,7 +1,7 @@
 """Surfaces that glow, as light for others: what is small and bright is what cones and few rays miss.
 
 Nodes on what glows (`nodes.py`) are put together to discs, and these to clusters. A point receives the form
-factors of a cluster's discs where a ray to the one that counts most there is free.
+factors of a cluster's discs where a ray to one of them, which change from point to point, is free.
 
 Letters: J nodes, K points, G clusters, m discs of each.
 """
@@ -14,13 +14,14 @@ from scenelang.compiler.spaces import LIFT
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.nodes import Nodes
+from scenelang.drawing.solid.nodes import SCATTER, Nodes
 from scenelang.drawing.solid.passes import INF
 
 DISCS, CLUSTER = 1024, 16  # of all that glows, and of one cluster
 TURNED = 0.3  # how far apart opposite normals count, twice
 BAND = 1024  # points at once
 CLEAR = 0.02  # world units before a disc where rays to it end
+GOLDEN = 0.618034
 DIM = 1e-5  # light that no ray is worth
 GAP = 0.002  # world units, as of `MarchSettings`
 
@@ -87,11 +88,14 @@ class Emitters:
         there = -sum(to[axis] * self.n[axis] for axis in range(3)).clip(None, 0.0)
         form = self.area * here * there / (square * (np.pi * square + self.area)).clip(1e-12)
         light = xp.stack([(form * row).sum(2) for row in self.glow], 0)  # (3, K, G)
-        best = form.argmax(2)
+        turn = (SCATTER @ np.asarray(xp.to_numpy(p), np.float64))[:, None] + GOLDEN * np.arange(form.shape[1])
+        sums = form.cumsum(2)  # each point asks for one of a cluster's discs, by what they send
+        below = sums < (sums[..., -1] * xp.array((turn % 1.0).astype(np.float32), p))[..., None]
+        chosen = below.sum(2).clip(None, form.shape[2] - 1)
         some = xp.where(light.sum(0).reshape(-1) > DIM)
         groups, size = self.area.shape
         point, cluster = some // groups, some % groups
-        disc = cluster * size + xp.take(best.reshape(-1), some)
+        disc = cluster * size + xp.take(chosen.reshape(-1), some)
         begin = xp.take(p if n is None else p + LIFT * n, point)
         way = xp.take(self.p.reshape(3, -1), disc) - begin
         far = xp.sqrt((way * way).sum(0)).clip(1e-6)

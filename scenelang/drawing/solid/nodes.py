@@ -21,6 +21,7 @@ from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import Wanted
 
 ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
+SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of rays
 COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
 CHORDS, GLOWING = 24000, 400  # of those that glow, and nodes of the light on each
 NODES, LEAST, MOST = 200, 20, 400  # on all objects, on one at least and at most
