@@ -88,6 +88,28 @@ def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     assert light == pytest.approx(np.full_like(light, 0.3), rel=0.06)
 
 
+def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow() -> None:
+    """Ground below a roof's edge and a lamp above: power cos / r² on one side of a plane, 0 on the other."""
+    scene = nsg.loads("""nsg 1; canvas(16, 16); light([0, 2, 0], 5); sky(0); camera([0, 2, 9], [0, 0, 0]);
+        box { scale(1.732, 0.05, 3); translate(1, 1, 0); material diffuse { color(#000); } }
+        subtract { sphere { shell(0.2); scale(0.4); } box { scale(0.2); } translate(-6, 0, -6); }""")
+    kept: list[Around] = []
+    before = Around.look
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
+        nsg.render(nsg.compile(scene))
+    x = np.array([-0.3, -0.1, -0.03, 0.03, 0.1, 0.3], np.float32)  # the roof's edge is at 0, below the lamp
+    p, way = np.stack([x, 0 * x - 0.5, 0 * x]), np.tile(np.float32([[1e-4], [-1.0], [1e-4]]), len(x))
+    (around,) = kept
+    light, far = around.arriving(p, way, True)
+    assert far == pytest.approx(0.5)
+    square = x * x + 9
+    exact = around.nodes.colour[0, -1] * 5 * 3 / square**1.5 * (x < 0)
+    most = float(exact.max())
+    assert light[0] == pytest.approx(exact, abs=0.02 * most)
+    assert abs(around.arriving(p, way)[0][0] - exact).max() > 0.1 * most  # as nodes have it
+
+
 MOVED = """nsg 1; canvas(64, 64); sky(0.6);
     box { scale(0.6); rotate(20deg, axis = Y); translate(-0.6, -0.3, 0); material diffuse { color(#c44); } }
     torus { scale(0.8); translate(%r, 0.2, 0.3); material diffuse { color(#4c8); glow(#fff, 0.5); } }"""

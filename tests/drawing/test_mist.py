@@ -64,6 +64,17 @@ def test_balls_under_an_even_sky_solve_the_integral_equation(sigma, most):
     assert off.max() < most
 
 
+def test_a_lamp_in_the_middle_of_a_ball_of_mist_is_no_star():
+    """What is scattered is the same in all directions."""
+    lit = Stage(lights=(Light((0.0, 0.0, 0.0), 1.0, radius=0.1),), ground=None, sky=Sky(0.0, WHITE, WHITE))
+    mist = Mist(field_of([Object("sphere", (), "volumetric", (0.9, 0.9, 0.9))], density=(3.0,)), lit)
+    mist.relight()
+    way = np.random.default_rng(2).normal(size=(3, 500))
+    for r, most in ((0.5, 0.03), (0.7, 0.06)):  # along 14 ways 0.06 and 0.11
+        light = mist.medium((r * way / np.linalg.norm(way, axis=0)).astype(np.float32))[0]
+        assert light.std() < most * light.mean()
+
+
 def test_what_gives_off_as_much_as_it_takes_is_in_balance():
     objects = [
         Object("box", (scaled(1.1, 0.6, 0.8),), "volumetric", GREY),
