@@ -50,7 +50,6 @@ APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 # hollow or has lamps within
 LATTICE = (38, 40), (64, 40), (96, 24), (64, 72)
 PIXEL_RAYS = 8  # of pixels that are asked themselves
-FEWEST, MISTY = 4, (0.1, 0.5)  # rays through media, as parts of all, and where lamps are within
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
@@ -445,23 +444,17 @@ class Around:
         return result
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
-        xp, mist = self.xp, self.mist
-        misty = max(FEWEST, int(rays * MISTY[mist is not None and mist.lit]))
-        # the first of them, which go through media, in the middles of equal parts of the hemisphere
-        each = np.roll(np.arange(rays), -(rays // misty // 2)).reshape(misty, -1).T.reshape(-1, 1)
+        xp, each = self.xp, np.arange(rays)[:, None]
         shift, turn = (TURNS @ numbers + 0.5) % 1.0
         local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
         light, reach = self.arriving(begin, way, finer and self.uneven)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
-        result = light.reshape(3, rays, -1).mean(1)
-        if self.mist is None:
-            return result
-        some = slice(0, misty * p.shape[1])
-        parts = self.mist.along(begin[:, some], way[:, some], reach[some])
-        more, clear = (part.reshape(*part.shape[:-1], misty, -1).mean(-2) for part in parts)
-        return result * clear + more
+        if self.mist is not None:
+            more, clear = self.mist.along(begin, way, reach)
+            light = light * clear + more
+        return light.reshape(3, rays, -1).mean(1)
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If

@@ -39,7 +39,7 @@ from scenelang.drawing.solid.passes import INF, Passes
 from scenelang.drawing.solid.soft import ASIDE, BEAMS, MORE_BEAMS, WIDE, form, shown
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
-UNEVEN = 0.2  # difference of beams of a lamp through media for which more are asked
+UNEVEN = 0.3  # difference of beams of a lamp through media for which more are asked
 EVEN = 2  # how much more evenly than the light that the medium takes nodes lie
 BUSY = 8.0  # texels that a piece may cross with `FEW` panels of two points each
 FEW, MANY = 4, 12
