@@ -76,6 +76,24 @@ def test_a_thin_ring_that_glows_sends_what_all_of_it_does(wide: float) -> None:
     assert shown[0][0, 0] == pytest.approx((to[1] / far * facing / far**2 * area).sum() / np.pi, rel=0.03)
 
 
+@pytest.mark.parametrize("high", [0.05, 0.1, 0.3, 1.0])
+def test_a_plate_that_glows_is_as_bright_nearby_as_its_form_factor(high: float) -> None:
+    """a² / (a² + h²) of a disc of radius a above a level point; between its nodes too."""
+    scene = nsg.loads("""nsg 1; canvas(16, 16); ground(none); light(none); sky(0);
+        cylinder { scale(1.41421356, 0.1, 1.41421356); material diffuse { glow(#fff); } }""")
+    kept: list[Around] = []
+    before = Around.look
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
+        nsg.render(nsg.compile(scene))
+    emitters = kept[0].emitters
+    low = float(np.asarray(emitters.p)[1][np.asarray(emitters.n)[1] < -0.9].mean())
+    x, z = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 200))
+    p, n = np.stack([x, 0 * x + low - high, z]), np.tile([[0.0], [1.0], [0.0]], 200)
+    light = emitters.received(p.astype(np.float32), n.astype(np.float32), 0)[0]
+    assert light[0].mean() == pytest.approx(1 / (1 + high * high), rel=0.12)
+
+
 @pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
 def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""

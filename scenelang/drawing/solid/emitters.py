@@ -80,12 +80,16 @@ class Emitters:
         """
         xp = self.xp
         to = [self.p[axis] - p[axis][:, None, None] for axis in range(3)]  # (K, G, m) each
+        square = np.pi * (to[0] * to[0] + to[1] * to[1] + to[2] * to[2])
+        there = -sum(to[axis] * self.n[axis] for axis in range(3)).clip(None, 0.0)
+        # where it is as near as it is wide, a disc sends light from below the point rather than its middle
+        far = square / (square + self.area).clip(1e-12)
+        to = [far * to[axis] - (1 - far) * there * self.n[axis] for axis in range(3)]
         square = to[0] * to[0] + to[1] * to[1] + to[2] * to[2]
         if n is None:
             here = xp.sqrt(square)
         else:
             here = sum(to[axis] * n[axis][:, None, None] for axis in range(3)).clip(0.0)
-        there = -sum(to[axis] * self.n[axis] for axis in range(3)).clip(None, 0.0)
         form = self.area * here * there / (square * (np.pi * square + self.area)).clip(1e-12)
         light = xp.stack([(form * row).sum(2) for row in self.glow], 0)  # (3, K, G)
         turn = (SCATTER @ np.asarray(xp.to_numpy(p), np.float64))[:, None] + GOLDEN * np.arange(form.shape[1])
