@@ -46,8 +46,8 @@ GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # world units before surfaces, where walls are looked for, and how deep these stop light
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
-# points along the picture's shorter side and rays of each, where something glows, and where something may be
-# hollow or has lamps within
+# points along the picture's shorter side and rays of each, where something glows, where something may be
+# hollow, and where lamps are in media
 LATTICE = (38, 40), (64, 40), (96, 24), (64, 72)
 PIXEL_RAYS = 8  # of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
@@ -183,7 +183,7 @@ class Around:
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
         self.hollow = hollow(field)
-        self.few, self.uneven = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
+        self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
         with xp.inference():
             if self.hollow and self.lookup is not None:
                 index = self.lookup.index
@@ -212,8 +212,8 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        uneven = self.hollow or (self.mist is not None and self.mist.lit)
-        side, rays = LATTICE[2 if self.hollow else 3 if uneven else int(self.emitters.there)]
+        lit = self.mist is not None and self.mist.lit
+        side, rays = LATTICE[2 if self.hollow else 3 if lit else int(self.emitters.there)]
         self.canvas, self.step = canvas, max(1, round(min(canvas) / side))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
@@ -449,7 +449,7 @@ class Around:
         local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
-        light, reach = self.arriving(begin, way, finer and self.uneven)
+        light, reach = self.arriving(begin, way, finer and self.finer)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         if self.mist is not None:
             more, clear = self.mist.along(begin, way, reach)
@@ -543,7 +543,7 @@ def arriving(lighting: Any) -> Around:
         result = Around(field, stage, lighting.received)
     else:
         result = copy(last)
-        result.field, result.stage, result.seen = field, stage, None
+        result.field, result.stage, result.seen, result.lamps = field, stage, None, lighting.received
         if last.stage.lights != stage.lights:
             result.light(lighting.received)
     result.fixed, field.network.last = fixed, result

@@ -122,7 +122,7 @@ def shown(solids: SolidField, at: Array, radius: float, p: Array, n: Array) -> t
 def _parted(
     solids: SolidField, at: Array, radius: float, seen: list[Array], passes: Passes, told: Array, work: Work
 ) -> Array:
-    """As `shown`, of points whose rays, with such passes, told (4, K) where things are nearest."""
+    """As `shown`, of points on surfaces whose rays, with such passes, told (4, K) where things are near."""
     xp = solids.xp
     ray, far, spread, n = (xp.concat([part] * PARTS, -1) for part in seen)
     x, y, z = seen[0]
