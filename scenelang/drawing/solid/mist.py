@@ -38,7 +38,7 @@ NODES = 20**3, 32**3  # of a lattice, about, and of dense media,
 FINE = 0.5  # whose optical depth from a node to the next is this
 DEEPEST = 2.5  # optical depth from a node to the next; denser media are drawn thinner
 DEEP = 3.0  # cells by which points move inwards at most, where these are
-ENOUGH = 6e-3  # of the most light there is, by which the last sweep changes it,
+ENOUGH = 6e-3, 3e-4  # of the most light there is, by which the last sweep changes it; with lamps within;
 FIRST = 5e-2  # and where the ground's light is not known
 SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
 DARK = 1e-30
@@ -218,7 +218,7 @@ class Mist:
                 at = p + np.reshape(shift, (3, 1)) * ((ground.y - p[1]) / shift[1])
                 sent = self.xp.to_numpy(floor(self.xp.array(at.astype(np.float32), self.field.network.codes)))
             light[:, edge] = sent
-        self._solve(base, FIRST if floor is None else ENOUGH)
+        self._solve(base, FIRST if floor is None else ENOUGH[self.lit])
         light = np.where(self.opaque, 0.0, self.light).astype(np.float32)
         sends = self.albedo * light + self.glow
         for sent, _, rgb in self.lamps:
