@@ -31,7 +31,7 @@ from scenelang.drawing.solid.nodes import SCATTER, Nodes, ground_places, hollow,
 from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
-DIFFER, AGAIN = 0.15, 8  # light by which nodes around a place differ, above which it sends so many rays
+DIFFER, AGAIN = 0.3, 8  # light by which nodes around a place differ, above which it sends so many rays
 GAP = 0.01  # world units, as of `MarchSettings`
 RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
 DOME = 64  # directions to the sky alone
@@ -57,6 +57,7 @@ SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, above which there are more rays, how many times as many, and their turns
 NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
+LOUD = 7.5  # and how many times that again, by the noise, in hollows
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
@@ -240,7 +241,8 @@ class Around:
             self.seen, light = Seen(p, n, p), received(0)
             even = self._evened(light)
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            more, total = min(max(noise / NOISE - 1, 0.0), 3.0 if self.hollow else 1.0) * MORE, 1.0
+            most, total = max(1.0, LOUD * noise * self.finer), 1.0
+            more = MORE * min(max(noise / NOISE - 1, 0.0), most)
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 total += part
