@@ -108,7 +108,7 @@ def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
 
 def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow() -> None:
     """Ground below a roof's edge and a lamp above: power cos / r² on one side of a plane, 0 on the other."""
-    scene = nsg.loads("""nsg 1; canvas(16, 16); light([0, 2, 0], 5); sky(0); camera([0, 2, 9], [0, 0, 0]);
+    scene = nsg.loads("""nsg 1; canvas(16, 16); light([0, 2, 0], 20); sky(0); camera([0, 2, 9], [0, 0, 0]);
         box { scale(1.732, 0.05, 3); translate(1, 1, 0); material diffuse { color(#000); } }
         subtract { sphere { shell(0.2); scale(0.4); } box { scale(0.2); } translate(-6, 0, -6); }""")
     kept: list[Around] = []
@@ -122,7 +122,7 @@ def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow() -> None:
     light, far = around.arriving(p, way, True)
     assert far == pytest.approx(0.5)
     square = x * x + 9
-    exact = around.nodes.colour[0, -1] * 5 * 3 / square**1.5 * (x < 0)
+    exact = around.nodes.colour[0, -1] * 20 * 3 / square**1.5 * (x < 0)
     most = float(exact.max())
     assert light[0] == pytest.approx(exact, abs=0.02 * most)
     assert abs(around.arriving(p, way)[0][0] - exact).max() > 0.1 * most  # as nodes have it
