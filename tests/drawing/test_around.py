@@ -29,6 +29,16 @@ def received(objects: list[Object], stage: Stage, p: np.ndarray, n: np.ndarray) 
         return Around(solids, stage, Lighting(solids, stage).received).surface(p, n)
 
 
+def around_of(text: str) -> Around:
+    """The light of a scene that is drawn once."""
+    kept: list[Around] = []
+    before = Around.look
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
+        nsg.render(nsg.compile(nsg.loads(text)))
+    return kept[0]
+
+
 def test_all_of_an_even_sky_comes_to_what_is_convex() -> None:
     """(1/π) ∫ L cos θ dω is L."""
     light = received([BALL], EVEN, *on_ball(300, 0.7))
@@ -79,14 +89,9 @@ def test_a_thin_ring_that_glows_sends_what_all_of_it_does(wide: float) -> None:
 @pytest.mark.parametrize("high", [0.05, 0.1, 0.3, 1.0])
 def test_a_plate_that_glows_is_as_bright_nearby_as_its_form_factor(high: float) -> None:
     """a² / (a² + h²) of a disc of radius a above a level point; between its nodes too."""
-    scene = nsg.loads("""nsg 1; canvas(16, 16); ground(none); light(none); sky(0);
+    around = around_of("""nsg 1; canvas(16, 16); ground(none); light(none); sky(0);
         cylinder { scale(1.41421356, 0.1, 1.41421356); material diffuse { glow(#fff); } }""")
-    kept: list[Around] = []
-    before = Around.look
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
-        nsg.render(nsg.compile(scene))
-    emitters = kept[0].emitters
+    emitters = around.emitters
     low = float(np.asarray(emitters.p)[1][np.asarray(emitters.n)[1] < -0.9].mean())
     x, z = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 200))
     p, n = np.stack([x, 0 * x + low - high, z]), np.tile([[0.0], [1.0], [0.0]], 200)
@@ -108,17 +113,11 @@ def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
 
 def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow() -> None:
     """Ground below a roof's edge and a lamp above: power cos / r² on one side of a plane, 0 on the other."""
-    scene = nsg.loads("""nsg 1; canvas(16, 16); light([0, 2, 0], 20); sky(0); camera([0, 2, 9], [0, 0, 0]);
+    around = around_of("""nsg 1; canvas(16, 16); light([0, 2, 0], 20); sky(0); camera([0, 2, 9], [0, 0, 0]);
         box { scale(1.732, 0.05, 3); translate(1, 1, 0); material diffuse { color(#000); } }
         subtract { sphere { shell(0.2); scale(0.4); } box { scale(0.2); } translate(-6, 0, -6); }""")
-    kept: list[Around] = []
-    before = Around.look
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
-        nsg.render(nsg.compile(scene))
     x = np.array([-0.3, -0.1, -0.03, 0.03, 0.1, 0.3], np.float32)  # the roof's edge is at 0, below the lamp
     p, way = np.stack([x, 0 * x - 0.5, 0 * x]), np.tile(np.float32([[1e-4], [-1.0], [1e-4]]), len(x))
-    (around,) = kept
     light, far = around.arriving(p, way, True)
     assert far == pytest.approx(0.5)
     square = x * x + 9

@@ -65,7 +65,7 @@ def test_balls_under_an_even_sky_solve_the_integral_equation(sigma, most):
 
 
 def test_a_lamp_in_the_middle_of_a_ball_of_mist_is_no_star():
-    """What is scattered is the same in all directions."""
+    """Scattered light is the same in all directions."""
     lit = Stage(lights=(Light((0.0, 0.0, 0.0), 1.0, radius=0.1),), ground=None, sky=Sky(0.0, WHITE, WHITE))
     mist = Mist(field_of([Object("sphere", (), "volumetric", (0.9, 0.9, 0.9))], density=(3.0,)), lit)
     mist.relight()

@@ -387,8 +387,8 @@ class Around:
         return sent * kept + self.horizon * (1 - kept)
 
     def _finer(self, p: Array, n: Array, index: Array, shares: Array) -> Array:
-        """How much more points (3, K) with unit normals send (3, K) than nodes around them do, by their
-        indices and shares (k, K); where these differ much, as few rays tell.
+        """Light (3, K) that points (3, K) with unit normals send beyond that of nodes around them, of such
+        indices and shares (k, K), where these differ much, as few rays tell; not of what glows.
         """
         xp, result = self.xp, 0 * p
         sent = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
@@ -396,7 +396,7 @@ class Around:
         if len(some := xp.where(off > DIFFER)):
             p, n, index, shares = (xp.take(part, some) for part in (p, n, index, shares))
             at = SCATTER[:, None] * np.asarray(xp.to_numpy(p), np.float64)
-            here = self.lamps(p, n) + self._glowing(p, n) + self.gathered(p, n, at[:2] + at[2], AGAIN, False)
+            here = self.lamps(p, n) + self.gathered(p, n, at[:2] + at[2], AGAIN, False)
             more = self._mixed(self.nodes.colour.clip(0.0, CAP), index, shares) * here
             part = (xp.take(off, some) * (1 / DIFFER) - 1).clip(None, 1.0)
             xp.put(result, some, part * (more - self._mixed(self.sent, index, shares)))
