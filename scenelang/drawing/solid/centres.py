@@ -102,12 +102,10 @@ class Centres:
                 weight = weight * (alike + ALMOST) * (value[0] >= 0)
                 total, mean = total + weight, mean + weight * value
             xp.put(result, rest, mean / xp.maximum(total, 0 * total + ALMOST * ALMOST))
-            unknown = xp.take(rest, xp.where(total == 0))
             rest = xp.take(rest, xp.where(total < 30 * ALMOST))
             if not len(rest):
                 return result
-        if len(unknown):
-            xp.put(result, unknown, ask(unknown))
+        xp.put(result, rest, ask(rest))
         return result
 
     def _spread(self, rays: Array, count: int, ask: Callable[[Array], Array], most: float) -> Array:

@@ -422,11 +422,15 @@ class Lighting:
         passes = trail.at(self.xp, index)
         result = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
         sharp = xp.take(trail.soft, index) == 0
-        off = xp.where(sharp & (abs(result.distance) > 3 * INTO))
+        left = _dot(result.gradient, way) > 0  # beyond an edge
+        off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
         if len(off):  # where the distances on both sides of the surface said little about it
-            t_off = xp.take(t, off) + INTO + self._ahead(result, way, off)
+            left, ways = xp.take(left, off), xp.take(way, off)
+            t_off = xp.take(t, off) + INTO
+            t_off = t_off + xp.select(left, 0 * t_off - self.pace.gap, self._ahead(result, way, off))
             again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
-            there = xp.where(_dot(again.gradient, again.gradient) > 0.01)  # not past an edge
+            beyond = left & (_dot(again.gradient, ways) > 0)
+            there = xp.where((_dot(again.gradient, again.gradient) > 0.01) & ~beyond)  # not past an edge
             off = xp.take(off, there)
             xp.put(t, off, xp.take(t_off, there) - INTO)
             for name in ("distance", "register", "gradient"):

@@ -32,17 +32,17 @@ MORE_BEAMS = np.array(
 )
 FLOOR = 0.012  # what is added to all steps, in world units; rays end so far before a point
 # what rays carry along: the cone's radius over the way that is left, the whole way, the least distance over
-# the radius and where it is, those of other things before, whether it falls, and its last
-SPREAD, WHOLE, LEAST, WHERE, OTHER, THERE, FALLS, BEFORE = range(STATE, STATE + 8)
+# the radius and where it is, the like of the two nearest things before, whether it falls, and its last
+SPREAD, WHOLE, LEAST, WHERE, OTHER, THERE, THIRD, FARTHER, FALLS, BEFORE = range(STATE, STATE + 10)
 
 
 class Cones(Rays):
-    """Rays along the axes of cones, whose `told` (4, M) are rows `LEAST` to `THERE`."""
+    """Rays along the axes of cones, whose `told` (6, M) are rows `LEAST` to `FARTHER`."""
 
     def __init__(self, solids: SolidField, trail: Trail, spread: Array, whole: Array) -> None:
         xp, none = solids.xp, 0 * whole
-        more = xp.stack([spread, whole, none + 1, none, none + 1, none, none, none], 0)
-        self.told = 1 * more[2:6]
+        more = xp.stack([spread, whole, *[none + 1, none] * 3, none, none], 0)
+        self.told = 1 * more[2:8]
         super().__init__(solids, trail, xp.where(none == 0), trail.passes, 0.0, more)
 
     def _step(self, batch: _Batch) -> None:
@@ -53,14 +53,17 @@ class Cones(Rays):
         c = d / radius
         falls = c < rows[BEFORE]
         other = falls & (rows[FALLS] < 1)  # something else comes near
-        kept = other & (rows[LEAST] < rows[OTHER])
-        rows[OTHER] = xp.select(kept, rows[LEAST], rows[OTHER])
-        rows[THERE] = xp.select(kept, rows[WHERE], rows[THERE])
+        for first in (OTHER, THIRD):  # what is nearer moves the others on
+            kept = other & (rows[LEAST] < rows[first])
+            for before, after in ((LEAST, first), (WHERE, first + 1)):
+                rows[after], rows[before] = (
+                    xp.select(kept, rows[a], rows[b]) for a, b in ((before, after), (after, before))
+                )
         least = xp.select(other, 0 * c + 1, rows[LEAST])
         rows[WHERE] = xp.select(c < least, t, rows[WHERE])
         rows[LEAST] = xp.minimum(c, least)
         rows[FALLS], rows[BEFORE] = falls, c
-        least = xp.minimum(rows[LEAST], rows[OTHER])
+        least = xp.minimum(rows[LEAST], rows[OTHER])  # less than the third
         step = xp.maximum((d - least.clip(-1.0, 1.0) * radius) * rows[PACE], STRIDE * radius)
         following = t + step + HASTE * left + FLOOR
         ended = xp.where(batch.alive & ((following > rows[UNTIL]) | (least <= -1)))
@@ -122,7 +125,7 @@ def shown(solids: SolidField, at: Array, radius: float, p: Array, n: Array) -> t
 def _parted(
     solids: SolidField, at: Array, radius: float, seen: list[Array], passes: Passes, told: Array, work: Work
 ) -> Array:
-    """As `shown`, of points on surfaces whose rays, with such passes, told (4, K) where things are near."""
+    """As `shown`, of points on surfaces whose rays, with such passes, told (6, K) where things are near."""
     xp = solids.xp
     ray, far, spread, n = (xp.concat([part] * PARTS, -1) for part in seen)
     x, y, z = seen[0]
@@ -138,7 +141,7 @@ def _parted(
     way = way / xp.sqrt((way * way).sum(0))
     facing = -(n * way).sum(0) / spread
     beside = 0 * far + 1
-    for least, t in (told[:2], told[2:]):
+    for least, t in (told[:2], told[2:4], told[4:]):
         near = xp.where(xp.concat([least] * PARTS, 0) < 1)
         if not len(near):
             continue
