@@ -56,15 +56,13 @@ TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Ro
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, above which more rays go, how many times as many at most, and their turns
-NOISE, MORE, FURTHER = 0.02, 5, np.array([[0.37], [0.61]])
+NOISE, MORE, FURTHER = (0.03, 0.02), 5, np.array([[0.37], [0.61]])
 HEMISPHERE = 16, 32  # parts by the squared sine to the normal and by turns, which more rays go by
 EVERYWHERE = 0.2  # of these go so as those before
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
-NEXT = (0, 0), (1, 0), (0, 1), (1, 1)
-AROUND = tuple((x, y) for x in range(-1, 3) for y in range(-1, 3))  # of those corners
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
 CELLS = 8  # of the grid of nodes, along its longest side
 
@@ -285,7 +283,7 @@ class Around:
             self.seen, light = Seen(p, n, p), everywhere(guide.send(rays))
             even = self._evened(light)
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            more = MORE * min(max(noise / NOISE - 1, 0.0), 1.0)
+            more = MORE * min(max(noise / NOISE[self.hollow] - 1, 0.0), 1.0)
             for turn in range(ceil(more)):  # the last one counts in part
                 told = guide.sums[:3].sum(0).reshape(guide.density.shape) / guide.density
                 told = self.xp.take(self._evened(everywhere(told), own=False), there)
@@ -457,21 +455,15 @@ class Around:
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
             return self.gathered(p, n, numbers, LATTICE[0][1]) + self._glowing(p, n)
-        places = self._places(p)
-        result, fits = self._between(p, n, *places, NEXT)
-        rest = xp.where(~fits)
-        if len(rest):
-            side, u, v = (xp.take(part, rest) for part in places)
-            few = xp.take(p, rest), xp.take(n, rest)
-            values, fits = self._between(*few, side, u, v, AROUND)
-            alone = xp.where(~fits)
-            if len(alone):
-                at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
-                numbers = np.rint(at * (EIGHTHS * self.step))
-                here, up = (xp.take(part, alone) for part in few)
-                xp.put(values[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
-                values[3:, alone] = self.emitters.received(here, up)[1]
-            xp.put(result, rest, values)
+        side, u, v = self._places(p)
+        result, fits = self._between(p, n, side, u, v)
+        alone = xp.where(~fits)
+        if len(alone):
+            at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
+            numbers = np.rint(at * (EIGHTHS * self.step))
+            here, up = xp.take(p, alone), xp.take(n, alone)
+            xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
+            result[3:, alone] = self.emitters.received(here, up)[1]
         if not self.emitters.there:
             return result
         return result[:3] + result[3] * self.emitters.received(p, n, 0)[0]
@@ -564,13 +556,11 @@ class Around:
             total, result = total + weight, result + weight * xp.take(values, index)
         return result / total.clip(1e-9)
 
-    def _between(
-        self, p: Array, n: Array, side: Array, u: Array, v: Array, corners: tuple[tuple[int, int], ...]
-    ) -> tuple[Array, Array]:
+    def _between(self, p: Array, n: Array, side: Array, u: Array, v: Array) -> tuple[Array, Array]:
         """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any."""
         xp, i, j, values = self.xp, self.xp.floor(u), self.xp.floor(v), self.seen.received
         total, result, most = 0 * u, 0 * xp.take(values, xp.whole(0 * u)), 0 * u
-        for right, below in corners:
+        for right, below in np.ndindex(2, 2):
             column, row = (
                 (k + step).clip(0, count - 1)
                 for k, step, count in ((i, right, self.columns), (j, below, self.rows))
