@@ -22,10 +22,8 @@ EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
 APART = 0.1  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
 UNKNOWN = -1.0
-# of pixels around a sample, steps towards it down and across, and weights; those on other surfaces count less
+# of pixels around a sample, steps towards it down and across, and weights
 AROUND = (0, 0, 9 / 16), (0, 1, 3 / 16), (1, 0, 3 / 16), (1, 1, 1 / 16)
-FARTHER = tuple((down, right, 1.0) for down in range(-1, 3) for right in range(-1, 3))
-ALMOST = 1e-4
 
 
 class Centres:
@@ -88,24 +86,22 @@ class Centres:
         rest = xp.where(~(own | sharp))
         if not len(rest):
             return result
-        # what is thinner than a pixel takes of what is farther, or else of others
-        for ring in (AROUND, FARTHER):
-            row, column, down, right = (xp.take(part, rest) for part in at)
-            here, up = xp.take(p, rest), xp.take(n, rest)
-            total: Any = 0.0
-            mean: Any = 0.0
-            for one, other, weight in ring:
-                index = (row + one * down).clip(0, rows - 1) * columns
-                index = index + (column + other * right).clip(0, columns - 1)
-                value = xp.take(values, index)
-                alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
-                weight = weight * (alike + ALMOST) * (value[0] >= 0)
-                total, mean = total + weight, mean + weight * value
-            xp.put(result, rest, mean / xp.maximum(total, 0 * total + ALMOST * ALMOST))
-            rest = xp.take(rest, xp.where(total < 30 * ALMOST))
-            if not len(rest):
-                return result
-        xp.put(result, rest, ask(rest))
+        row, column, down, right = (xp.take(part, rest) for part in at)
+        here, up = xp.take(p, rest), xp.take(n, rest)
+        total: Any = 0.0
+        mean: Any = 0.0
+        for one, other, weight in AROUND:
+            index = (row + one * down).clip(0, rows - 1) * columns
+            index = index + (column + other * right).clip(0, columns - 1)
+            value = xp.take(values, index)
+            weight = (
+                weight * (value[0] >= 0) * _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
+            )
+            total, mean = total + weight, mean + weight * value
+        xp.put(result, rest, mean / (total + (total == 0)))
+        rest = xp.take(rest, xp.where(total == 0))
+        if len(rest):
+            xp.put(result, rest, ask(rest))
         return result
 
     def _spread(self, rays: Array, count: int, ask: Callable[[Array], Array], most: float) -> Array:
