@@ -29,7 +29,7 @@ from scenelang.language.diagnostics import Diagnostics
 ENOUGH = 52.0  # decibels of a traced picture's own noise
 BATCH = 64  # paths of a pixel in a batch
 WORST = 3  # pictures that are shown
-FIGURES = "psnr", "clean", "flip", "own_flip", "seconds"  # whose means are told
+FIGURES = "psnr", "clean", "flip", "clean_flip", "own_flip", "seconds"  # whose means are told
 
 
 def scene_of(text: str) -> tuple[Program, Graph]:
@@ -108,6 +108,9 @@ def measure(
             noise = np.random.default_rng(seed).standard_normal(truth.mean.shape) * truth.error
             noisy = over_white(from_light(truth.mean + noise, program.background is None))
             row["own_flip"] = flip(noisy, exact)
+            # squares of errors add, so twice the noise tells how much of it is in FLIP
+            square = 2 * row["flip"] ** 2 - flip(picture, noisy) ** 2
+            row["clean_flip"] = math.sqrt(max(square, 0.0))
             # without the traced picture's noise, whose square adds to that of the error
             square = float(np.mean((picture - exact) ** 2)) - 10 ** (-truth.decibels / 10)
             row["clean"] = min(-10 * math.log10(max(square, 1e-12)), MOST_DB)

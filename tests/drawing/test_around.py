@@ -9,6 +9,7 @@ import scenelang as nsg
 from scenelang.compiler.spaces import Sky, Stage
 from scenelang.drawing.solid.around import Around
 from scenelang.drawing.solid.draw import Lighting
+from scenelang.drawing.solid.soft import ASIDE, WIDE, shown
 from tests.drawing.solids import Object, field, moved, scaled
 
 BALL = Object("sphere", (scaled(0.7),), rgb=(0.8, 0.5, 0.3))
@@ -154,3 +155,58 @@ def test_what_is_kept_for_the_next_picture_changes_nothing() -> None:
     for before in ("light([1, 3, 2], 20);", "light([-1, 3, 2], 20);", "light([1, 3, 2], 9, radius = 0.3);"):
         drawn(before)
         assert (drawn(moved_on) == alone).all()
+
+
+def test_a_small_window_lights_a_black_room_by_its_form_factor() -> None:
+    """Of the sky what comes through a square hole in a thin roof, summed over its area for each point."""
+    text = """nsg 1; canvas(64, 64); ground(none); light(none); sky(1, #fff, #fff);
+        camera([0, 0.5, 0], [0.1, -1, 0]); subtract { box { shell(0.01); scale(1.7320508); } box { scale(0.2); translate(0, 1, 0); }
+            material diffuse { color(#000); } }"""
+    half, low, high = 0.2 / 3**0.5, 1 - 0.005 * 3**0.5, 1 + 0.005 * 3**0.5
+    at = (np.arange(64) + 0.5) / 32 - 1
+
+    def off() -> tuple[float, float]:
+        """The error of the mean, and of points: both as parts of the mean."""
+        seen = around_of(text).seen
+        floor = np.flatnonzero((seen.n[1] > 0.9) & (abs(seen.p[1] + low) < 0.01))
+        p = np.float64(seen.p[:, floor])[:, :, None, None]
+        x, z = half * at[:, None] - p[0], half * at - p[2]
+        rise = low - p[1]
+        further = (high - low) / rise  # through the roof the way must stay within the hole
+        free = (abs(p[0] + x * (1 + further)) < half) & (abs(p[2] + z * (1 + further)) < half)
+        exact = (free * rise**2 / (x * x + z * z + rise**2) ** 2).sum((1, 2)) * (half / 32) ** 2 / np.pi
+        light = seen.received[0, floor]
+        assert len(exact) > 500
+        return float(light.mean() / exact.mean() - 1), float(
+            np.sqrt(((light - exact) ** 2).mean()) / exact.mean()
+        )
+
+    mean, points = off()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scenelang.drawing.solid.around.MORE", 0)
+        evenly = off()[1]
+    assert abs(mean) < 0.04
+    assert points < 0.25 < evenly / 2
+
+
+def test_a_soft_lamp_behind_three_things_is_hidden_by_all() -> None:
+    """Shares of a lamp beside three balls on the way, by straight lines to points of its disc."""
+    balls = [((0.3, -0.05, 1.0), 0.3), ((-0.34, 0.02, 1.8), 0.3), ((0.0, 0.33, 2.6), 0.3)]
+    objects = [Object("sphere", (scaled(size), moved(*at)), rgb=(0.5, 0.5, 0.5)) for at, size in balls]
+    lamp, radius = np.array([0.0, 0.0, 4.0]), 0.15
+    p = np.stack([np.linspace(-0.1, 0.1, 21), 0 * np.arange(21.0), 0 * np.arange(21.0)])
+    n = np.tile([[0.0], [0.0], [1.0]], 21)
+    solids = field(objects).opaque((ASIDE + WIDE) * radius)
+    with solids.xp.inference():
+        share = shown(solids, np.float32(lamp), radius, np.float32(p), np.float32(n))[0]
+    r, turn = np.sqrt((np.arange(4000) + 0.5) / 4000), 2.399963 * np.arange(4000)
+    disc = lamp[:, None] + radius * np.stack([r * np.cos(turn), r * np.sin(turn), 0 * r])
+    way = disc[:, None] - p[:, :, None]  # (3, 21, 4000)
+    way /= np.linalg.norm(way, axis=0)
+    free = np.ones(way.shape[1:], bool)
+    for at, size in balls:
+        to = np.array(at)[:, None, None] - p[:, :, None]
+        along = (to * way).sum(0)
+        free &= (to * to).sum(0) - along**2 > size * size
+    assert share == pytest.approx(free.mean(1), abs=0.1)
+    assert abs(share - free.mean(1)).mean() < 0.04
