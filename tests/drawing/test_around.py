@@ -160,7 +160,8 @@ def test_what_is_kept_for_the_next_picture_changes_nothing() -> None:
 def test_a_small_window_lights_a_black_room_by_its_form_factor() -> None:
     """Of the sky what comes through a square hole in a thin roof, summed over its area for each point."""
     text = """nsg 1; canvas(64, 64); ground(none); light(none); sky(1, #fff, #fff);
-        camera([0, 0.5, 0], [0.1, -1, 0]); subtract { box { shell(0.01); scale(1.7320508); } box { scale(0.2); translate(0, 1, 0); }
+        camera([0, 0.5, 0], [0.1, -1, 0]);
+        subtract { box { shell(0.01); scale(1.7320508); } box { scale(0.2); translate(0, 1, 0); }
             material diffuse { color(#000); } }"""
     half, low, high = 0.2 / 3**0.5, 1 - 0.005 * 3**0.5, 1 + 0.005 * 3**0.5
     at = (np.arange(64) + 0.5) / 32 - 1
