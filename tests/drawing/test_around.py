@@ -157,39 +157,6 @@ def test_what_is_kept_for_the_next_picture_changes_nothing() -> None:
         assert (drawn(moved_on) == alone).all()
 
 
-def test_a_small_window_lights_a_black_room_by_its_form_factor() -> None:
-    """Of the sky what comes through a square hole in a thin roof, summed over its area for each point."""
-    text = """nsg 1; canvas(64, 64); ground(none); light(none); sky(1, #fff, #fff);
-        camera([0, 0.5, 0], [0.1, -1, 0]);
-        subtract { box { shell(0.01); scale(1.7320508); } box { scale(0.2); translate(0, 1, 0); }
-            material diffuse { color(#000); } }"""
-    half, low, high = 0.2 / 3**0.5, 1 - 0.005 * 3**0.5, 1 + 0.005 * 3**0.5
-    at = (np.arange(64) + 0.5) / 32 - 1
-
-    def off() -> tuple[float, float]:
-        """The error of the mean, and of points: both as parts of the mean."""
-        seen = around_of(text).seen
-        floor = np.flatnonzero((seen.n[1] > 0.9) & (abs(seen.p[1] + low) < 0.01))
-        p = np.float64(seen.p[:, floor])[:, :, None, None]
-        x, z = half * at[:, None] - p[0], half * at - p[2]
-        rise = low - p[1]
-        further = (high - low) / rise  # through the roof the way must stay within the hole
-        free = (abs(p[0] + x * (1 + further)) < half) & (abs(p[2] + z * (1 + further)) < half)
-        exact = (free * rise**2 / (x * x + z * z + rise**2) ** 2).sum((1, 2)) * (half / 32) ** 2 / np.pi
-        light = seen.received[0, floor]
-        assert len(exact) > 500
-        return float(light.mean() / exact.mean() - 1), float(
-            np.sqrt(((light - exact) ** 2).mean()) / exact.mean()
-        )
-
-    mean, points = off()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenelang.drawing.solid.around.MORE", 0)
-        evenly = off()[1]
-    assert abs(mean) < 0.04
-    assert points < 0.25 < evenly / 2
-
-
 def test_a_soft_lamp_behind_three_things_is_hidden_by_all() -> None:
     """Shares of a lamp beside three balls on the way, by straight lines to points of its disc."""
     balls = [((0.3, -0.05, 1.0), 0.3), ((-0.34, 0.02, 1.8), 0.3), ((0.0, 0.33, 2.6), 0.3)]

@@ -31,7 +31,7 @@ from scenelang.drawing.solid.nodes import SCATTER, Nodes, ground_places, hollow,
 from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
-DIFFER, AGAIN = 0.3, 4  # light by which nodes around a place differ, above which it sends so many rays
+DIFFER, AGAIN = 0.3, 8  # light by which nodes around a place differ, above which it sends so many rays
 GAP = 0.01  # world units, as of `MarchSettings`
 RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
 DOME = 64  # directions to the sky alone
@@ -55,10 +55,9 @@ OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, above which more rays go, how many times as many at most, and their turns
-NOISE, MORE, FURTHER = (0.03, 0.02), 5, np.array([[0.37], [0.61]])
-HEMISPHERE = 16, 32  # parts by the squared sine to the normal and by turns, which more rays go by
-EVERYWHERE = 0.2  # of these go so as those before
+# of the light on the lattice, above which there are more rays, how many times as many, and their turns
+NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
+LOUD = 7.5  # and how many times that again, by the noise, in hollows
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
@@ -70,13 +69,6 @@ CELLS = 8  # of the grid of nodes, along its longest side
 def disc(r: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Directions (3, …) above places of the unit disc."""
     return np.stack([r * np.cos(angle), r * np.sin(angle), np.sqrt(1 - r * r)])
-
-
-def evenly(numbers: np.ndarray, rays: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places (R, K) of so many rays above points, as of `Around.cast`, which numbers (2, K) turn."""
-    each = np.arange(rays)[:, None]
-    shift, turn = (TURNS @ numbers + 0.5) % 1.0
-    return (each + shift) / rays, (GOLDEN / (2 * np.pi) * each + turn) % 1.0
 
 
 def product(xp: Arrays, a: Array, b: Array) -> Array:
@@ -164,44 +156,6 @@ class Seen(NamedTuple):
     received: Array
 
 
-class Guide:
-    """Light from parts of the hemispheres above points (3, L), which tells where more rays pay: where those
-    of its neighbours met light (path guiding). A ray counts by how densely all turns went its way (Veach's
-    balance heuristic), and a point's own ones tell it nothing, which would be biased.
-    """
-
-    def __init__(self, around: Around, p: Array, n: Array, numbers: np.ndarray) -> None:
-        self.around, self.p, self.n, self.numbers = around, p, n, numbers
-        count, points = HEMISPHERE[0] * HEMISPHERE[1], p.shape[1]
-        self.density = np.zeros((count, points), np.float32)  # of rays, as if each went everywhere
-        self.sums = np.zeros((4, count * points), np.float32)  # of their light, and of rays
-
-    def send(self, rays: int, part: float = 1.0, told: Array = None) -> np.ndarray:
-        """Light (3, L) of all turns and another, that counts in part: evenly, or as light (C, L) tells."""
-        (high, wide), (count, points) = HEMISPHERE, self.density.shape
-        if told is not None:
-            told = np.asarray(self.around.xp.to_numpy(told)).reshape(high, wide, points)
-            told = sum(np.roll(told, (i - 1, j - 1), (0, 1)) for i, j in np.ndindex(3, 3)).reshape(count, -1)
-            told = told + EVERYWHERE * told.mean(0) + 1e-9
-        for start in range(0, points, BATCH // rays):
-            band = slice(start, start + BATCH // rays)
-            (s, t), odds = evenly(self.numbers[:, band], rays), np.float32(1 / count)
-            if told is not None:
-                odds = told[:, band] / told[:, band].sum(0)
-                ends = odds.cumsum(0)
-                cell = np.stack([np.searchsorted(*each) for each in zip(ends[:-1].T, s.T, strict=True)], 1)
-                rest = 1 + (s - np.take_along_axis(ends, cell, 0)) / np.take_along_axis(odds, cell, 0)
-                s, t = (cell // wide + rest.clip(0.0, 0.999)) / high, (cell % wide + t) / wide
-            self.density[:, band] += rays * part * count * odds
-            light = self.around.cast(self.p[:, band], self.n[:, band], s, t, True)
-            light = np.asarray(self.around.xp.to_numpy(light)).reshape(3, -1)
-            cell = np.floor(s * high).astype(int) * wide + np.floor(t * wide).astype(int)
-            index = (cell * points + np.arange(points)[band]).reshape(-1)
-            NUMPY.add(self.sums, index, part * np.concatenate([light, 0 * light[:1] + 1]))
-        light = (self.sums.reshape(4, count, points) / self.density).sum(1)
-        return np.asarray(light[:3] / light[3])
-
-
 class Around:
     """The light that arrives at points of a field under a stage, but for what comes straight from lamps.
 
@@ -272,27 +226,29 @@ class Around:
             there = self.xp.where(p[0] < ELSEWHERE)
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
 
-            def everywhere(values: np.ndarray) -> Array:
-                result = self.xp.full((len(values), p.shape[1]), 0.0, p)
-                self.xp.put(result, there, self.xp.array(values, p))
+            def everywhere(values: Array) -> Array:
+                result = 0 * p[: len(values)]
+                self.xp.put(result, there, values)
                 return result
 
             at, up = self.xp.take(p, there), self.xp.take(n, there)
 
-            guide = Guide(self, at, up, numbers)
-            self.seen, light = Seen(p, n, p), everywhere(guide.send(rays))
+            def received(turn: int) -> Array:
+                return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
+
+            self.seen, light = Seen(p, n, p), received(0)
             even = self._evened(light)
             noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            more = MORE * min(max(noise / NOISE[self.hollow] - 1, 0.0), 1.0)
-            for turn in range(ceil(more)):  # the last one counts in part
-                told = guide.sums[:3].sum(0).reshape(guide.density.shape) / guide.density
-                told = self.xp.take(self._evened(everywhere(told), own=False), there)
-                guide.numbers = numbers + (turn + 1) * FURTHER
-                light = everywhere(guide.send(rays, min(more - turn, 1.0), told))
+            most, total = max(1.0, LOUD * noise * self.finer), 1.0
+            more = MORE * min(max(noise / NOISE - 1, 0.0), most)
+            for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
+                part = min(more - turn, 1.0)
+                total += part
+                light = light + (received(turn + 1) - light) * (part / total)
             even = self._evened(light) if more else even
             even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
             if self.emitters.there:
-                free = everywhere(self.xp.to_numpy(self.emitters.received(at, up)[1][None]))
+                free = everywhere(self.emitters.received(at, up)[1][None])
                 even = self.xp.concat([even, self._evened(free)], 0)
             self.seen = Seen(p, n, even)
 
@@ -478,16 +434,13 @@ class Around:
         result = 0 * p
         for start in range(0, p.shape[1], BATCH // rays):
             band = slice(start, start + BATCH // rays)
-            way = evenly(numbers[:, band], rays)
-            result[:, band] += self.cast(p[:, band], n[:, band], *way, finer).mean(1)
+            result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer)
         return result
 
-    def cast(self, p: Array, n: Array, s: np.ndarray, t: np.ndarray, finer: bool) -> Array:
-        """Light (3, R, K) to points (3, K) from places (R, K) of the hemispheres above them: squared sines
-        to their normals, and turns.
-        """
-        xp, rays = self.xp, len(s)
-        local = disc(np.sqrt(s), 2 * np.pi * t).astype(np.float32)
+    def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
+        xp, each = self.xp, np.arange(rays)[:, None]
+        shift, turn = (TURNS @ numbers + 0.5) % 1.0
+        local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
         light, reach = self.arriving(begin, way, finer and self.finer)
@@ -495,7 +448,7 @@ class Around:
         if self.mist is not None:
             more, clear = self.mist.along(begin, way, reach)
             light = light * clear + more
-        return light.reshape(3, rays, -1)
+        return light.reshape(3, rays, -1).mean(1)
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
@@ -543,16 +496,15 @@ class Around:
         fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
         return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
 
-    def _evened(self, values: Array, own: bool = True) -> Array:
-        """Values (R, L) of points of the lattice, mixed with those around or of these on the same surface."""
+    def _evened(self, values: Array) -> Array:
+        """Values (R, L) of points of the lattice, mixed with those around on the same surface."""
         xp, seen = self.xp, self.seen
         side, result, total = self._places(seen.p)[0], 0 * values, 0 * seen.p[0]
         row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
         for below, right in np.ndindex(3, 3):
             index = (row + below - 1).clip(0, self.rows - 1) * self.columns
             index = xp.array(index + (column + right - 1).clip(0, self.columns - 1), seen.p)
-            weight = (1, 2, 1)[below] * (1, 2, 1)[right] * (own or (below, right) != (1, 1))
-            weight = weight * self._alike(seen.p, seen.n, index, side)
+            weight = (1, 2, 1)[below] * (1, 2, 1)[right] * self._alike(seen.p, seen.n, index, side)
             total, result = total + weight, result + weight * xp.take(values, index)
         return result / total.clip(1e-9)
 
