@@ -94,9 +94,8 @@ class Centres:
             index = (row + one * down).clip(0, rows - 1) * columns
             index = index + (column + other * right).clip(0, columns - 1)
             value = xp.take(values, index)
-            weight = (
-                weight * (value[0] >= 0) * _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
-            )
+            alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
+            weight = weight * (value[0] >= 0) * alike
             total, mean = total + weight, mean + weight * value
         xp.put(result, rest, mean / (total + (total == 0)))
         rest = xp.take(rest, xp.where(total == 0))
