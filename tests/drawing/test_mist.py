@@ -75,6 +75,21 @@ def test_a_lamp_in_the_middle_of_a_ball_of_mist_is_no_star():
         assert light.std() < most * light.mean()
 
 
+def test_a_ball_within_mist_sends_a_lamps_light_back():
+    """What reaches it is power cos / r², less what mist takes on the way."""
+    lit = Stage(lights=(Light((0.0, 0.0, 0.8), 2.0, radius=0.05),), ground=None, sky=Sky(0.0, WHITE, WHITE))
+    solid = Object("sphere", (scaled(0.4),), rgb=GREY)
+    mist = Mist(field_of([Object("sphere", (), "volumetric", GREY), solid], density=(2.0, 2.0)), lit)
+    out = np.linalg.norm(mist.p, axis=0)
+    way = np.array([0.0, 0.0, 0.8]).reshape(3, 1, 1, 1) - mist.p
+    r = np.linalg.norm(way, axis=0)
+    cos = (way * mist.p).sum(0) / r / out
+    near = ~mist.opaque & (out < 0.4 + mist.h) & (cos > 0.3)
+    exact = 2 * cos / r**2 * np.exp(-2 * (r - 0.05))
+    assert near.sum() > 30
+    assert mist.received[0, near].sum() == pytest.approx(exact[near].sum(), rel=0.1)
+
+
 def test_what_gives_off_as_much_as_it_takes_is_in_balance():
     objects = [
         Object("box", (scaled(1.1, 0.6, 0.8),), "volumetric", GREY),

@@ -114,9 +114,10 @@ class Mist:
         self.reflected, self.shining = colour.clip(0.0, WHITEST) * self.opaque, glow * self.opaque
         looks = np.concatenate([colour.clip(0.0, ALBEDO), glow, density[None]]) * self.mist
         # nodes around media have what those next to them have
-        around, count = 0 * looks, 0 * d
+        around, count, hard = 0 * looks, 0 * d, 1.0 * self.opaque
         for shift in AROUND:
             to, on = pair_of(self.sides, shift)
+            hard[to] += self.opaque[on]
             around[:, *to] += looks[:, *on]
             count[to] += self.mist[on]
         looks = np.where(self.mist, looks, around / count.clip(1.0))
@@ -124,6 +125,7 @@ class Mist:
         self.thin = np.minimum(1.0, DEEPEST / (self.h * self.density).clip(1e-9))
         self.thinned = self.density * self.thin
         active = np.flatnonzero(((count > 0) | self.mist) & ~self.opaque)
+        normal = -np.array(np.gradient(hard))  # of what is opaque, next to it; not yet of length 1
         self.slopes = np.array(np.gradient(d, self.h))
         # what arrives (n…,), where it is uneven, and colours with their power
         self.lamps: list[tuple[Any, ...]] = []
@@ -142,7 +144,7 @@ class Mist:
                 away = self.p[:, None, uneven] - at.reshape(3, 1, 1) + self.h * parts
                 own[uneven] = sent[uneven] * _received(np.linalg.norm(away, axis=0), light.radius).mean(0)
             self.lamps.append((own, uneven, light.power * rgb))
-            facing = (self.slopes * (at - self.p)).sum(0).clip(0.0) / r.clip(1e-6)
+            facing = (normal * (at - self.p)).sum(0).clip(0.0) / (r * np.linalg.norm(normal, axis=0) + 1e-6)
             self.received += 4 * light.power * rgb * own * facing
 
     def _reached(self, light: Light, p: np.ndarray) -> np.ndarray:
