@@ -7,7 +7,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.compiler.spaces import Sky, Stage
-from scenelang.drawing.solid.around import Around
+from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.soft import ASIDE, WIDE, shown
 from tests.drawing.solids import Object, field, moved, scaled
@@ -178,3 +178,38 @@ def test_a_soft_lamp_behind_three_things_is_hidden_by_all() -> None:
         free &= (to * to).sum(0) - along**2 > size * size
     assert share == pytest.approx(free.mean(1), abs=0.1)
     assert abs(share - free.mean(1)).mean() < 0.04
+
+
+def test_noise_of_rays_goes_and_edges_stay() -> None:
+    """Twice as bright on a ball as on the ground, and brighter at one place."""
+    around = around_of("nsg 1; canvas(128, 128); sky(0.5); sphere { scale(0.8); translate(0, 0.3, 0); }")
+    p, n = (np.asarray(part, np.float64) for part in around.seen[:2])
+    there = p[0] < 1e5
+    spot = np.exp(-((p[0] - 1) ** 2 + p[2] ** 2) / 0.1) * (n[1] > 0.999)
+    light = np.where(n[1] > 0.999, 1.0 + spot, 2.0) * np.ones((3, 1))
+    noise = np.random.default_rng(3).normal(0, 0.1, light.shape)
+    with around.xp.inference():
+        kept, even = (np.asarray(around._smoothed(np.float32(values))) for values in (light, light + noise))
+    assert (kept - light)[:, there].std() < 0.01
+    assert (even - light)[:, there].std() < 0.03
+
+
+def test_a_small_bright_place_is_found_by_points_next_to_each_other() -> None:
+    """Eight turns of 24 rays, shared with eight neighbours, have half of random turns' square error."""
+    rows, rng = np.stack(np.divmod(np.arange(30 * 30), 30)), np.random.default_rng(4)
+    errors: list[list[float]] = [[], []]
+    for _ in range(10):
+        angle, r = rng.uniform(0, 6.28), rng.uniform(0, 0.7)
+        middle = r * np.array([np.cos(angle), np.sin(angle)])[:, None, None]
+        for which, found in enumerate(errors):
+            light = np.zeros((30, 30))
+            for turn in range(8):
+                even = (TURNS @ (rows + turn * FURTHER) + 0.5) % 1.0
+                shift, turned = rng.random((2, 900)) if which else even
+                at = np.arange(24)[:, None] + shift
+                way = disc(np.sqrt(at / 24), GOLDEN * at + 2 * np.pi * turned)[:2]
+                light += (((way - middle) ** 2).sum(0) < 0.04).mean(0).reshape(30, 30) / 8
+            wide = (light[:, :-2] + 2 * light[:, 1:-1] + light[:, 2:]) / 4
+            wide = (wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4
+            found.append(float(((wide - 0.04) ** 2).mean()))
+    assert np.mean(errors[0]) < np.mean(errors[1]) / 2

@@ -33,7 +33,7 @@ from scenelang.drawing.solid.passes import INF
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
 DIFFER, AGAIN = 0.3, 8  # light by which nodes around a place differ, above which it sends so many rays
 GAP = 0.01  # world units, as of `MarchSettings`
-RARE = 5e-3  # of rays may be given up, but for those that may leave what is closed
+RARE, LAST = 5e-3, 16  # part of rays that are given up, or number, but where they may leave what is closed
 DOME = 64  # directions to the sky alone
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
@@ -46,18 +46,18 @@ GOLDEN = 2.399963  # radians
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # world units before surfaces, where walls are looked for, and how deep these stop light
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
-# points along the picture's shorter side and rays of each, where something glows, where something may be
-# hollow, and where lamps are in media
-LATTICE = (38, 40), (64, 40), (96, 24), (64, 72)
-PIXEL_RAYS = 8  # of pixels that are asked themselves
+# points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
+LATTICE = (52, 12), (96, 16), (96, 24)
+POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin
-TURNS = np.array([[0.7549, 0.5698], [0.5698, 0.7549]])  # of rays, by places (Roberts)
+TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, above which there are more rays, how many times as many, and their turns
-NOISE, MORE, FURTHER = 0.03, 5, np.array([[0.37], [0.61]])
+# of the light on the lattice, and in hollows; with more there are more rays, so many times, turned so
+NOISE, MORE, FURTHER = (0.05, 0.03), 5, np.array([[1.3756], [-0.5877]])
 LOUD = 7.5  # and how many times that again, by the noise, in hollows
+WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
@@ -211,8 +211,7 @@ class Around:
         """Note what points on a lattice of a picture receive; ``places`` tells them (3, L) and their normals
         by places of the picture in pixels.
         """
-        lit = self.mist is not None and self.mist.lit
-        side, rays = LATTICE[2 if self.hollow else 3 if lit else int(self.emitters.there)]
+        side, rays = LATTICE[2 if self.hollow or (self.mist and self.mist.lit) else int(self.emitters.there)]
         self.canvas, self.step = canvas, max(1, round(min(canvas) / side))
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
@@ -236,20 +235,16 @@ class Around:
             def received(turn: int) -> Array:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
-            self.seen, light = Seen(p, n, p), received(0)
-            even = self._evened(light)
-            noise = float(abs(even - light).sum()) / max(float(light.sum()), 1e-9)
-            most, total = max(1.0, LOUD * noise * self.finer), 1.0
-            more = MORE * min(max(noise / NOISE - 1, 0.0), most)
+            self.seen, self.rings, light = Seen(p, n, p), dict[int, tuple[Array, Array]](), received(0)
+            noise = float(abs(self._evened(light) - light).sum()) / max(float(light.sum()), 1e-9)
+            more = MORE * min(max(noise / NOISE[self.finer] - 1, 0.0), max(1.0, LOUD * noise * self.finer))
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
-                total += part
-                light = light + (received(turn + 1) - light) * (part / total)
-            even = self._evened(light) if more else even
-            even = (even + self._evened(light - even)).clip(0.0)  # which leaves bends in the light (Tukey)
+                light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
+            even = self._smoothed(light)
             if self.emitters.there:
                 free = everywhere(self.emitters.received(at, up)[1][None])
-                even = self.xp.concat([even, self._evened(free)], 0)
+                even = self.xp.concat([even, self._smoothed(free)], 0)
             self.seen = Seen(p, n, even)
 
     def sky(self, way: Array) -> Array:
@@ -410,7 +405,7 @@ class Around:
         xp = self.xp
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
-            return self.gathered(p, n, numbers, LATTICE[0][1]) + self._glowing(p, n)
+            return self.gathered(p, n, numbers, POINT_RAYS) + self._glowing(p, n)
         side, u, v = self._places(p)
         result, fits = self._between(p, n, side, u, v)
         alone = xp.where(~fits)
@@ -438,9 +433,9 @@ class Around:
         return result
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
-        xp, each = self.xp, np.arange(rays)[:, None]
-        shift, turn = (TURNS @ numbers + 0.5) % 1.0
-        local = disc(np.sqrt((each + shift) / rays), GOLDEN * each + 2 * np.pi * turn).astype(np.float32)
+        xp, (shift, turn) = self.xp, (TURNS @ numbers + 0.5) % 1.0
+        at = np.arange(rays)[:, None] + shift
+        local = disc(np.sqrt(at / rays), GOLDEN * at + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
         light, reach = self.arriving(begin, way, finer and self.finer)
@@ -456,7 +451,8 @@ class Around:
         """
         xp = self.xp
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit = march(self.field, p, way, limit, 0, GAP, few=self.few).hit
+        few = self.few and max(self.few, LAST / (1 + p.shape[1]))
+        hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
         met, floor = xp.where(hit < INF), xp.where((hit == INF) & (limit < INF))
         light = self.sky(way)
         if len(floor):
@@ -496,17 +492,32 @@ class Around:
         fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
         return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
 
-    def _evened(self, values: Array) -> Array:
-        """Values (R, L) of points of the lattice, mixed with those around on the same surface."""
-        xp, seen = self.xp, self.seen
-        side, result, total = self._places(seen.p)[0], 0 * values, 0 * seen.p[0]
-        row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
-        for below, right in np.ndindex(3, 3):
-            index = (row + below - 1).clip(0, self.rows - 1) * self.columns
-            index = xp.array(index + (column + right - 1).clip(0, self.columns - 1), seen.p)
-            weight = (1, 2, 1)[below] * (1, 2, 1)[right] * self._alike(seen.p, seen.n, index, side)
-            total, result = total + weight, result + weight * xp.take(values, index)
-        return result / total.clip(1e-9)
+    def _smoothed(self, light: Array) -> Array:
+        """Light (3, L) of the lattice without the noise of rays: of points next to each, and of those farther
+        off where that changes it by less than the noise (wavelets à trous).
+        """
+        even = self._evened(light)
+        even = even + self._evened(light - even)  # which leaves bends in the light (Tukey)
+        noise = self._evened(self._evened(abs(light - even).sum(0)[None]))
+        for step, part in WIDER:
+            wide = self._evened(even, step)
+            change = wide + self._evened(even - wide, step) - even
+            much = self._evened(abs(change).sum(0)[None])
+            even = even + change * (2 - much / (part * noise).clip(1e-9)).clip(0.0, 1.0)
+        return even.clip(0.0)
+
+    def _evened(self, values: Array, step: int = 1) -> Array:
+        """Values (R, L) of the lattice, mixed with those so many steps around on the same surface."""
+        xp, seen, shape = self.xp, self.seen, (self.rows, self.columns)
+        if step not in self.rings:
+            to = np.mgrid[-1:2, -1:2].reshape(2, 9, 1)
+            at = np.indices(shape).reshape(2, 1, -1) + step * to
+            index = [xp.array(each, seen.p) for each in np.ravel_multi_index(tuple(at), shape, mode="clip")]
+            side, bell = step * self._places(seen.p)[0], (2 - abs(to)).prod(0)[:, 0].tolist()
+            fits = [k * self._alike(seen.p, seen.n, each, side) for k, each in zip(bell, index, strict=True)]
+            self.rings[step] = xp.concat(index, 0), xp.stack([fit / sum(fits).clip(1e-9) for fit in fits], 0)
+        index, shares = self.rings[step]
+        return (xp.take(values, index).reshape(len(values), 9, -1) * shares).sum(1)
 
     def _between(self, p: Array, n: Array, side: Array, u: Array, v: Array) -> tuple[Array, Array]:
         """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any."""

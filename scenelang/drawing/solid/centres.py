@@ -47,8 +47,7 @@ class Centres:
             xp.put(self.p, rays, p)
             xp.put(self.n, rays, n)
             most = 0.0 if every else INF
-            light = self._spread(rays, 3, lambda index: ask(xp.take(p, index), xp.take(n, index)), most)
-            xp.put(self.light, rays, xp.take(light, rays))
+            self.light = self._spread(rays, 3, lambda at: ask(xp.take(p, at), xp.take(n, at)), most)
             return xp.take(self.light, rays)
         return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))
 
