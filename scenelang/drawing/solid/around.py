@@ -47,7 +47,7 @@ OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less i
 # world units before surfaces, where walls are looked for, and how deep these stop light
 APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
-LATTICE = (52, 12), (96, 16), (96, 24)
+LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 OFF = 1e-3  # world units off a surface where these begin

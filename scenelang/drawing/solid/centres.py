@@ -15,7 +15,7 @@ from typing import Any
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.passes import INF
 
-EACH = 3  # pixels, along both sides, from one that asks to the next
+EACH, LARGE = (2, 3), 160  # pixels, along both sides, from one that asks to the next; and in large pictures
 # differences of shares: from one that asks to the next, and to a pixel's neighbours, whose samples take from
 # around, and of small lamps ask themselves
 EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
@@ -29,8 +29,8 @@ AROUND = (0, 0, 9 / 16), (0, 1, 3 / 16), (1, 0, 3 / 16), (1, 1, 1 / 16)
 class Centres:
     """The centres of rows of pixels, numbered row by row."""
 
-    def __init__(self, xp: Arrays, like: Array, shape: tuple[int, int]) -> None:
-        self.xp, self.shape, count = xp, shape, shape[0] * shape[1]
+    def __init__(self, xp: Arrays, like: Array, shape: tuple[int, int], each: int) -> None:
+        self.xp, self.shape, self.each, count = xp, shape, each, shape[0] * shape[1]
         # of samples, once all centres are known: row and column of the pixel, and the next to each (K,)
         self.pixels: Any = None
         self.p, self.n, self.light = (xp.full((3, count), 0.0, like) for _ in range(3))
@@ -104,16 +104,16 @@ class Centres:
 
     def _spread(self, rays: Array, count: int, ask: Callable[[Array], Array], most: float) -> Array:
         """Values (count, M) that rays (K,) want; between others' where these differ by no more."""
-        xp, (rows, columns) = self.xp, self.shape
+        xp, each, (rows, columns) = self.xp, self.each, self.shape
         result = xp.full((count, rows * columns), UNKNOWN, self.p)
         wanted = 1 * result[0]
         wanted[rays] = 1.0
-        first = xp.where((rays // columns % EACH == 0) & (rays % columns % EACH == 0))
+        first = xp.where((rays // columns % each == 0) & (rays % columns % each == 0))
         if len(first):
             xp.put(result, xp.take(rays, first), ask(first))
         grids = [part.reshape(-1, rows, columns) for part in (result, self.p, self.n)]
-        _fill(xp, [part[:, ::EACH] for part in grids], most)
-        _fill(xp, [part.swapaxes(1, 2) for part in grids], most)
+        _fill(xp, [part[:, ::each] for part in grids], most, each)
+        _fill(xp, [part.swapaxes(1, 2) for part in grids], most, each)
         result = xp.select(wanted > 0, result, wanted)
         rest = xp.where(xp.take(result[0], rays) < 0)
         if len(rest):
@@ -140,21 +140,21 @@ def _same(off: Array, n: Array, other: Array) -> Array:
     return ((n * other).sum(0) > ALIGNED) & (above * above < 4 * APART * APART * square + 1e-12)
 
 
-def _fill(xp: Arrays, grids: list[Array], most: float) -> None:
+def _fill(xp: Arrays, grids: list[Array], most: float, each: int) -> None:
     """Set values (…, R, C) of rows between two that asked, linearly, where both lie on the same surface and
     differ by no more; of grids of values, points and normals.
     """
     values, p, n = grids
-    count = (values.shape[2] - 1) // EACH  # of gaps between
+    count = (values.shape[2] - 1) // each  # of gaps between
     if not count:
         return
-    last = EACH * count
-    a, b = values[:, :, :last:EACH], values[:, :, EACH : last + 1 : EACH]
+    last = each * count
+    a, b = values[:, :, :last:each], values[:, :, each : last + 1 : each]
     agree = (abs(a[0] - b[0]) < most) & (a[0] >= 0) & (b[0] >= 0)
-    for step in range(1, EACH):
-        here, up = (part[:, :, step:last:EACH] for part in (p, n))
+    for step in range(1, each):
+        here, up = (part[:, :, step:last:each] for part in (p, n))
         fits = agree
-        for side in (slice(None, last, EACH), slice(EACH, last + 1, EACH)):
+        for side in (slice(None, last, each), slice(each, last + 1, each)):
             fits = fits & _same(p[:, :, side] - here, n[:, :, side], up)
-        between = a + (b - a) * (step / EACH)
-        values[:, :, step:last:EACH] = xp.select(fits, between, 0 * a + UNKNOWN)
+        between = a + (b - a) * (step / each)
+        values[:, :, step:last:each] = xp.select(fits, between, 0 * a + UNKNOWN)

@@ -18,7 +18,7 @@ from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Ligh
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
 from scenelang.drawing.solid.around import CAP, ELSEWHERE, OFF, RARE, arriving, to_ground
-from scenelang.drawing.solid.centres import EACH, Centres
+from scenelang.drawing.solid.centres import EACH, LARGE, Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
 from scenelang.drawing.solid.march import (
@@ -635,14 +635,14 @@ def _band(
         return result[:4], work
     if samples != "four" and min(canvas) > 1:  # a line of pixels shows too little of what changes
         # from a row that `Centres` asks to another, as bands tell the same of rows that they share
-        near = range(
-            max((rows.start - 2) // EACH * EACH, 0), min(-(-(rows.stop + 1) // EACH) * EACH + 1, height)
-        )
+        each = EACH[min(canvas) > LARGE]
+        first, last = (rows.start - 2) // each * each, -(-(rows.stop + 1) // each) * each + 1
+        near = range(max(first, 0), min(last, height))
         x_centres, y_centres = np.arange(width) + 0.5, np.array(near)[:, None] + 0.5
         xp, like = lighting.xp, lighting.field.network.codes
         useful = lighting.around is not None or any(lamp.light.radius for lamp in lighting.lamps)
         useful = useful and lighting.size(canvas) > SMALLISH
-        centres = Centres(xp, like, (len(near), width)) if useful else None
+        centres = Centres(xp, like, (len(near), width), each) if useful else None
         once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas), centres)
         band = slice(rows.start - near.start, rows.stop - near.start)
         picture = np.ascontiguousarray(once[:4, band])
