@@ -75,6 +75,18 @@ def test_a_lamp_in_the_middle_of_a_ball_of_mist_is_no_star():
         assert light.std() < most * light.mean()
 
 
+def test_what_glows_in_the_middle_of_a_ball_of_mist_is_less_of_a_star():
+    """Its light goes along as many ways as that of a lamp."""
+    core = Object("sphere", (scaled(0.25),), rgb=(0.0, 0.0, 0.0))
+    mist = Object("sphere", (), "volumetric", (0.9, 0.9, 0.9))
+    solids = field_of([mist, core], density=(3.0, 3.0), glow=((0.0, 0.0, 0.0), (5.0, 5.0, 5.0)))
+    found = Mist(solids, Stage(lights=(), ground=None, sky=Sky(0.0, WHITE, WHITE)))
+    found.relight()
+    way = np.random.default_rng(2).normal(size=(3, 500))
+    light = found.medium((0.6 * way / np.linalg.norm(way, axis=0)).astype(np.float32))[0]
+    assert light.std() < 0.07 * light.mean()  # along 14 ways 0.12
+
+
 def test_a_ball_within_mist_sends_a_lamps_light_back():
     """What reaches it is power cos / r², less what mist takes on the way."""
     lit = Stage(lights=(Light((0.0, 0.0, 0.8), 2.0, radius=0.05),), ground=None, sky=Sky(0.0, WHITE, WHITE))

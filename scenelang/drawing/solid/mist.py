@@ -88,7 +88,7 @@ class Mist:
         h = float(min(max(FINE / max(densest, 1e-9), fine), coarse))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
-        self.lit = any(
+        self.lit = (self.field.glowing and self.field.mixed) or any(
             bool(((low < light.position) & (light.position < high)).all()) for light in self.stage.lights
         )
         if ground is not None and high[1] > ground.y:
