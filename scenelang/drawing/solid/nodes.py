@@ -104,8 +104,8 @@ def on_objects(field: SolidField, stage: Stage) -> Nodes:
     # each stands for as much of the surface behind the map
     area = (2 * np.pi * balls**2 / tried.clip(1))[owner].astype(np.float32)
     found = np.bincount(owner, minlength=len(sizes))
-    rank = np.arange(len(owner)) - np.repeat(np.cumsum(found) - found, found)
-    kept = ~glows[owner] | (rank % (found // GLOWING).clip(1)[owner] == 0)
+    number = line - (np.cumsum(tried) - tried)[owner]  # of an object's chords
+    kept = ~glows[owner] | (number % (found // GLOWING).clip(1)[owner] == 0)
     place = xp.array(np.concatenate([at, owner[None], kept[None]]).astype(np.float32), like)
     owner, at, area = (xp.array(part, like) for part in (owner, at, area))
     return _settled(field, stage, field.before(owner, at), owner, area, place)
