@@ -88,7 +88,7 @@ def test_what_glows_in_the_middle_of_a_ball_of_mist_is_less_of_a_star():
 
 
 def test_a_ball_within_mist_sends_a_lamps_light_back():
-    """What reaches it is power cos / r², less what mist takes on the way."""
+    """Light on it is power cos / r², less what mist takes on the way."""
     lit = Stage(lights=(Light((0.0, 0.0, 0.8), 2.0, radius=0.05),), ground=None, sky=Sky(0.0, WHITE, WHITE))
     solid = Object("sphere", (scaled(0.4),), rgb=GREY)
     mist = Mist(field_of([Object("sphere", (), "volumetric", GREY), solid], density=(2.0, 2.0)), lit)
