@@ -513,9 +513,9 @@ class Around:
             to = np.mgrid[-1:2, -1:2].reshape(2, 9, 1)
             at = np.indices(shape).reshape(2, 1, -1) + step * to
             index = [xp.array(each, seen.p) for each in np.ravel_multi_index(tuple(at), shape, mode="clip")]
-            side, bell = step * self._places(seen.p)[0], (2 - abs(to)).prod(0)[:, 0].tolist()
-            fits = [k * self._alike(seen.p, seen.n, each, side) for k, each in zip(bell, index, strict=True)]
-            self.rings[step] = xp.concat(index, 0), xp.stack([fit / sum(fits).clip(1e-9) for fit in fits], 0)
+            side, bell = step * self._places(seen.p)[0], xp.array(np.float32((2 - abs(to)).prod(0)), seen.p)
+            fit = bell * xp.stack([self._alike(seen.p, seen.n, each, side) for each in index], 0)
+            self.rings[step] = xp.concat(index, 0), fit / fit.sum(0).clip(1e-9)
         index, shares = self.rings[step]
         return (xp.take(values, index).reshape(len(values), 9, -1) * shares).sum(1)
 
