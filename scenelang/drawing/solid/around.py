@@ -43,13 +43,15 @@ NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearb
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
+LITTLE = 0.02  # share of a node that is worth the asking
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # world units before surfaces, where walls are looked for, and how deep these stop light
-APART, BETWEEN, WALL = 0.02, (0.25, 0.5, 0.75), 0.02
+APART, BETWEEN, WALL = 0.02, (1 / 3, 2 / 3), 0.02
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
 LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
+WORTH = 0.5  # of the mean light on the lattice, for which points ask what glows with all their rays
 OFF = 1e-3  # world units off a surface where these begin
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
@@ -236,15 +238,17 @@ class Around:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
             self.seen, self.rings, light = Seen(p, n, p), dict[int, tuple[Array, Array]](), received(0)
-            noise = float(abs(self._evened(light) - light).sum()) / max(float(light.sum()), 1e-9)
+            self.worth = WORTH * float(light.sum()) / max(len(there), 1)
+            glow, free = self.emitters.received(at, up, self.worth)
+            whole = max(float(light.sum()) + float((glow * free).sum()), 1e-9)
+            noise = float(abs(self._evened(light) - light).sum()) / whole
             more = MORE * min(max(noise / NOISE[self.finer] - 1, 0.0), max(1.0, LOUD * noise * self.finer))
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
             even = self._smoothed(light)
             if self.emitters.there:
-                free = everywhere(self.emitters.received(at, up)[1][None])
-                even = self.xp.concat([even, self._smoothed(free)], 0)
+                even = self.xp.concat([even, self._smoothed(everywhere(free[None]))], 0)
             self.seen = Seen(p, n, even)
 
     def sky(self, way: Array) -> Array:
@@ -318,14 +322,18 @@ class Around:
         cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
         some = xp.where(lookup.split[cell]) if self.hollow else cell[:0]
         if len(some):
-            nodes = lookup.index[xp.take(cell, some)]  # (k, m)
-            own, near_by = (xp.take(part, some) for part in (at - APART * g, shares.T))
-            free = self._open(xp.stack([own] * nodes.shape[1], 2), nodes).T * near_by
-            shares[some] = (free / free.sum(0).clip(OPEN)).T
+            own, count = shares[some].reshape(-1), shares.shape[1]  # (k m)
+            large = xp.where(own > LITTLE)
+            nodes = xp.take(lookup.index[xp.take(cell, some)].reshape(-1), large)
+            free = self._open(xp.take(at - APART * g, xp.take(some, large // count)), nodes)
+            free, own = free * xp.take(own, large), 0 * own
+            own[large] = free
+            own = own.reshape(-1, count)
+            shares[some] = own / own.sum(1).clip(OPEN)[:, None]
         return cell, shares, g
 
     def _open(self, p: Array, nodes: Array) -> Array:
-        """The part of the light between points (3, k, m) and nodes (k, m) that no wall stops."""
+        """The part (…) of the light between points (3, …) and nodes (…) that no wall stops."""
         xp, n = self.xp, self.nodes
         to = (xp.take(n.p + APART * n.n, nodes.reshape(-1))).reshape(p.shape)
         free = 0 * p[0] + 1
@@ -414,10 +422,10 @@ class Around:
             numbers = np.rint(at * (EIGHTHS * self.step))
             here, up = xp.take(p, alone), xp.take(n, alone)
             xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
-            result[3:, alone] = self.emitters.received(here, up)[1]
+            result[3:, alone] = self.emitters.received(here, up, self.worth)[1]
         if not self.emitters.there:
             return result
-        return result[:3] + result[3] * self.emitters.received(p, n, 0)[0]
+        return result[:3] + result[3] * self.emitters.received(p, n, INF)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""
