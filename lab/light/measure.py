@@ -61,7 +61,7 @@ def reference(
     assert graph.stage is not None
     side = round(graph.samples**0.5)
     how: dict[str, Any] = {"per_side": side, "paths": paths, "enough": ENOUGH, "threads": threads}
-    how |= {"points": points, "batch": BATCH}
+    how |= {"points": points, "batch": min(BATCH, paths // 2)}
     found = traced_picture(world_of(graph), graph.stage, graph.canvas, known=known, **how)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -25,7 +25,6 @@ from scenelang.drawing.solid.network import SolidArrays, Wanted
 from scenelang.web.arrays import ArrayStore
 
 SPREAD = 3.0  # nodes along a side of the ground's map stand at s sinh(SPREAD u)
-EVERY = 4  # of how many things that glow one is asked for
 NOISE = 0.02  # of the light, above which there are more rays
 UNLIKE = 0.15  # of the light of both, by which neighbours differ that are not mixed
 FILLED = 3  # nodes in solids that a surface may be next to, behind each other
@@ -160,7 +159,7 @@ def _glowing(around: Around, p: Floats, counts: Counts) -> Floats:
     result = np.zeros((len(counts(p)), 3, p.shape[1]), np.float32)
     for start in range(0, p.shape[1] if around.emitters.there else 0, BATCH):
         band = slice(start, start + BATCH)
-        point, way, light, clear = around.emitters.seen(p[:, band], None, EVERY)
+        _, point, way, light, clear = around.emitters.seen(p[:, band], None, 0.0)
         light = light * clear
         for row, count in zip(result, counts(way), strict=True):
             around.xp.add(row[:, band], point, light * count / 4)

@@ -1,9 +1,9 @@
 """Surfaces that glow, as light for others: what is small and bright is what cones and few rays miss.
 
-Nodes on what glows (`nodes.py`) are put together to discs, and these to clusters. A point receives the form
-factors of a cluster's discs where a ray to one of them, which change from point to point, is free.
+Nodes on what glows (`nodes.py`) are put together to discs. A point receives the form factors of these. Rays
+to some, drawn by what they send there and anew from point to point, tell how much of that is free.
 
-Letters: J nodes, K points, G clusters, m discs of each.
+Letters: J nodes, K points, D discs.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.nodes import SCATTER, Nodes
 from scenelang.drawing.solid.passes import INF
 
-DISCS, CLUSTER = 1024, 16  # of all that glows, and of one cluster
+DISCS = 1024  # of all that glows
+RAYS, LEAST = 32, 4  # to some of these from each point, where it is bright, and at least
 TURNED = 0.3  # how far apart opposite normals count, twice
-BAND = 1024  # points at once
+BAND = 256  # points at once
 CLEAR = 0.02  # world units before a disc where rays to it end
-GOLDEN = 0.618034
-DIM = 1e-5  # light that no ray is worth
-GAP = 0.002  # world units, as of `MarchSettings`
+DIM = 1e-4  # light that is worth few rays
+GAP = 0.01  # world units, as of `MarchSettings`
 
 
 class Emitters:
-    """The nodes that glow, as discs in clusters."""
+    """The nodes that glow, as discs."""
 
     def __init__(self, field: SolidField, nodes: Nodes) -> None:
         self.field, self.xp = field, field.xp
@@ -49,37 +49,34 @@ class Emitters:
                 beyond = along > (along.min() + along.max()) / 2
                 halves += [group[~beyond], group[beyond]]
             groups = halves
-        discs = []
+        discs = [np.zeros(10)] * (not groups)
         for group in groups:
             own, faces = area[group], (n[:, group] * area[group]).sum(1)
             size = float(np.linalg.norm(faces))
             centre, light = ((part[:, group] * own).sum(1) / max(own.sum(), 1e-12) for part in (p, glow))
             discs.append(np.concatenate([centre, faces / max(size, 1e-12), light, [own.sum()]]))
-        shape = (10, -1, CLUSTER)  # siblings are neighbours
-        discs = self.xp.array(np.reshape(np.array(discs, np.float32).T, shape), nodes.p) if discs else nodes.p
-        self.p, self.n, self.glow, self.area = discs[:3], discs[3:6], discs[6:9], discs[-1]
+        each = self.xp.array(np.array(discs, np.float32).T.copy(), nodes.p)  # siblings are neighbours
+        self.p, self.n, self.glow, self.area = each[:3], each[3:6], each[6:9], each[-1]
 
-    def received(self, p: Array, n: Array, every: int = 1) -> tuple[Array, Array]:
+    def received(self, p: Array, n: Array, worth: float = 0.0) -> tuple[Array, Array]:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows if nothing
-        hides it, and the part (K,) that arrives; ``every`` as of `seen`.
+        hides it, and the part (K,) that arrives; ``worth`` as of `seen`.
         """
-        result, part = 0 * p, 0 * p[0]
+        result, part = 0 * p, 0 * p[:1]
         for start in range(0, p.shape[1] if self.there else 0, BAND):
             band = slice(start, start + BAND)
-            point, _, light, clear = self.seen(p[:, band], n[:, band], every)
-            self.xp.add(result[:, band], point, light)
-            self.xp.add(part[None, band], point, (light.sum(0) * clear)[None])
-        return result, part / result.sum(0).clip(1e-9)
+            result[:, band], point, _, light, clear = self.seen(p[:, band], n[:, band], worth)
+            self.xp.add(part[:, band], point, (light.sum(0) * clear)[None])
+        return result, part[0] / result.sum(0).clip(1e-9)
 
-    def seen(self, p: Array, n: Array | None, every: int = 1) -> tuple[Array, Array, Array, Array]:
-        """Clusters that points (3, K) see: numbers (k,) of the points, unit directions (3, k), and what
-        surfaces with unit normals (3, K) receive of them if nothing hides them (3, k), without normals those
-        that face them, and the part of it (k,) that arrives.
-
-        Rays go to each ``every``th cluster, by turns; others are hidden as much as these, and none with 0.
+    def seen(self, p: Array, n: Array | None, worth: float) -> tuple[Array, Array, Array, Array, Array]:
+        """What surfaces with unit normals (3, K) receive at points (3, K) if nothing hides it (3, K), without
+        normals those that face each disc. Of some rays from each point numbers (k,) of the points, unit
+        directions (3, k), light of the discs there (3, k), in sum what is received, and the part of it (k,)
+        that arrives. There are fewer where less light than ``worth`` is received, none where that is inf.
         """
         xp = self.xp
-        to = [self.p[axis] - p[axis][:, None, None] for axis in range(3)]  # (K, G, m) each
+        to = [self.p[axis] - p[axis][:, None] for axis in range(3)]  # (K, D) each
         square = np.pi * (to[0] * to[0] + to[1] * to[1] + to[2] * to[2])
         there = -sum(to[axis] * self.n[axis] for axis in range(3)).clip(None, 0.0)
         # where it is as near as it is wide, a disc sends light from below the point rather than its middle
@@ -89,29 +86,24 @@ class Emitters:
         if n is None:
             here = xp.sqrt(square)
         else:
-            here = sum(to[axis] * n[axis][:, None, None] for axis in range(3)).clip(0.0)
+            here = sum(to[axis] * n[axis][:, None] for axis in range(3)).clip(0.0)
         form = self.area * here * there / (square * (np.pi * square + self.area)).clip(1e-12)
-        light = xp.stack([(form * row).sum(2) for row in self.glow], 0)  # (3, K, G)
-        turn = (SCATTER @ np.asarray(xp.to_numpy(p), np.float64))[:, None] + GOLDEN * np.arange(form.shape[1])
-        sums = form.cumsum(2)  # each point asks for one of a cluster's discs, by what they send
-        below = sums < (sums[..., -1] * xp.array((turn % 1.0).astype(np.float32), p))[..., None]
-        chosen = below.sum(2).clip(None, form.shape[2] - 1)
-        some = xp.where(light.sum(0).reshape(-1) > DIM)
-        groups, size = self.area.shape
-        point, cluster = some // groups, some % groups
-        disc = cluster * size + xp.take(chosen.reshape(-1), some)
+        light = xp.stack([(form * row).sum(1) for row in self.glow], 0)
+        if worth == INF:
+            return light, xp.whole(0 * p[0, :0]), p[:, :0], p[:, :0], p[0, :0]
+        sums, bright = (form * self.glow.sum(0)).cumsum(1), self.glow.sum(0).clip(1e-9)
+        turn = (SCATTER @ np.asarray(xp.to_numpy(p), np.float64) % 1.0)[:, None].astype(np.float32)
+        # a disc has as many rays as there are whole numbers that the sum passes with it
+        whole = sums[:, -1:]
+        each = (whole * (RAYS / max(worth, DIM))).clip(LEAST, RAYS)
+        passed = xp.floor(sums * (each / whole.clip(DIM)) + xp.array(turn, p))
+        many = xp.concat([passed[:, :1], passed[:, 1:] - passed[:, :-1]], 1).reshape(-1)
+        some = xp.where(many > 0)
+        point, disc = some // len(self.area), some % len(self.area)
         begin = xp.take(p if n is None else p + LIFT * n, point)
-        way = xp.take(self.p.reshape(3, -1), disc) - begin
+        way = xp.take(self.p, disc) - begin
         far = xp.sqrt((way * way).sum(0)).clip(1e-6)
-        way, light = way / far, xp.take(light.reshape(3, -1), some)
-        if not every:
-            return point, way, light, 0 * far + 1
-        asked = xp.where((point + cluster) % every == 0)
-        begin, ways = xp.take(begin, asked), xp.take(way, asked)
-        trail = march(self.field, begin, ways, xp.take(far, asked) - CLEAR, 0, GAP, True)
-        clear = (trail.hit == INF) * xp.exp(-trail.depth)
-        if every > 1:
-            sums, at, bright = xp.full((2, p.shape[1]), 0.0, p), xp.take(point, asked), light.sum(0)[asked]
-            xp.add(sums, at, xp.stack([bright * clear, bright], 0))
-            clear = xp.take(sums[0] / sums[1].clip(1e-9), point)
-        return point, way, light, clear
+        trail = march(self.field, begin, way / far, far - CLEAR, 0, GAP, True)
+        share = xp.take(many, some) * xp.take(sums[:, -1] / passed[:, -1].clip(1.0), point)
+        sent = xp.take(self.glow / bright, disc) * share
+        return light, point, way / far, sent, (trail.hit == INF) * xp.exp(-trail.depth)
