@@ -114,6 +114,27 @@ def test_an_edge_hides_the_half_of_what_glows(worth: float) -> None:
     assert free.std() < 0.1
 
 
+BOWL = """sphere { shell(0.09); scale(1.1); translate(0, 0.12, 0); material diffuse { color(#fff); } }
+    capsule { scale(0.3); rotate(90deg); translate(1.4, -0.85, 0.5); material diffuse { color(#fff); } }"""
+GREY = "material diffuse { color(#ccc); }"
+SIX = "".join(
+    f"box {{ scale({', '.join('0.087' if i == axis else '1.82' for i in range(3))}); "
+    f"translate({', '.join(str(side * (i == axis)) for i in range(3))}); {GREY} }}"
+    for axis in range(3)
+    for side in (-1, 1)
+)
+
+
+@pytest.mark.parametrize("closed", [BOWL, SIX], ids=["shell", "boxes"])
+def test_no_light_leaves_what_is_closed(closed: str) -> None:
+    """A ball glows within a shell, or within six boxes, and all else is dark."""
+    text = f"""nsg 1; canvas(64, 48); light(none); sky(0); background(#000); ground(-1.05, #fff);
+        camera([2, 1.5, 5], [0, -0.3, 0], 40deg); {closed}
+        sphere {{ scale(0.4); translate(0.3, -0.3, 0); material diffuse {{ glow(#fff, 5); }} }}
+        sphere {{ scale(0.15); translate(-1.3, -0.8, 0.3); material diffuse {{ color(#fff); }} }}"""
+    assert np.asarray(nsg.render(nsg.compile(nsg.loads(text))))[..., :3].max() < 0.01
+
+
 @pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
 def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""

@@ -43,10 +43,11 @@ NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearb
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
+CLOSED = 0.1  # of nodes on objects, more of which see nothing but objects in what is closed
 LITTLE = 0.02  # share of a node that is worth the asking
 OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
-# world units before surfaces, where walls are looked for, and how deep these stop light
-APART, BETWEEN, WALL = 0.02, (1 / 3, 2 / 3), 0.02
+# so far before surfaces, in world units, parts of a way, and at most, ways begin and end that walls may cross
+APART, RISE, HIGHEST = 0.02, 0.3, 0.1
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
 LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
@@ -175,24 +176,26 @@ class Around:
         )
         self.seen: Any = None  # a `Seen`, once a picture is looked at
         self.mist = Mist(field, stage) if field.media else None
-        own, floor = on_objects(field, stage), on_ground(field, stage)
-        self.emitters = Emitters(field, own)
-        kept = xp.where(own.place[4] > 0)
-        own = Nodes(*(xp.take(part, kept) for part in own))
-        self.first = own.p.shape[1]  # node of the ground
-        self.lookup: Any = Lookup(xp, own) if self.first else None
-        self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
-        self.count = self.nodes.p.shape[1]
-        self.hollow = hollow(field)
-        self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
-        with xp.inference():
-            if self.hollow and self.lookup is not None:
-                index = self.lookup.index
-                to = xp.take(self.nodes.p + APART * self.nodes.n, index[:, 0])
-                free = self._open(xp.stack([to] * index.shape[1], 2), index)
-                self.lookup.split = xp.least(free.T) < 1
-            matrix, less = self._exchange(RAYS[self.hollow])
-            self.exchange = matrix, self._dome(self.nodes.n) + less
+        for self.hollow in (hollow(field), True):  # again where walls turn out to be all around many nodes
+            own, floor = on_objects(field, stage, self.hollow), on_ground(field, stage, self.hollow)
+            self.emitters = Emitters(field, own)
+            kept = xp.where(own.place[4] > 0)
+            own = Nodes(*(xp.take(part, kept) for part in own))
+            self.first = own.p.shape[1]  # node of the ground
+            self.lookup: Any = Lookup(xp, own) if self.first else None
+            self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
+            self.count = self.nodes.p.shape[1]
+            self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
+            with xp.inference():
+                if self.hollow and self.lookup is not None:
+                    index = self.lookup.index
+                    first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
+                    free = self._open(xp.take(own.p, first), xp.take(own.n, first), index.reshape(-1))
+                    self.lookup.split = xp.least(free.reshape(index.shape).T) < 1
+                matrix, less = self._exchange(RAYS[self.hollow])
+                self.exchange = matrix, self._dome(self.nodes.n) + less
+            if self.hollow or self.closed < CLOSED:
+                break
         self.light(lamps)
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
@@ -287,6 +290,9 @@ class Around:
             light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
             xp.add(escaped, node, light * share)
             through = share * clear
+        within, weight = hit[: self.first * rays[0]] < INF, nodes.weight[: self.first]
+        within = weight * (within.reshape(self.first, -1).sum(1) == rays[0])
+        self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
         met = xp.where(hit < INF)
         if len(met) and self.lookup is not None:
             ways = xp.take(way, met)
@@ -320,31 +326,24 @@ class Around:
         way = WAY * way + g
         lookup: Lookup = self.lookup
         cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
-        some = xp.where(lookup.split[cell]) if self.hollow else cell[:0]
-        if len(some):
-            own, count = shares[some].reshape(-1), shares.shape[1]  # (k m)
-            large = xp.where(own > LITTLE)
-            nodes = xp.take(lookup.index[xp.take(cell, some)].reshape(-1), large)
-            free = self._open(xp.take(at - APART * g, xp.take(some, large // count)), nodes)
-            free, own = free * xp.take(own, large), 0 * own
-            own[large] = free
-            own = own.reshape(-1, count)
-            shares[some] = own / own.sum(1).clip(OPEN)[:, None]
+        if self.hollow:  # where no wall is between its nodes, one of a cell tells of all
+            split, most, count = lookup.split[cell][:, None], xp.largest(shares.T).T, shares.shape[1]
+            large = xp.where((split & (shares > LITTLE) | (shares >= most)).reshape(-1))
+            nodes, place = xp.take(lookup.index[cell].reshape(-1), large), large // count
+            free = 0 * shares
+            free.reshape(-1)[large] = self._open(xp.take(at, place), xp.take(-g, place), nodes)
+            shares = shares * xp.select(split, free, xp.largest(free.T).T)
+            shares = shares / shares.sum(1).clip(OPEN)[:, None]
         return cell, shares, g
 
-    def _open(self, p: Array, nodes: Array) -> Array:
-        """The part (…) of the light between points (3, …) and nodes (…) that no wall stops."""
-        xp, n = self.xp, self.nodes
-        to = (xp.take(n.p + APART * n.n, nodes.reshape(-1))).reshape(p.shape)
-        free = 0 * p[0] + 1
-        for t in BETWEEN:
-            at = (p + (to - p) * t).reshape(3, -1)
-            met = near(self.field, at, 0 * at[0] + GAP, Wanted.KIND if self.field.mixed else Wanted.DISTANCE)
-            clear = (1 + met.distance * (1 / WALL)).clip(0.0, 1.0)
-            if self.field.mixed:
-                clear = xp.maximum(clear, 1.0 * (met.register[0] >= 0.5))
-            free = xp.minimum(free, clear.reshape(nodes.shape))
-        return free
+    def _open(self, p: Array, n: Array, nodes: Array) -> Array:
+        """Whether (K,) no wall is between points (3, K) with unit normals (3, K) and nodes (K,): 1 or 0."""
+        xp, other, up = self.xp, *(self.xp.take(part, nodes) for part in (self.nodes.p, self.nodes.n))
+        lift = (APART + RISE * xp.length(list(other - p))).clip(None, HIGHEST)  # over what is round
+        p = p + lift * n
+        to = other + lift * up - p
+        far = xp.length(list(to)).clip(1e-6)
+        return 1.0 * (march(self.field, p, to / far, far, 0, GAP, True).hit == INF)
 
     def _on_floor(self, at: Array) -> tuple[Array, Array, Array]:
         """Nodes (4, K) around points on the ground, their shares, and how much is kept in the fade."""

@@ -83,10 +83,7 @@ class Emitters:
         far = square / (square + self.area).clip(1e-12)
         to = [far * to[axis] - (1 - far) * there * self.n[axis] for axis in range(3)]
         square = to[0] * to[0] + to[1] * to[1] + to[2] * to[2]
-        if n is None:
-            here = xp.sqrt(square)
-        else:
-            here = sum(to[axis] * n[axis][:, None] for axis in range(3)).clip(0.0)
+        here = xp.sqrt(square) if n is None else sum(to[i] * n[i][:, None] for i in range(3)).clip(0.0)
         form = self.area * here * there / (square * (np.pi * square + self.area)).clip(1e-12)
         light = xp.stack([(form * row).sum(1) for row in self.glow], 0)
         if worth == INF:
