@@ -24,7 +24,7 @@ ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of rays
 COARSE, FINE = 18, 400  # parts of a chord that are not looked into, of objects, and of those that glow
 CHORDS, GLOWING = 24000, 400  # of those that glow, and nodes of the light on each
-NODES, LEAST, MOST = 200, 20, 400  # on all objects, on one at least and at most
+NODES, LEAST, MOST = 200, (20, 80), 400  # on all objects, on one at least, in hollows, and at most
 ALL = 2400  # at most
 HOLLOW = 8  # times as many where something may be hollow
 COVERED = 0.06  # world units by which a surface is covered where its nodes have faded
@@ -93,7 +93,7 @@ def on_objects(field: SolidField, stage: Stage, hollow: bool) -> Nodes:
     glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
     more = HOLLOW if hollow else 1
     shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
-    counts = _bounded(np.ceil(shares.clip(LEAST, more * MOST)), ALL)
+    counts = _bounded(np.ceil(shares.clip(LEAST[hollow], more * MOST)), ALL)
     balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
     tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
     parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
