@@ -291,7 +291,7 @@ class Around:
             xp.add(escaped, node, light * share)
             through = share * clear
         within, weight = hit[: self.first * rays[0]] < INF, nodes.weight[: self.first]
-        within = weight * (within.reshape(self.first, -1).sum(1) == rays[0])
+        within = weight * (within.reshape(-1, rays[0]).sum(1) == rays[0])
         self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
         met = xp.where(hit < INF)
         if len(met) and self.lookup is not None:
