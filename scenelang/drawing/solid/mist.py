@@ -34,11 +34,11 @@ Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
 Slices = tuple[slice, ...]
 
-NODES = 20**3, 32**3  # of a lattice, about, and of dense media,
+NODES, MANY = (18**3, 22**3), 32**3  # of a lattice, with lamps within, and where media are dense
 FINE = 0.5  # whose optical depth from a node to the next is this
 DEEPEST = 2.5  # optical depth from a node to the next; denser media are drawn thinner
 DEEP = 3.0  # cells by which points move inwards at most, where these are
-ENOUGH = 6e-3, 3e-4  # of the most light there is, by which the last sweep changes it; with lamps within;
+ENOUGH = 1e-2, 3e-4  # of the most light there is, by which the last sweep changes it; with lamps within;
 FIRST = 5e-2  # and where the ground's light is not known
 SWEEPS, KEPT = 60, 6  # at most, and as many of the last tell where the next begins
 DARK = 1e-30
@@ -79,18 +79,18 @@ class Mist:
 
     def _place(self, low: np.ndarray, high: np.ndarray) -> None:
         """Lay the lattice around a box; it moves with the box, and has more nodes only where nothing is."""
+        self.lit = (self.field.glowing and self.field.mixed) or any(
+            bool(((low < light.position) & (light.position < high)).all()) for light in self.stage.lights
+        )
         a, b, c = (high - low).clip(1e-3).tolist()
         coarse, fine = (  # where the product of a / h + 2 and the others is the number of nodes
             1 / np.roots([a * b * c, 2 * (a * b + b * c + c * a), 4 * (a + b + c), 8 - count]).real.max()
-            for count in NODES
+            for count in (NODES[self.lit], MANY)
         )
         densest = float((self.field.density * self.field.looks[-1]).max())
         h = float(min(max(FINE / max(densest, 1e-9), fine), coarse))
         self.h, ground = h, self.stage.ground
         self.low = low - 0.999 * h
-        self.lit = (self.field.glowing and self.field.mixed) or any(
-            bool(((low < light.position) & (light.position < high)).all()) for light in self.stage.lights
-        )
         if ground is not None and high[1] > ground.y:
             self.low[1] = max(self.low[1], ground.y + 1e-3)
         self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
