@@ -70,10 +70,10 @@ class Emitters:
         return result, part[0] / result.sum(0).clip(1e-9)
 
     def seen(self, p: Array, n: Array | None, worth: float) -> tuple[Array, Array, Array, Array, Array]:
-        """What surfaces with unit normals (3, K) receive at points (3, K) if nothing hides it (3, K), without
-        normals those that face each disc. Of some rays from each point numbers (k,) of the points, unit
-        directions (3, k), light of the discs there (3, k), in sum what is received, and the part of it (k,)
-        that arrives. There are fewer where less light than ``worth`` is received, none where that is inf.
+        """Light (3, K) that surfaces receive at points (3, K) with unit normals (3, K) if nothing hides it;
+        without normals, surfaces that face each disc. Of some rays from each point numbers (k,) of the points,
+        unit directions (3, k), light of the discs there (3, k), in sum what is received, and the part of it
+        (k,) that arrives. There are fewer where less is received than ``worth``, none where that is inf.
         """
         xp = self.xp
         to = [self.p[axis] - p[axis][:, None] for axis in range(3)]  # (K, D) each
