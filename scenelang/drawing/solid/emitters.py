@@ -71,7 +71,7 @@ class Emitters:
 
     def seen(self, p: Array, n: Array | None, worth: float) -> tuple[Array, Array, Array, Array, Array]:
         """Light (3, K) that surfaces receive at points (3, K) with unit normals (3, K) if nothing hides it;
-        without normals, surfaces that face each disc. Of some rays from each point numbers (k,) of the points,
+        without normals, surfaces that face each disc. Of some rays from each point numbers (k,) of points,
         unit directions (3, k), light of the discs there (3, k), in sum what is received, and the part of it
         (k,) that arrives. There are fewer where less is received than ``worth``, none where that is inf.
         """
