@@ -160,8 +160,9 @@ def _glowing(around: Around, p: Floats, counts: Counts) -> Floats:
     for start in range(0, p.shape[1] if around.emitters.there else 0, BATCH):
         band = slice(start, start + BATCH)
         _, point, way, light, clear = around.emitters.seen(p[:, band], None, 0.0)
+        light = light * clear
         for row, count in zip(result, counts(way), strict=True):
-            around.xp.add(row[:, band], point, light * clear * count / 4)
+            around.xp.add(row[:, band], point, light * count / 4)
     return result.reshape(-1, p.shape[1])
 
 
