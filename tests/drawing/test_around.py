@@ -7,6 +7,7 @@ import pytest
 
 import scenelang as nsg
 from scenelang.compiler.spaces import Sky, Stage
+from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.soft import ASIDE, WIDE, shown
@@ -43,7 +44,7 @@ def around_of(text: str) -> Around:
 def test_all_of_an_even_sky_comes_to_what_is_convex() -> None:
     """(1/π) ∫ L cos θ dω is L."""
     light = received([BALL], EVEN, *on_ball(300, 0.7))
-    assert light == pytest.approx(np.tile([[0.3], [0.48], [0.6]], 300), rel=0.02)
+    assert light == pytest.approx(np.tile([[0.3], [0.48], [0.6]], 300), rel=0.025)
 
 
 def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
@@ -147,20 +148,24 @@ def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     assert light == pytest.approx(np.full_like(light, 0.3), rel=0.06)
 
 
-def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow() -> None:
+@pytest.mark.parametrize("high", [0.5, 0.005])
+def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow_or_close(high: float) -> None:
     """Ground below a roof's edge and a lamp above: power cos / r² on one side of a plane, 0 on the other."""
-    around = around_of("""nsg 1; canvas(16, 16); light([0, 2, 0], 20); sky(0); camera([0, 2, 9], [0, 0, 0]);
-        box { scale(1.732, 0.05, 3); translate(1, 1, 0); material diffuse { color(#000); } }
-        subtract { sphere { shell(0.2); scale(0.4); } box { scale(0.2); } translate(-6, 0, -6); }""")
+    hollow = "subtract { sphere { shell(0.2); scale(0.4); } box { scale(0.2); } translate(-6, 0, -6); }"
+    around = around_of(f"""nsg 1; canvas(16, 16); light([0, 2, 0], 20); sky(0); camera([0, 2, 9], [0, 0, 0]);
+        box {{ scale(1.732, 0.05, 3); translate(1, 1, 0); material diffuse {{ color(#000); }} }}
+        {hollow if high > 0.1 else ""}""")
     x = np.array([-0.3, -0.1, -0.03, 0.03, 0.1, 0.3], np.float32)  # the roof's edge is at 0, below the lamp
-    p, way = np.stack([x, 0 * x - 0.5, 0 * x]), np.tile(np.float32([[1e-4], [-1.0], [1e-4]]), len(x))
-    light, far = around.arriving(p, way, True)
-    assert far == pytest.approx(0.5)
+    p, way = np.stack([x, high - 1 + 0 * x, 0 * x]), np.tile(np.float32([[1e-4], [-1.0], [1e-4]]), len(x))
+    with NUMPY.inference():
+        light, far = around.arriving(p, way, True)
+        nodes = around.arriving(p, way)[0]
+    assert far == pytest.approx(high, rel=1e-3)
     square = x * x + 9
     exact = around.nodes.colour[0, -1] * 20 * 3 / square**1.5 * (x < 0)
     most = float(exact.max())
     assert light[0] == pytest.approx(exact, abs=0.02 * most)
-    assert abs(around.arriving(p, way)[0][0] - exact).max() > 0.1 * most  # as nodes have it
+    assert abs(nodes[0] - exact).max() > 0.1 * most
 
 
 MOVED = """nsg 1; canvas(64, 64); sky(0.6);

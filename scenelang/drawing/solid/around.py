@@ -21,6 +21,7 @@ import numpy as np
 
 from scenelang.compiler.spaces import FADE, LIFT, Ground, Sky, Stage
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
+from scenelang.drawing.solid.centres import UNKNOWN
 from scenelang.drawing.solid.emitters import Emitters
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
@@ -31,9 +32,11 @@ from scenelang.drawing.solid.nodes import SCATTER, Nodes, ground_places, hollow,
 from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
-DIFFER, AGAIN = 0.3, 8  # light by which nodes around a place differ, above which it sends so many rays
+# light by which nodes around a place differ, and world units from a place, for which that sends so many rays
+DIFFER, SHORT, AGAIN = 0.3, 0.6, 5
 GAP = 0.01  # world units, as of `MarchSettings`
-RARE, LAST = 5e-3, 16  # part of rays that are given up, or number, but where they may leave what is closed
+# part of rays that are given up, or number, but where they may leave what is closed, and of rays to nodes
+RARE, LAST, OFTEN = 5e-3, 16, 0.04
 DOME = 64  # directions to the sky alone
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
@@ -113,13 +116,9 @@ class Lookup:
         self.index = xp.array(np.concatenate(found).astype(np.int64), nodes.p)  # (6 cells, k)
         self.split: Any = None  # cells with walls between their nodes (6 cells,)
         # what places ask, cell by cell: positions, normals and weights of its nodes (cells, 7, k)
-        self.about = self.rows(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0))
+        about = xp.take(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0), self.index.reshape(-1))
+        self.about = xp.packed(about.reshape(len(about), *self.index.shape).swapaxes(0, 1))
         self.room = float(self.side / 4) ** 2  # the square of how near is near
-
-    def rows(self, values: Array) -> Array:
-        """Values (R, J) of nodes, cell by cell (cells, R, k)."""
-        rows = self.xp.take(values[:, : len(self.nodes.weight)], self.index.reshape(-1))
-        return self.xp.packed(rows.reshape(len(values), *self.index.shape).swapaxes(0, 1))
 
     def near(self, p: Array, way: Array) -> tuple[Array, Array]:
         """Cells (K,) of points (3, K), and shares (K, k) of the nodes near them that face against unit
@@ -144,10 +143,6 @@ class Lookup:
         square = square + ASIDE * (above * above)
         shares = about[:, 6] * (facing.clip(0.0) ** 2 + 1e-5) / (square * square)
         return cell, shares / shares.sum(1).clip(1e-20)[:, None]
-
-    def mixed(self, rows: Array, cell: Array, shares: Array) -> Array:
-        """Values (R, K) of nodes, as `rows` has them, by their shares."""
-        return (rows[cell] * shares[:, None]).sum(2).T
 
 
 class Seen(NamedTuple):
@@ -205,7 +200,6 @@ class Around:
             direct = lamps(n.p, n.n) + self._glowing(n.p, n.n)
             received = self._solved(direct)
             self.sent = n.colour.clip(0.0, CAP) * (direct + received)  # (3, J), without what glows
-            self.sent_rows = self.lookup.rows(self.sent) if self.lookup else None
         if self.mist is not None:
             self.mist.relight(self._floored)
             self.medium = self.mist.medium
@@ -285,7 +279,7 @@ class Around:
         way = turned(xp, xp.take(nodes.n, node), xp.array(disc(r, angle).astype(np.float32), nodes.p))
         p = xp.take(nodes.p + LIFT * nodes.n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=self.few).hit, share
+        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=self.few and OFTEN).hit, share
         if self.mist is not None:
             light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
             xp.add(escaped, node, light * share)
@@ -378,37 +372,20 @@ class Around:
                 break
         return x
 
-    def _floored(self, at: Array, finer: bool = False) -> Array:
+    def _floored(self, at: Array) -> Array:
         """What the ground sends (3, K) from points (3, K) of it."""
         index, shares, kept = self._on_floor(at)
-        sent = self._mixed(self.sent, index, shares)
-        if finer:
-            sent = sent + self._finer(at, self.xp.take(self.nodes.n, index[0]), index, shares)
-        return sent * kept + self.horizon * (1 - kept)
-
-    def _finer(self, p: Array, n: Array, index: Array, shares: Array) -> Array:
-        """Light (3, K) that points (3, K) with unit normals send beyond that of nodes around them, of such
-        indices and shares (k, K), where these differ much, as few rays tell; not of what glows.
-        """
-        xp, result = self.xp, 0 * p
-        sent = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
-        off = xp.sqrt((shares * (sent - (sent * shares).sum(0)) ** 2).sum(0))
-        if len(some := xp.where(off > DIFFER)):
-            p, n, index, shares = (xp.take(part, some) for part in (p, n, index, shares))
-            at = SCATTER[:, None] * np.asarray(xp.to_numpy(p), np.float64)
-            here = self.lamps(p, n) + self.gathered(p, n, at[:2] + at[2], AGAIN, False)
-            more = self._mixed(self.nodes.colour.clip(0.0, CAP), index, shares) * here
-            part = (xp.take(off, some) * (1 / DIFFER) - 1).clip(None, 1.0)
-            xp.put(result, some, part * (more - self._mixed(self.sent, index, shares)))
-        return result
+        return self._mixed(self.sent, index, shares) * kept + self.horizon * (1 - kept)
 
     def _mixed(self, values: Array, index: Array, shares: Array) -> Array:
         """Values (3, K) of those of nodes (3, J) by their indices and shares (k, K)."""
         xp, flat = self.xp, index.reshape(-1)
         return xp.stack([(xp.take(row, flat).reshape(index.shape) * shares).sum(0) for row in values], 0)
 
-    def surface(self, p: Array, n: Array) -> Array:
-        """What surfaces receive (3, K) at points (3, K) with unit normals (3, K)."""
+    def surface(self, p: Array, n: Array, last: bool = True) -> Array:
+        """What surfaces receive (3, K) at points (3, K) with unit normals (3, K); where the lattice does not
+        tell, `UNKNOWN` unless it is the ``last`` time of asking.
+        """
         xp = self.xp
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
@@ -416,11 +393,13 @@ class Around:
         side, u, v = self._places(p)
         result, fits = self._between(p, n, side, u, v)
         alone = xp.where(~fits)
-        if len(alone):
+        if len(alone) and not (last or self.emitters.there):
+            xp.put(result, alone, 0 * xp.take(result, alone) + UNKNOWN)
+        elif len(alone):
             at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
             numbers = np.rint(at * (EIGHTHS * self.step))
             here, up = xp.take(p, alone), xp.take(n, alone)
-            xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS))
+            xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow))
             result[3:, alone] = self.emitters.received(here, up, self.worth)[1]
         if not self.emitters.there:
             return result
@@ -445,7 +424,7 @@ class Around:
         local = disc(np.sqrt(at / rays), GOLDEN * at + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
         begin = xp.concat([p + OFF * n] * rays, 1)
-        light, reach = self.arriving(begin, way, finer and self.finer)
+        light, reach = self.arriving(begin, way, finer)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         if self.mist is not None:
             more, clear = self.mist.along(begin, way, reach)
@@ -454,26 +433,44 @@ class Around:
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
-        ``finer``, places where nodes differ send rays of their own.
+        ``finer``, places nearer than nodes may be, and in hollows places where these differ, send rays.
         """
-        xp = self.xp
+        xp, few = self.xp, self.few and max(self.few if finer else OFTEN, LAST / (1 + p.shape[1]))
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        few = self.few and max(self.few, LAST / (1 + p.shape[1]))
         hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
-        met, floor = xp.where(hit < INF), xp.where((hit == INF) & (limit < INF))
-        light = self.sky(way)
-        if len(floor):
-            at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
-            xp.put(light, floor, self._floored(at, finer))
-        if len(met) and self.lookup is not None:
-            ways = xp.take(way, met)
-            at = xp.take(p, met) + ways * xp.take(hit, met)
-            cell, shares, g = self._around(at, ways)
-            sent = self.lookup.mixed(self.sent_rows, cell, shares)
-            if finer:
-                sent = sent + self._finer(at, -g, self.lookup.index[cell].T, shares.T)
-            xp.put(light, met, sent)
-        return light, xp.minimum(hit, limit)
+        light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()
+        for on_floor, met in enumerate((hit < INF, (hit == INF) & (limit < INF))):
+            some = xp.where(met)
+            if not len(some) or not (on_floor or self.lookup):
+                continue
+            ways, far = xp.take(way, some), xp.take(reach, some)
+            at = xp.take(p, some) + ways * far
+            if on_floor:
+                index, shares, kept = self._on_floor(at)
+                n = xp.take(self.nodes.n, index[0])
+            else:
+                cell, shares, g = self._around(at, ways)
+                n, index, shares, kept = -g, self.lookup.index[cell].T, shares.T, 0 * far + 1
+            sent = self._mixed(self.sent, index, shares)
+            xp.put(light, some, sent * kept + self.horizon * (1 - kept))
+            if finer and not self.emitters.there:
+                part = 1 - far / SHORT
+                if self.hollow:
+                    each = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
+                    off = xp.sqrt((shares * (each - sent.sum(0)) ** 2).sum(0))
+                    part = xp.maximum(part, off / DIFFER - 1)
+                chosen, part = xp.where(part > 0), part.clip(0.0, 1.0) * kept
+                whole = index, shares, at, n, sent, part, some
+                index, shares, *parts = (xp.take(each, chosen) for each in whole)
+                again.append((self._mixed(self.nodes.colour, index, shares).clip(0.0, CAP), *parts))
+        if not again:
+            return light, reach
+        colour, at, n, sent, part, place = (xp.concat(list(each), -1) for each in zip(*again, strict=True))
+        if len(place):
+            turns = SCATTER[:, None] * np.asarray(xp.to_numpy(at), np.float64)
+            here = self.lamps(at, n) + self.gathered(at, n, turns[:2] + turns[2], AGAIN, False)
+            xp.put(light, place, xp.take(light, place) + part * (colour * here - sent))
+        return light, reach
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:
         """Sides (K,) in world units of cells of the lattice where points (3, K) are, and their places."""

@@ -22,6 +22,7 @@ EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
 APART = 0.1  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
 UNKNOWN = -1.0
+OTHERS = 1e-3  # weight of pixels on other surfaces, where a sample's own has none
 # of pixels around a sample, steps towards it down and across, and weights
 AROUND = (0, 0, 9 / 16), (0, 1, 3 / 16), (1, 0, 3 / 16), (1, 1, 1 / 16)
 
@@ -37,26 +38,30 @@ class Centres:
         self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and how uneven they are
 
     def received(
-        self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array], Array], every: bool
+        self, rays: Array, p: Array, n: Array, ask: Callable[[Array, Array, bool], Array], every: bool
     ) -> Array:
         """Light (3, K) from everywhere on points (3, K) with unit normals that rays (K,) met. With ``every``
-        all centres ask, else some.
+        all centres ask, else some; unless it is the last time, `UNKNOWN` is an answer.
         """
         xp = self.xp
         if self.pixels is None:
             xp.put(self.p, rays, p)
             xp.put(self.n, rays, n)
             most = 0.0 if every else INF
-            self.light = self._spread(rays, 3, lambda at: ask(xp.take(p, at), xp.take(n, at)), most)
+            self.light = self._spread(
+                rays, 3, lambda at, last: ask(xp.take(p, at), xp.take(n, at), last), most
+            )
             return xp.take(self.light, rays)
-        return self._mixed(self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest)))
+        return self._mixed(
+            self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest), True)
+        )
 
     def shares(
         self, lamp: int, small: bool, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]
     ) -> Array:
         """Shares (K,) of a lamp, which may be small, at such points; some are asked by their indices."""
         if self.pixels is None:
-            share = self._spread(rays, 1, lambda index: ask(index)[None], EVEN)[0]
+            share = self._spread(rays, 1, lambda index, _: ask(index)[None], EVEN)[0]
             self.lit[lamp] = share, self._uneven(share.reshape(self.shape))
             return self.xp.take(share, rays)
         if lamp not in self.lit:
@@ -93,7 +98,7 @@ class Centres:
             index = (row + one * down).clip(0, rows - 1) * columns
             index = index + (column + other * right).clip(0, columns - 1)
             value = xp.take(values, index)
-            alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up)
+            alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up) + OTHERS
             weight = weight * (value[0] >= 0) * alike
             total, mean = total + weight, mean + weight * value
         xp.put(result, rest, mean / (total + (total == 0)))
@@ -102,7 +107,7 @@ class Centres:
             xp.put(result, rest, ask(rest))
         return result
 
-    def _spread(self, rays: Array, count: int, ask: Callable[[Array], Array], most: float) -> Array:
+    def _spread(self, rays: Array, count: int, ask: Callable[[Array, bool], Array], most: float) -> Array:
         """Values (count, M) that rays (K,) want; between others' where these differ by no more."""
         xp, each, (rows, columns) = self.xp, self.each, self.shape
         result = xp.full((count, rows * columns), UNKNOWN, self.p)
@@ -110,14 +115,14 @@ class Centres:
         wanted[rays] = 1.0
         first = xp.where((rays // columns % each == 0) & (rays % columns % each == 0))
         if len(first):
-            xp.put(result, xp.take(rays, first), ask(first))
+            xp.put(result, xp.take(rays, first), ask(first, False))
         grids = [part.reshape(-1, rows, columns) for part in (result, self.p, self.n)]
         _fill(xp, [part[:, ::each] for part in grids], most, each)
         _fill(xp, [part.swapaxes(1, 2) for part in grids], most, each)
         result = xp.select(wanted > 0, result, wanted)
         rest = xp.where(xp.take(result[0], rays) < 0)
         if len(rest):
-            xp.put(result, xp.take(rays, rest), ask(rest))
+            xp.put(result, xp.take(rays, rest), ask(rest, True))
         return result
 
     def _uneven(self, share: Array) -> Array:

@@ -17,7 +17,7 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.solid.around import CAP, ELSEWHERE, OFF, RARE, arriving, to_ground
+from scenelang.drawing.solid.around import CAP, ELSEWHERE, LAST, OFF, RARE, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, LARGE, Centres
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
@@ -51,6 +51,7 @@ GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surfac
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
+GIVEN = 0.1  # part of rays to nodes that are given up at most
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 SMALL = 0.15  # world units: lamps with shadows that may be sharper than pixels
@@ -405,7 +406,7 @@ class Lighting:
         r = _length(xp, way)
         limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
         ways, begin = way / r.clip(1e-9), lamp.light.radius
-        few = 0.0 if exact else 3 * self.few
+        few = 0.0 if exact else self.few and min(max(3 * self.few, LAST / (1 + len(r))), GIVEN)
         trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)
         clear = (trail.hit == INF) * xp.exp(-trail.depth)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
