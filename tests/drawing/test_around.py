@@ -56,6 +56,25 @@ def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
     assert light[2, 0] == pytest.approx(0.6 * (1 - (0.5 / 1.3) ** 2), rel=0.03)
 
 
+def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
+    """What is linear on the lattice is so between its points, and half a step beyond the last on a plate."""
+    around = around_of("""nsg 1; canvas(128, 128); ground(none); sky(1); camera([0, 4, 0.1], [0, 0, 0]);
+        box { scale(1.3); material diffuse { color(#888); } }""")
+    there = np.flatnonzero(around.seen.p[0] < 100)
+    row, column = np.divmod(np.arange(around.rows * around.columns, dtype=np.float32), around.columns)
+    plane = np.stack([10 + column, 10 + row, 50 + row - column / 2])
+    with NUMPY.inference():
+        parts = [around._evened(plane, part=part) for part in range(3)]
+        assert parts[0][:, there] == pytest.approx(plane[:, there], abs=0.2)
+        around.seen = around.seen._replace(received=np.concatenate([plane, *parts[1:]]))
+        x = np.linspace(-0.74, 0.74, 150, dtype=np.float32)  # the top's sides are at 0.75
+        p = np.stack([np.tile(x, 150), np.full(22500, 1.3 / 3**0.5, np.float32), np.repeat(x, 150)])
+        side, u, v = around._places(p)
+        found, fits = around._between(p, np.float32([[0], [1], [0]]) + 0 * p, side, u, v)
+    assert fits.all()
+    assert found == pytest.approx(np.stack([10 + u, 10 + v, 50 + v - u / 2]), abs=0.15)
+
+
 @pytest.mark.parametrize("wide", [0.3, 0.02])
 def test_a_thin_ring_that_glows_sends_what_all_of_it_does(wide: float) -> None:
     """By an integral over the surface of a tube around the point's normal; its far side hides nothing."""

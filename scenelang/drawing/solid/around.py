@@ -12,7 +12,7 @@ Letters: J nodes, K points, L points of the lattice, R rays.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from math import ceil, isqrt
 from typing import Any, NamedTuple
@@ -65,6 +65,7 @@ NOISE, MORE, FURTHER = (0.05, 0.03), 5, np.array([[1.3756], [-0.5877]])
 LOUD = 7.5  # and how many times that again, by the noise, in hollows
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
+LEVEL = 0.1  # of squares of steps: planes through few points are as level
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
@@ -150,7 +151,8 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    # (3, L) from everywhere, and if something glows the part of its light that nothing hides
+    # (R, L) from everywhere, and if something glows the part of its light that nothing hides; then how these
+    # change from a point to the next across, and down
     received: Array
 
 
@@ -234,7 +236,7 @@ class Around:
             def received(turn: int) -> Array:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
-            self.seen, self.rings, light = Seen(p, n, p), dict[int, tuple[Array, Array]](), received(0)
+            self.seen, self.rings, light = Seen(p, n, p), dict[int, tuple[Array, ...]](), received(0)
             self.worth = WORTH * float(light.sum()) / max(len(there), 1)
             glow, free = self.emitters.received(at, up, self.worth)
             whole = max(float(light.sum()) + float((glow * free).sum()), 1e-9)
@@ -243,10 +245,10 @@ class Around:
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
-            even = self._smoothed(light)
-            if self.emitters.there:
-                even = self.xp.concat([even, self._smoothed(everywhere(free[None]))], 0)
-            self.seen = Seen(p, n, even)
+            every = [light, everywhere(free[None])] if self.emitters.there else [light]
+            even = self.xp.concat([self._smoothed(each) for each in every], 0)
+            slopes = [self._evened(even, part=part) for part in (1, 2)]
+            self.seen = Seen(p, n, self.xp.concat([even, *slopes], 0))
 
     def sky(self, way: Array) -> Array:
         """Light of the sky (3, …) from directions (3, …)."""
@@ -287,20 +289,10 @@ class Around:
         within, weight = hit[: self.first * rays[0]] < INF, nodes.weight[: self.first]
         within = weight * (within.reshape(-1, rays[0]).sum(1) == rays[0])
         self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
-        met = xp.where(hit < INF)
-        if len(met) and self.lookup is not None:
-            ways = xp.take(way, met)
-            at = xp.take(p, met) + ways * xp.take(hit, met)
-            cell, shares, _ = self._around(at, ways)
-            place = (xp.take(node, met) * count)[:, None] + self.lookup.index[cell]
-            found.append((place.reshape(-1), (shares * xp.take(through, met)[:, None]).reshape(-1)))
-        floor = xp.where((hit == INF) & (limit < INF))
-        if len(floor):
-            at = xp.take(p, floor) + xp.take(way, floor) * xp.take(limit, floor)
-            index, shares, kept = self._on_floor(at)
-            place, part = xp.take(node, floor) * count + index, xp.take(through, floor)
+        for some, _, index, shares, kept, _ in self._ends(p, way, hit, limit):
+            place, part = xp.take(node, some) * count + index, xp.take(through, some)
             found.append((place.reshape(-1), (shares * (kept * part)).reshape(-1)))
-            xp.add(escaped, xp.take(node, floor), self.horizon * ((1 - kept) * part))
+            xp.add(escaped, xp.take(node, some), self.horizon * ((1 - kept) * part))
         if found:
             place, shares = (xp.concat(parts, 0) for parts in zip(*found, strict=True))
             xp.add(row, place, shares[None])
@@ -309,10 +301,20 @@ class Around:
         xp.add(escaped, xp.take(node, hidden), -self.sky(xp.take(way, hidden)) * xp.take(lost, hidden))
         return row.reshape(count, count), escaped
 
-    def _around(self, at: Array, way: Array) -> tuple[Array, Array, Array]:
-        """Cells and shares, as of `Lookup.near`, of nodes around points (3, K) where rays end, and normals
-        along these.
+    def _ends(self, p: Array, way: Array, hit: Array, limit: Array) -> Iterator[tuple[Array, ...]]:
+        """Rays (k,) from points (3, K) that end on objects, then those on the ground: their indices, ends
+        (3, k), and what `_around` and `_on_floor` tell of these.
         """
+        xp = self.xp
+        for on_floor, met in enumerate((hit < INF, (hit == INF) & (limit < INF))):
+            some = xp.where(met)
+            if len(some) and (on_floor or self.lookup):
+                ways = xp.take(way, some)
+                at = xp.take(p, some) + ways * xp.take(xp.minimum(hit, limit), some)
+                yield some, at, *(self._on_floor(at) if on_floor else self._around(at, ways))
+
+    def _around(self, at: Array, way: Array) -> tuple[Array, ...]:
+        """Nodes (j, K) around points (3, K) where rays end, their shares, as of `Lookup`, 1, and normals."""
         xp = self.xp
         g = near(self.field, at, 0 * at[0] + GAP, gradient=True).gradient
         # in a crevice the nearest surface may be the one that is left
@@ -328,7 +330,7 @@ class Around:
             free.reshape(-1)[large] = self._open(xp.take(at, place), xp.take(-g, place), nodes)
             shares = shares * xp.select(split, free, xp.largest(free.T).T)
             shares = shares / shares.sum(1).clip(OPEN)[:, None]
-        return cell, shares, g
+        return lookup.index[cell].T, shares.T, 0 * at[0] + 1, -g
 
     def _open(self, p: Array, n: Array, nodes: Array) -> Array:
         """Whether (K,) no wall is between points (3, K) with unit normals (3, K) and nodes (K,): 1 or 0."""
@@ -339,13 +341,14 @@ class Around:
         far = xp.length(list(to)).clip(1e-6)
         return 1.0 * (march(self.field, p, to / far, far, 0, GAP, True).hit == INF)
 
-    def _on_floor(self, at: Array) -> tuple[Array, Array, Array]:
-        """Nodes (4, K) around points on the ground, their shares, and how much is kept in the fade."""
+    def _on_floor(self, at: Array) -> tuple[Array, ...]:
+        """Nodes (4, K) around points on the ground, their shares, what is kept in the fade, and normals."""
         xp = self.xp
         index, shares = ground_places(xp, at[0], at[2], isqrt(self.count - self.first))
         index = index + self.first
         shares = shares * (xp.take(self.nodes.weight, index.reshape(-1)).reshape(index.shape) + 1e-4)
-        return index, shares / shares.sum(0), xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / FADE))
+        kept = xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / FADE))
+        return index, shares / shares.sum(0), kept, xp.take(self.nodes.n, index[0])
 
     def _solved(self, direct: Array) -> Array:
         """What nodes receive (3, J) after any number of bounces, by generalised conjugate residuals
@@ -374,7 +377,7 @@ class Around:
 
     def _floored(self, at: Array) -> Array:
         """What the ground sends (3, K) from points (3, K) of it."""
-        index, shares, kept = self._on_floor(at)
+        index, shares, kept, _ = self._on_floor(at)
         return self._mixed(self.sent, index, shares) * kept + self.horizon * (1 - kept)
 
     def _mixed(self, values: Array, index: Array, shares: Array) -> Array:
@@ -403,7 +406,7 @@ class Around:
             result[3:, alone] = self.emitters.received(here, up, self.worth)[1]
         if not self.emitters.there:
             return result
-        return result[:3] + result[3] * self.emitters.received(p, n, INF)[0]
+        return result[:3] + result[3].clip(None, 1.0) * self.emitters.received(p, n, INF)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""
@@ -439,34 +442,21 @@ class Around:
         limit = to_ground(xp, self.stage.ground, p[1], way)
         hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
         light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()
-        for on_floor, met in enumerate((hit < INF, (hit == INF) & (limit < INF))):
-            some = xp.where(met)
-            if not len(some) or not (on_floor or self.lookup):
-                continue
-            ways, far = xp.take(way, some), xp.take(reach, some)
-            at = xp.take(p, some) + ways * far
-            if on_floor:
-                index, shares, kept = self._on_floor(at)
-                n = xp.take(self.nodes.n, index[0])
-            else:
-                cell, shares, g = self._around(at, ways)
-                n, index, shares, kept = -g, self.lookup.index[cell].T, shares.T, 0 * far + 1
+        for some, at, index, shares, kept, n in self._ends(p, way, hit, limit):
             sent = self._mixed(self.sent, index, shares)
             xp.put(light, some, sent * kept + self.horizon * (1 - kept))
             if finer and not self.emitters.there:
-                part = 1 - far / SHORT
+                part = 1 - xp.take(reach, some) / SHORT
                 if self.hollow:
                     each = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
                     off = xp.sqrt((shares * (each - sent.sum(0)) ** 2).sum(0))
                     part = xp.maximum(part, off / DIFFER - 1)
-                chosen, part = xp.where(part > 0), part.clip(0.0, 1.0) * kept
-                whole = index, shares, at, n, sent, part, some
-                index, shares, *parts = (xp.take(each, chosen) for each in whole)
-                again.append((self._mixed(self.nodes.colour, index, shares).clip(0.0, CAP), *parts))
-        if not again:
-            return light, reach
-        colour, at, n, sent, part, place = (xp.concat(list(each), -1) for each in zip(*again, strict=True))
-        if len(place):
+                if len(chosen := xp.where(part > 0)):
+                    whole = index, shares, at, n, sent, part.clip(0.0, 1.0) * kept, some
+                    index, shares, *parts = (xp.take(each, chosen) for each in whole)
+                    again.append((self._mixed(self.nodes.colour, index, shares).clip(0.0, CAP), *parts))
+        if again:
+            colour, at, n, sent, part, place = (xp.concat(x, -1) for x in zip(*again, strict=True))
             turns = SCATTER[:, None] * np.asarray(xp.to_numpy(at), np.float64)
             here = self.lamps(at, n) + self.gathered(at, n, turns[:2] + turns[2], AGAIN, False)
             xp.put(light, place, xp.take(light, place) + part * (colour * here - sent))
@@ -510,8 +500,10 @@ class Around:
             even = even + change * (2 - much / (part * noise).clip(1e-9)).clip(0.0, 1.0)
         return even.clip(0.0)
 
-    def _evened(self, values: Array, step: int = 1) -> Array:
-        """Values (R, L) of the lattice, mixed with those so many steps around on the same surface."""
+    def _evened(self, values: Array, step: int = 1, part: int = 0) -> Array:
+        """Values (R, L) that a plane has, by least squares over the lattice so many steps around on the same
+        surface; part 1 and 2 are how much it rises from a point to the next across and down.
+        """
         xp, seen, shape = self.xp, self.seen, (self.rows, self.columns)
         if step not in self.rings:
             to = np.mgrid[-1:2, -1:2].reshape(2, 9, 1)
@@ -519,14 +511,25 @@ class Around:
             index = [xp.array(each, seen.p) for each in np.ravel_multi_index(tuple(at), shape, mode="clip")]
             side, bell = step * self._places(seen.p)[0], xp.array(np.float32((2 - abs(to)).prod(0)), seen.p)
             fit = bell * xp.stack([self._alike(seen.p, seen.n, each, side) for each in index], 0)
-            self.rings[step] = xp.concat(index, 0), fit / fit.sum(0).clip(1e-9)
-        index, shares = self.rings[step]
-        return (xp.take(values, index).reshape(len(values), 9, -1) * shares).sum(1)
+            fit = fit / fit.sum(0).clip(1e-9)
+            v, u = (xp.array(np.float32(each), seen.p) for each in to)
+            uu, uv, vv = ((fit * each).sum(0) for each in (u * u + LEVEL, u * v, v * v + LEVEL))
+            less = fit / (uu * vv - uv * uv).clip(LEVEL**2)
+            across, down = less * (vv * u - uv * v), less * (uu * v - uv * u)
+            mean = fit - (fit * u).sum(0) * across - (fit * v).sum(0) * down
+            for slope in (across, down):
+                slope[4] -= slope.sum(0)
+            self.rings[step] = xp.concat(index, 0), mean / mean.sum(0).clip(1e-9), across, down
+        index, *shares = self.rings[step]
+        return (xp.take(values, index).reshape(len(values), 9, -1) * shares[part]).sum(1)
 
     def _between(self, p: Array, n: Array, side: Array, u: Array, v: Array) -> tuple[Array, Array]:
-        """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any."""
+        """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any. With some
+        corners elsewhere, the others tell how values go on.
+        """
         xp, i, j, values = self.xp, self.xp.floor(u), self.xp.floor(v), self.seen.received
-        total, result, most = 0 * u, 0 * xp.take(values, xp.whole(0 * u)), 0 * u
+        total, most, across, down = (0 * u for _ in range(4))
+        result = 0 * xp.take(values, xp.whole(0 * u))
         for right, below in np.ndindex(2, 2):
             column, row = (
                 (k + step).clip(0, count - 1)
@@ -536,8 +539,11 @@ class Around:
             fit = self._alike(p, n, index, side)
             weight = fit * ((1 - abs(u - column)).clip(0.0) * (1 - abs(v - row)).clip(0.0) + 0.02)
             total, most = total + weight, xp.maximum(most, fit)
+            across, down = across + weight * (u - column), down + weight * (v - row)
             result = result + weight * xp.take(values, index)
-        return result / total.clip(1e-9), most > 0.5
+        less = 1 / total.clip(1e-9)
+        mean, rise, fall = (result * less).reshape(3, -1, len(u))
+        return (mean + (across * less) * rise + (down * less) * fall).clip(0.0), most > 0.5
 
 
 def arriving(lighting: Any) -> Around:

@@ -44,17 +44,16 @@ class Centres:
         all centres ask, else some; unless it is the last time, `UNKNOWN` is an answer.
         """
         xp = self.xp
-        if self.pixels is None:
-            xp.put(self.p, rays, p)
-            xp.put(self.n, rays, n)
-            most = 0.0 if every else INF
-            self.light = self._spread(
-                rays, 3, lambda at, last: ask(xp.take(p, at), xp.take(n, at), last), most
-            )
-            return xp.take(self.light, rays)
-        return self._mixed(
-            self.light, None, rays, p, n, lambda rest: ask(xp.take(p, rest), xp.take(n, rest), True)
-        )
+
+        def some(index: Array, last: bool = True) -> Array:
+            return ask(xp.take(p, index), xp.take(n, index), last)
+
+        if self.pixels is not None:
+            return self._mixed(self.light, None, rays, p, n, some)
+        xp.put(self.p, rays, p)
+        xp.put(self.n, rays, n)
+        self.light = self._spread(rays, 3, some, 0.0 if every else INF)
+        return xp.take(self.light, rays)
 
     def shares(
         self, lamp: int, small: bool, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]

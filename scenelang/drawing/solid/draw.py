@@ -15,7 +15,7 @@ import numpy as np
 
 from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
-from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
 from scenelang.drawing.solid.around import CAP, ELSEWHERE, LAST, OFF, RARE, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, LARGE, Centres
@@ -51,7 +51,6 @@ GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surfac
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
-GIVEN = 0.1  # part of rays to nodes that are given up at most
 HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 SMALL = 0.15  # world units: lamps with shadows that may be sharper than pixels
@@ -343,7 +342,7 @@ class Lighting:
         """What points send to the eye (R, K) of a lamp's light if nothing is in its way."""
         xp, surfaces = self.xp, points.n.shape[1]
         to = lamp.at[:, None] - points.p
-        r = _length(xp, to).clip(NEAREST)
+        r = xp.length(to).clip(NEAREST)
         more = points.colour * lamp.power[:, None]
         near, far, radius = r[:surfaces], r[surfaces:], lamp.light.radius
         facing = _dot(points.n, to[:, :surfaces]) / near
@@ -375,7 +374,7 @@ class Lighting:
         where these differ; from the middle alone to points in media that are far from it.
         """
         xp, passed, work = self.xp, 0 * p[0], Work()
-        single = (_dot(n, n) < 0.5) & (_length(xp, p - lamp.at[:, None]) > DISTANT * lamp.light.radius)
+        single = (_dot(n, n) < 0.5) & (xp.length(p - lamp.at[:, None]) > DISTANT * lamp.light.radius)
         more: list[tuple[Array, Any]] = [(xp.where(single), 0 * BEAMS[:1]), (xp.where(~single), BEAMS)]
         while more:
             some, beams = more.pop()
@@ -392,7 +391,7 @@ class Lighting:
         xp, radius = self.xp, lamp.light.radius
         start = xp.array(np.repeat(radius * beams.T, p.shape[1], 1).astype(np.float32), p)
         way = xp.concat([p] * len(beams), 1) - (start + lamp.at[:, None])
-        r = _length(xp, way)
+        r = xp.length(way)
         way, along = way / r, _dot(start, way) / r
         rim = xp.sqrt(along * along + (radius * radius - _dot(start, start))) - along  # of the lamp
         trail = march(self.hazy, start + lamp.at[:, None], way, r - CLEAR, 0, self.pace.gap, True, start=rim)
@@ -403,10 +402,10 @@ class Lighting:
         of ``soft``. Few rays are given up unless it is to be ``exact``.
         """
         xp, way = self.xp, p - lamp.at[:, None]
-        r = _length(xp, way)
+        r = xp.length(way)
         limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
         ways, begin = way / r.clip(1e-9), lamp.light.radius
-        few = 0.0 if exact else self.few and min(max(3 * self.few, LAST / (1 + len(r))), GIVEN)
+        few = 0.0 if exact else self.few and max(3 * self.few, LAST / (10 * LAST + len(r)))
         trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)
         clear = (trail.hit == INF) * xp.exp(-trail.depth)
         inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
@@ -440,7 +439,7 @@ class Lighting:
         towards = _dot(g, way)
         t = t + sharp * (INTO + self._ahead(result, way, None))
         p = origin + way * t
-        n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / _length(xp, g).clip(1e-12))
+        n = g * (xp.select(towards > 0, 0 * t - 1, 0 * t + 1) / xp.length(g).clip(1e-12))
         colour = result.register[: self.field.hues]
         glow = self._twice(self.field.glow(result.register)) if self.field.glowing else 0 * colour
         for soft in (False, True) if px and self.field.textures else ():
@@ -491,14 +490,14 @@ class Lighting:
         xp, (ray, begin, end, before, sigma) = self.xp, piece
         ways, to = xp.take(way, ray), (lamp.at - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
-        narrow = _dot(first, last) > NARROW * _length(xp, first) * _length(xp, last)
+        narrow = _dot(first, last) > NARROW * xp.length(first) * xp.length(last)
         result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
         wide = xp.where(~narrow)
         if not len(wide):
             return result[0]
         ray, begin, end, before, sigma, ways = (xp.take(part, wide) for part in (*piece, ways))
         middle = _dot(ways, to)
-        aside = _length(xp, to - ways * middle).clip(NEAREST)
+        aside = xp.length(to - ways * middle).clip(NEAREST)
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
@@ -580,10 +579,6 @@ class Lighting:
 
 def _dot(a: Array, b: Array) -> Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _length(xp: Arrays, a: Array) -> Array:
-    return xp.sqrt(_dot(a, a))
 
 
 TILE = 1 << 16  # samples at a time
