@@ -3,10 +3,10 @@
 Ours, Mitsuba 3, and the laboratory's compiled tracer of the same field, the last two with Intel's denoiser
 too (colours and normals of 16 samples help it; with Mitsuba's they are its picture's own). All are warm:
 libraries, compiled kernels, weights and Mitsuba's trees of triangles are there, and pictures are made from
-there on, ours with its nodes. The ways are drawn in turns, each with new seeds, and their least times kept.
-Each is held to its own converged picture; the noise of Mitsuba's, as two halves tell it, is taken off its
-squared errors. With ``--orbits`` the camera goes around scenes: flicker is how errors to traced pictures
-change from a frame to the next.
+there on, ours with its nodes. Rivals have two threads, ours as many as it takes by default. Ways are drawn
+in turns, each with new seeds, and their least times kept. Each is held to its own converged picture; the
+noise of Mitsuba's, as two halves tell it, is taken off its squared errors. With ``--orbits`` the camera goes
+around scenes: flicker is how errors to traced pictures change from a frame to the next.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def ways_of(family: str, index: int, size: int, cache: Path | None) -> tuple[dic
 
     ways = {
         f"ours {pace}": held(
-            lambda _, pace=pace: over_white(render(program, threads=THREADS, samples=pace)), ours
+            lambda _, pace=pace: over_white(render(program, samples=pace)), ours
         )
         for pace in ("adaptive", "one")
     }
