@@ -93,9 +93,7 @@ def ways_of(family: str, index: int, size: int, cache: Path | None) -> tuple[dic
         return encoded(denoised(light, albedo, normal, True) if clean else light)
 
     ways = {
-        f"ours {pace}": held(
-            lambda _, pace=pace: over_white(render(program, samples=pace)), ours
-        )
+        f"ours {pace}": held(lambda _, pace=pace: over_white(render(program, samples=pace)), ours)
         for pace in ("adaptive", "one")
     }
     ways |= {

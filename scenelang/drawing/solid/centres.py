@@ -72,8 +72,8 @@ class Centres:
     def _mixed(
         self, values: Array, uneven: Array, rays: Array, p: Array, n: Array, ask: Callable[[Array], Array]
     ) -> Array:
-        """Values (R, K) of samples from those (R, M) of pixels on the same surfaces: their own where these
-        are not ``uneven``, else of those around them. Where they are very much so, or nothing is known
+        """Values (R, K) of samples from those (R, M) of pixels, on the same surface if any: their own where
+        these are not ``uneven``, else of those around them. Where they are very much so, or nothing is known
         around, samples are asked by their indices.
         """
         xp, (rows, columns) = self.xp, self.shape
