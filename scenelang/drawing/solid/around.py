@@ -541,9 +541,8 @@ class Around:
             total, most = total + weight, xp.maximum(most, fit)
             across, down = across + weight * (u - column), down + weight * (v - row)
             result = result + weight * xp.take(values, index)
-        less = 1 / total.clip(1e-9)
-        mean, rise, fall = (result * less).reshape(3, -1, len(u))
-        return (mean + (across * less) * rise + (down * less) * fall).clip(0.0), most > 0.5
+        mean, rise, fall = (result / total.clip(1e-9)).reshape(3, -1, len(u))
+        return (mean + (across * rise + down * fall) / total.clip(1e-9)).clip(0.0), most > 0.5
 
 
 def arriving(lighting: Any) -> Around:

@@ -22,7 +22,7 @@ EVEN, STEADY, SHARP = 0.2, 0.2, 0.5
 APART = 0.1  # sine: so far off each other's planes lie points of one surface at most
 ALIGNED = 0.8  # cosine of their normals
 UNKNOWN = -1.0
-OTHERS = 1e-3  # weight of pixels on other surfaces, where a sample's own has none
+OTHERS = 1e-3  # weight of pixels on other surfaces, where a sample's own has none, unless all have to ask
 # of pixels around a sample, steps towards it down and across, and weights
 AROUND = (0, 0, 9 / 16), (0, 1, 3 / 16), (1, 0, 3 / 16), (1, 1, 1 / 16)
 
@@ -34,6 +34,7 @@ class Centres:
         self.xp, self.shape, self.each, count = xp, shape, each, shape[0] * shape[1]
         # of samples, once all centres are known: row and column of the pixel, and the next to each (K,)
         self.pixels: Any = None
+        self.others = 0.0  # as `OTHERS`
         self.p, self.n, self.light = (xp.full((3, count), 0.0, like) for _ in range(3))
         self.lit: dict[int, tuple[Array, Array]] = {}  # shares (M,) of lamps, and how uneven they are
 
@@ -52,6 +53,7 @@ class Centres:
             return self._mixed(self.light, None, rays, p, n, some)
         xp.put(self.p, rays, p)
         xp.put(self.n, rays, n)
+        self.others = OTHERS * (not every)
         self.light = self._spread(rays, 3, some, 0.0 if every else INF)
         return xp.take(self.light, rays)
 
@@ -97,7 +99,7 @@ class Centres:
             index = (row + one * down).clip(0, rows - 1) * columns
             index = index + (column + other * right).clip(0, columns - 1)
             value = xp.take(values, index)
-            alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up) + OTHERS
+            alike = _same(xp.take(self.p, index) - here, xp.take(self.n, index), up) + self.others
             weight = weight * (value[0] >= 0) * alike
             total, mean = total + weight, mean + weight * value
         xp.put(result, rest, mean / (total + (total == 0)))
