@@ -436,7 +436,7 @@ class Around:
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
-        ``finer``, places nearer than nodes may be, and in hollows places where these differ, send rays.
+        ``finer``, places nearer than nodes may be, and in hollows those where nodes differ, send rays.
         """
         xp, few = self.xp, self.few and max(self.few if finer else OFTEN, LAST / (1 + p.shape[1]))
         limit = to_ground(xp, self.stage.ground, p[1], way)
@@ -447,10 +447,9 @@ class Around:
             xp.put(light, some, sent * kept + self.horizon * (1 - kept))
             if finer and not self.emitters.there:
                 part = 1 - xp.take(reach, some) / SHORT
-                if self.hollow:
+                if self.hollow:  # there it takes long, and gains little
                     each = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
-                    off = xp.sqrt((shares * (each - sent.sum(0)) ** 2).sum(0))
-                    part = xp.maximum(part, off / DIFFER - 1)
+                    part = xp.sqrt((shares * (each - sent.sum(0)) ** 2).sum(0)) / DIFFER - 1
                 if len(chosen := xp.where(part > 0)):
                     whole = index, shares, at, n, sent, part.clip(0.0, 1.0) * kept, some
                     index, shares, *parts = (xp.take(each, chosen) for each in whole)
