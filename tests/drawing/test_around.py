@@ -57,7 +57,7 @@ def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
 
 
 def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
-    """What is linear on the lattice is so between its points, and half a step beyond the last on a plate."""
+    """Linear light on the lattice is so between its points, and half a step beyond the last on a plate."""
     around = around_of("""nsg 1; canvas(128, 128); ground(none); sky(1); camera([0, 4, 0.1], [0, 0, 0]);
         box { scale(1.3); material diffuse { color(#888); } }""")
     there = np.flatnonzero(around.seen.p[0] < 100)
@@ -179,7 +179,7 @@ def test_the_edge_of_a_shadow_is_sharp_for_what_sees_it_in_a_hollow_or_close(hig
     with NUMPY.inference():
         light, far = around.arriving(p, way, True)
         nodes = around.arriving(p, way)[0]
-    assert far == pytest.approx(high, rel=1e-3)
+    assert far == pytest.approx(high, abs=5e-7)
     square = x * x + 9
     exact = around.nodes.colour[0, -1] * 20 * 3 / square**1.5 * (x < 0)
     most = float(exact.max())

@@ -386,7 +386,7 @@ class Around:
         return xp.stack([(xp.take(row, flat).reshape(index.shape) * shares).sum(0) for row in values], 0)
 
     def surface(self, p: Array, n: Array, last: bool = True) -> Array:
-        """What surfaces receive (3, K) at points (3, K) with unit normals (3, K); where the lattice does not
+        """Light (3, K) that surfaces receive at points (3, K) with unit normals; where the lattice does not
         tell, `UNKNOWN` unless it is the ``last`` time of asking.
         """
         xp = self.xp
