@@ -155,6 +155,19 @@ def test_no_light_leaves_what_is_closed(closed: str) -> None:
     assert np.asarray(nsg.render(nsg.compile(nsg.loads(text))))[..., :3].max() < 0.01
 
 
+@pytest.mark.parametrize("sky", ["#fff", "#222, #fff"], ids=["even", "graded"])
+def test_no_light_comes_into_what_is_closed(sky: str) -> None:
+    """Nodes on the inside of a shell receive nothing of a sky (below 0 is not nothing either, and asked for
+    more and more rays), and points that are seen there neither.
+    """
+    around = around_of(f"""nsg 1; canvas(24, 24); ground(none); light(none); sky(2, {sky});
+        camera([0, 0.1, 0.2]); sphere {{ shell(0.2); scale(1.5); {GREY} }}""")
+    inside = (around.nodes.n * around.nodes.p).sum(0) < 0
+    assert inside.sum() > 100
+    assert np.all(around.exchange[1][:, inside] == 0)
+    assert np.all(around.seen.received == 0)
+
+
 @pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
 def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""

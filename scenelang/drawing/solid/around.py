@@ -37,11 +37,9 @@ DIFFER, SHORT, AGAIN = 0.3, 0.6, 5
 GAP = 0.01  # world units, as of `MarchSettings`
 # part of rays that are given up, or number, but where they may leave what is closed, and of rays to nodes
 RARE, LAST, OFTEN = 5e-3, 16, 0.04
-DOME = 64  # directions to the sky alone
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
 EXACT = 1e-3  # the part of the light that bounces leave out at most
-FLAT = 1e-6  # sine: directions so level meet no ground
 NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearby
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
@@ -61,8 +59,7 @@ TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a 
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, and in hollows; with more there are more rays, so many times, turned so
-NOISE, MORE, FURTHER = (0.05, 0.03), 5, np.array([[1.3756], [-0.5877]])
-LOUD = 7.5  # and how many times that again, by the noise, in hollows
+NOISE, MORE, FURTHER = (0.05, 0.03), 3, np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
 LEVEL = 0.1  # of squares of steps: planes through few points are as level
@@ -115,7 +112,7 @@ class Lookup:
             chosen = np.argpartition(off + AWAY * (along > -TURNED), count - 1, 1)[:, :count]
             found.append(np.take_along_axis(close, chosen, 1))
         self.index = xp.array(np.concatenate(found).astype(np.int64), nodes.p)  # (6 cells, k)
-        self.split: Any = None  # cells with walls between their nodes (6 cells,)
+        self.alike: Any = None  # whether no wall is between nodes and the first of their cell (6 cells, k)
         # what places ask, cell by cell: positions, normals and weights of its nodes (cells, 7, k)
         about = xp.take(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0), self.index.reshape(-1))
         self.about = xp.packed(about.reshape(len(about), *self.index.shape).swapaxes(0, 1))
@@ -188,9 +185,8 @@ class Around:
                     index = self.lookup.index
                     first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
                     free = self._open(xp.take(own.p, first), xp.take(own.n, first), index.reshape(-1))
-                    self.lookup.split = xp.least(free.reshape(index.shape).T) < 1
-                matrix, less = self._exchange(RAYS[self.hollow])
-                self.exchange = matrix, self._dome(self.nodes.n) + less
+                    self.lookup.alike = free.reshape(index.shape) > 0
+                self.exchange = self._exchange(RAYS[self.hollow])
             if self.hollow or self.closed < CLOSED:
                 break
         self.light(lamps)
@@ -241,7 +237,7 @@ class Around:
             glow, free = self.emitters.received(at, up, self.worth)
             whole = max(float(light.sum()) + float((glow * free).sum()), 1e-9)
             noise = float(abs(self._evened(light) - light).sum()) / whole
-            more = MORE * min(max(noise / NOISE[self.finer] - 1, 0.0), max(1.0, LOUD * noise * self.finer))
+            more = MORE * min(max(noise / NOISE[self.finer] - 1, 0.0), 1.0)
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
@@ -256,18 +252,9 @@ class Around:
         shape = (3,) + (1,) * (way.ndim - 1)
         return self.horizon.reshape(shape) + (self.zenith - self.horizon).reshape(shape) * high
 
-    def _dome(self, n: Array) -> Array:
-        """What points with unit normals (3, K) receive of the sky alone (3, K)."""
-        xp, index = self.xp, np.arange(DOME)
-        local = disc(np.sqrt((index + 0.5) / DOME), GOLDEN * index)[:, :, None].astype(np.float32)
-        up = turned(xp, n, xp.array(local, n), (1,))[0]
-        open_ = up >= -FLAT if self.stage.ground is not None else up > -INF
-        high = ((2 * up).clip(0.0, 1.0) * open_).sum(0) / DOME
-        return self.horizon * (open_.sum(0) / DOME) + (self.zenith - self.horizon) * high
-
     def _exchange(self, rays: tuple[int, int]) -> tuple[Array, Array]:
-        """Parts of each node that nodes see (J, J) by rays, so many on objects and on the ground, and of the
-        horizon less what is hidden of the sky (3, J).
+        """Parts of each node that nodes see (J, J) by rays, so many on objects and on the ground, and what
+        they receive of the sky, the horizon and media (3, J).
         """
         xp, nodes, count = self.xp, self.nodes, self.count
         row, escaped = xp.full((1, count * count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
@@ -296,9 +283,8 @@ class Around:
         if found:
             place, shares = (xp.concat(parts, 0) for parts in zip(*found, strict=True))
             xp.add(row, place, shares[None])
-        lost = share - through * (hit == INF)
-        hidden = xp.where((lost > 0) & ((way[1] >= -FLAT) | (self.stage.ground is None)))
-        xp.add(escaped, xp.take(node, hidden), -self.sky(xp.take(way, hidden)) * xp.take(lost, hidden))
+        seen = xp.where((hit == INF) & (limit == INF))
+        xp.add(escaped, xp.take(node, seen), self.sky(xp.take(way, seen)) * xp.take(through, seen))
         return row.reshape(count, count), escaped
 
     def _ends(self, p: Array, way: Array, hit: Array, limit: Array) -> Iterator[tuple[Array, ...]]:
@@ -322,13 +308,16 @@ class Around:
         way = WAY * way + g
         lookup: Lookup = self.lookup
         cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
-        if self.hollow:  # where no wall is between its nodes, one of a cell tells of all
-            split, most, count = lookup.split[cell][:, None], xp.largest(shares.T).T, shares.shape[1]
-            large = xp.where((split & (shares > LITTLE) | (shares >= most)).reshape(-1))
-            nodes, place = xp.take(lookup.index[cell].reshape(-1), large), large // count
-            free = 0 * shares
-            free.reshape(-1)[large] = self._open(xp.take(at, place), xp.take(-g, place), nodes)
-            shares = shares * xp.select(split, free, xp.largest(free.T).T)
+        if self.hollow:  # of a cell's nodes with no wall between them, one tells of all
+            groups, shown = (lookup.alike[cell], ~lookup.alike[cell]), 0 * shares
+            for group in groups:
+                part = shares * group
+                shown = shown + (part > LITTLE) * (part >= xp.largest(part.T).T)
+            large = xp.where(shown.reshape(-1) > 0)
+            nodes, place = xp.take(lookup.index[cell].reshape(-1), large), large // shares.shape[1]
+            shown = 0 * shares
+            shown.reshape(-1)[large] = self._open(xp.take(at, place), xp.take(-g, place), nodes)
+            shares = shares * sum(group * xp.largest((shown * group).T).T for group in groups)
             shares = shares / shares.sum(1).clip(OPEN)[:, None]
         return lookup.index[cell].T, shares.T, 0 * at[0] + 1, -g
 
