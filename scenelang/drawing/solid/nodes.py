@@ -86,14 +86,14 @@ def hollow(field: SolidField) -> bool:
     return bool(field.skinned.any()) or not field.draws
 
 
-def on_objects(field: SolidField, stage: Stage, hollow: bool) -> Nodes:
-    """Nodes on objects; many chords find even the thin ones that glow."""
+def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
+    """Nodes on objects, ``many`` as hollows want; many chords find even the thin ones that glow."""
     xp, like = field.xp, field.network.codes
     sizes = np.array([solid.extent for solid in field.solids])
     glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
-    more = HOLLOW if hollow else 1
+    more = HOLLOW if many else 1
     shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
-    counts = _bounded(np.ceil(shares.clip(LEAST[hollow], more * MOST)), ALL)
+    counts = _bounded(np.ceil(shares.clip(LEAST[many], more * MOST)), ALL)
     balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
     tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
     parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
@@ -177,9 +177,9 @@ def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Arra
     return Nodes(*(xp.take(part, kept) for part in parts))
 
 
-def on_ground(field: SolidField, stage: Stage, hollow: bool) -> Nodes:
+def on_ground(field: SolidField, stage: Stage, many: bool) -> Nodes:
     """Nodes on the ground (`SIDES`²), row by row along z; none without a ground."""
-    side = SIDES[hollow]
+    side = SIDES[many]
     xp, like, ground = field.xp, field.network.codes, stage.ground
     u = np.linspace(-1.0, 1.0, side)
     x = FAR * np.sinh(WARP * u) / np.sinh(WARP)
