@@ -5,7 +5,8 @@ something opaque comes nearer to the axis than the cone is wide, or holds the co
 or dark. For the others the disc is cut into parts, each a thinner cone; beside its axis the field is asked
 where things were nearest to the ray. The distance, negative within solids, over the thin cone's radius there
 tells what share of the part a straight edge at that distance leaves. Planes through what is nearest on both
-sides of the place give the edge's distance even where a solid is thin.
+sides of the place give the edge's distance even where a solid is thin. Edges of several things hide the same,
+or other places, as they face alike, or apart.
 """
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ def _parted(
     way = ray - aside
     way = way / xp.sqrt((way * way).sum(0))
     facing = -(n * way).sum(0) / spread
-    beside = 0 * far + 1
+    lit, side = 0 * far + 1, 0 * way  # shares of parts, and the side to which they are lit
     for least, t in (told[:2], told[2:4], told[4:]):
         near = xp.where(xp.concat([least] * PARTS, 0) < 1)
         if not len(near):
@@ -169,12 +170,19 @@ def _parted(
             xp.select(both, d + along * (middle - t), xp.minimum(d, e)),
             xp.select(both, middle, t),
         )
-        edge = d / (xp.sqrt((g * g).sum(0)).clip(1e-3) * spreads * (fars - t).clip(FLOOR))
+        steep = xp.sqrt((g * g).sum(0)).clip(1e-3)
+        edge = d / (steep * spreads * (fars - t).clip(FLOOR))
         # what is nearest within the lamp hides nothing
         edge = xp.select((d > 0) & (t - along * d < radius), 0 * d + 1, edge)
-        xp.put(beside, near, xp.minimum(xp.take(beside, near), edge))
+        # of two edges one hides what the other does, other places, or crosses it, by their angle
+        g, before, hidden, rest = g / steep, xp.take(side, near), 1 - share(xp, edge), xp.take(lit, near)
+        cos = (g * before).sum(0)
+        common = xp.select(cos > 0, xp.minimum(hidden, 1 - rest), (hidden - rest).clip(0.0))
+        crossed = hidden * (1 - rest)
+        xp.put(side, near, xp.select(hidden > 1 - rest, g, before))
+        xp.put(lit, near, rest - hidden + crossed + abs(cos) * (common - crossed))
     open_ = share(xp, facing)
-    lit = xp.minimum(share(xp, xp.minimum(beside, facing)) / open_.clip(1e-6), 0 * open_ + 1)
+    lit = xp.minimum(xp.minimum(lit, open_) / open_.clip(1e-6), 0 * open_ + 1)
     rest = xp.sqrt((1 - facing * facing).clip(0.0))
     # the mean of max(0, facing + y) over a unit disc
     weight = facing * open_ + rest * rest * rest * (2 / 3 / np.pi)
