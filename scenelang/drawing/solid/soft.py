@@ -23,7 +23,7 @@ PARTS = 4  # of the disc,
 ASIDE, WIDE = 0.6, 0.55  # in units of its radius, their middles and radii: shares of straight edges are right
 SIDE = (0.6, 0.0, -0.8)  # parts are turned alike but for points straight behind the lamp, seen from there
 STRIDE = 0.5  # least steps, in units of the cone's radius,
-HASTE = 0.03  # and of the way that is left
+HASTE, HURRY = 0.03, 0.5  # and of the way that is left, but no more of the cone's radius
 # points of a unit ball from which rays go through media: a tetrahedron, whose first and second moments are,
 # from everywhere, those of a disc
 BEAMS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / 2
@@ -66,7 +66,7 @@ class Cones(Rays):
         rows[FALLS], rows[BEFORE] = falls, c
         least = xp.minimum(rows[LEAST], rows[OTHER])  # less than the third
         step = xp.maximum((d - least.clip(-1.0, 1.0) * radius) * rows[PACE], STRIDE * radius)
-        following = t + step + HASTE * left + FLOOR
+        following = t + step + (HURRY * rows[SPREAD]).clip(None, HASTE) * left + FLOOR
         ended = xp.where(batch.alive & ((following > rows[UNTIL]) | (least <= -1)))
         xp.put(self.told, xp.take(batch.place, ended), xp.take(rows[LEAST:FALLS], ended))
         self._go(batch, following, batch.alive & (least > -1), rows[UNTIL] < rows[LAST])
