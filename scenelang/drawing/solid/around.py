@@ -415,7 +415,7 @@ class Around:
         at = np.arange(rays)[:, None] + shift
         local = disc(np.sqrt(at / rays), GOLDEN * at + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
-        begin = xp.concat([p + OFF * n] * rays, 1) + OFF * way  # out of what begins there, in corners
+        begin = xp.concat([p + OFF * n] * rays, 1)
         light, reach = self.arriving(begin, way, finer)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         if self.mist is not None:
