@@ -309,7 +309,8 @@ class Around:
         lookup: Lookup = self.lookup
         cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
         if self.hollow:  # of a cell's nodes with no wall between them, one tells of all
-            groups, shown = (lookup.alike[cell], ~lookup.alike[cell]), 0 * shares
+            alike, shown = lookup.alike[cell], 0 * shares
+            groups = alike, ~alike
             for group in groups:
                 part = shares * group
                 shown = shown + (part > LITTLE) * (part >= xp.largest(part.T).T)
