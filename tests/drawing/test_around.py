@@ -58,6 +58,17 @@ def test_a_ball_below_a_sphere_is_hidden_by_a_form_factor() -> None:
     assert light[2, 0] == pytest.approx(0.6 * (1 - (0.5 / 1.3) ** 2), rel=0.03)
 
 
+@pytest.mark.parametrize("off", [-1e-7, 0.0, 1e-7, 1e-3])
+def test_a_corner_sees_half_of_the_sky(off: float) -> None:
+    """On black ground, where a black wall begins, half of (1/π) ∫ L cos θ dω is left."""
+    black = {"rgb": (0.0, 0.0, 0.0)}
+    floor = Object("box", (scaled(20.0, 1.0, 20.0), moved(0.0, -1 / 3**0.5, 0.0)), **black)
+    wall = Object("box", (scaled(1.0, 20.0, 20.0), moved(-1 / 3**0.5, 0.0, 0.0)), **black)
+    p = np.stack([np.full(64, off), np.zeros(64), np.linspace(-1, 1, 64)]).astype(np.float32)
+    n = np.tile(np.float32([[0.0], [1.0], [0.0]]), 64)
+    assert received([floor, wall], EVEN, p, n).mean(1) == pytest.approx([0.15, 0.24, 0.3], rel=0.05)
+
+
 def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
     """Linear light on the lattice is so between its points, and half a step beyond the last on a plate."""
     around = around_of("""nsg 1; canvas(128, 128); ground(none); sky(1); camera([0, 4, 0.1], [0, 0, 0]);

@@ -54,12 +54,12 @@ LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 WORTH = 0.5  # of the mean light on the lattice, for which points ask what glows with all their rays
-OFF = 1e-3  # world units off a surface where these begin
+OFF, AHEAD = 1e-3, 1e-4  # world units off a surface, and on their way, where these begin
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, and in hollows; with more there are more rays, so many times, turned so
-NOISE, MORE, FURTHER = (0.05, 0.03), 3, np.array([[1.3756], [-0.5877]])
+# of the light on the lattice, and in hollows; above it rays are sent again, so often and at most, turned so
+NOISE, MORE, FURTHER = (0.05, 0.03), (3, 7), np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
 LEVEL = 0.1  # of squares of steps: planes through few points are as level
@@ -237,7 +237,8 @@ class Around:
             glow, free = self.emitters.received(at, up, self.worth)
             whole = max(float(light.sum()) + float((glow * free).sum()), 1e-9)
             noise = float(abs(self._evened(light) - light).sum()) / whole
-            more = MORE * min(max(noise / NOISE[self.finer] - 1, 0.0), 1.0)
+            over, (few, most) = max(noise / NOISE[self.finer] - 1, 0.0), MORE
+            more = min(few * over, max(few, (few + over) / 2), most)
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
@@ -416,7 +417,7 @@ class Around:
         at = np.arange(rays)[:, None] + shift
         local = disc(np.sqrt(at / rays), GOLDEN * at + 2 * np.pi * turn).astype(np.float32)
         way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
-        begin = xp.concat([p + OFF * n] * rays, 1)
+        begin = xp.concat([p + OFF * n] * rays, 1) + AHEAD * way  # out of what begins there, in corners
         light, reach = self.arriving(begin, way, finer)
         light = light * (reach * (1 / SHUT)).clip(None, 1.0)
         if self.mist is not None:
@@ -428,7 +429,8 @@ class Around:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
         ``finer``, places nearer than nodes may be, and in hollows those where nodes differ, send rays.
         """
-        xp, few = self.xp, self.few and max(self.few if finer else OFTEN, LAST / (1 + p.shape[1]))
+        xp, least = self.xp, self.few if finer else OFTEN
+        few = self.few and min(max(least, LAST / (1 + p.shape[1])), OFTEN)
         limit = to_ground(xp, self.stage.ground, p[1], way)
         hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
         light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()
