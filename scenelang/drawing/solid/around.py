@@ -36,7 +36,7 @@ RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where some
 DIFFER, SHORT, AGAIN = 0.3, 0.6, 5
 GAP = 0.01  # world units, as of `MarchSettings`
 # part of rays that are given up, or number, but where they may leave what is closed, and of rays to nodes
-RARE, LAST, OFTEN = 5e-3, 16, 0.04
+RARE, LAST, OFTEN = 5e-3, 16, 0.06
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
 EXACT = 1e-3  # the part of the light that bounces leave out at most
@@ -54,7 +54,7 @@ LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
 WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 WORTH = 0.5  # of the mean light on the lattice, for which points ask what glows with all their rays
-OFF, AHEAD = 1e-3, 1e-4  # world units off a surface, and on their way, where these begin
+OFF, AHEAD = 1e-3, 2e-4  # world units off a surface, and on their way, where these begin
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by

@@ -142,45 +142,44 @@ def _parted(
     way = way / xp.sqrt((way * way).sum(0))
     facing = -(n * way).sum(0) / spread
     lit, side = 0 * far + 1, 0 * way  # shares of parts, and the side to which they are lit
-    for least, t in (told[:2], told[2:4], told[4:]):
-        near = xp.where(xp.concat([least] * PARTS, 0) < 1)
-        if not len(near):
-            continue
-        rays, t = passes.at(xp, near % len(least)), xp.take(t, near % len(least))
-        ways, asides, rays_way, fars, spreads = (xp.take(x, near) for x in (way, aside, ray, far, spread))
-        two = []
-        for _ in range(2):
-            left = (fars - t).clip(FLOOR)
-            p = at[:, None] + rays_way * t + asides * left
-            met = solids.meet(rays, t, Wanted.DISTANCE, gradient=True, p=p)
-            work.met += met.met
-            length = xp.sqrt((met.gradient * met.gradient).sum(0)).clip(0.05)
-            along = (met.gradient * ways).sum(0) / length
-            two.append((t, met.distance / length, along, met.gradient / length - along * ways))
-            step = (STRIDE / WIDE * spreads + HASTE) * left + FLOOR
-            t = xp.select(along > 0, t - step, t + step)
-            t = xp.minimum(t.clip(radius), fars - FLOOR)
-        (t, d, along, g), (u, e, beyond, h) = two
-        # planes through what is nearest at both meet beside the axis, where an edge is; of thin plates, never
-        both = along * beyond < 0
-        apart = xp.select(both, along - beyond, 0 * d + 1)
-        middle = (e - d + along * t - beyond * u) / apart
-        g = xp.select(both, (along * h - beyond * g) / apart, xp.select(e < d, h, g))
-        d, t = (
-            xp.select(both, d + along * (middle - t), xp.minimum(d, e)),
-            xp.select(both, middle, t),
-        )
-        steep = xp.sqrt((g * g).sum(0)).clip(1e-3)
-        edge = d / (steep * spreads * (fars - t).clip(FLOOR))
-        # what is nearest within the lamp hides nothing
-        edge = xp.select((d > 0) & (t - along * d < radius), 0 * d + 1, edge)
+    several = [xp.where(xp.concat([least] * PARTS, 0) < 1) for least in told[::2]]
+    near, count = xp.concat(several, 0), told.shape[1]
+    t = xp.concat([xp.take(t, some % count) for t, some in zip(told[1::2], several, strict=True)], 0)
+    rays = passes.at(xp, near % count)
+    ways, asides, rays_way, fars, spreads = (xp.take(x, near) for x in (way, aside, ray, far, spread))
+    two = []
+    for _ in range(2):
+        left = (fars - t).clip(FLOOR)
+        p = at[:, None] + rays_way * t + asides * left
+        met = solids.meet(rays, t, Wanted.DISTANCE, gradient=True, p=p)
+        work.met += met.met
+        length = xp.sqrt((met.gradient * met.gradient).sum(0)).clip(0.05)
+        along = (met.gradient * ways).sum(0) / length
+        two.append((t, met.distance / length, along, met.gradient / length - along * ways))
+        step = (STRIDE / WIDE * spreads + HASTE) * left + FLOOR
+        t = xp.select(along > 0, t - step, t + step)
+        t = xp.minimum(t.clip(radius), fars - FLOOR)
+    (t, d, along, g), (u, e, beyond, h) = two
+    # planes through what is nearest at both meet beside the axis, where an edge is; of thin plates, never
+    both = along * beyond < 0
+    apart = xp.select(both, along - beyond, 0 * d + 1)
+    middle = (e - d + along * t - beyond * u) / apart
+    g = xp.select(both, (along * h - beyond * g) / apart, xp.select(e < d, h, g))
+    d, t = xp.select(both, d + along * (middle - t), xp.minimum(d, e)), xp.select(both, middle, t)
+    steep = xp.sqrt((g * g).sum(0)).clip(1e-3)
+    edge = d / (steep * spreads * (fars - t).clip(FLOOR))
+    # what is nearest within the lamp hides nothing
+    edge = xp.select((d > 0) & (t - along * d < radius), 0 * d + 1, edge)
+    hides, g, begin = 1 - share(xp, edge), g / steep, 0
+    for some in several:
+        band = slice(begin, begin := begin + len(some))
         # of two edges one hides what the other does, other places, or crosses it, by their angle
-        g, before, hidden, rest = g / steep, xp.take(side, near), 1 - share(xp, edge), xp.take(lit, near)
-        cos = (g * before).sum(0)
+        before, hidden, rest = xp.take(side, some), hides[band], xp.take(lit, some)
+        cos = (g[:, band] * before).sum(0)
         common = xp.select(cos > 0, xp.minimum(hidden, 1 - rest), (hidden - rest).clip(0.0))
         crossed = hidden * (1 - rest)
-        xp.put(side, near, xp.select(hidden > 1 - rest, g, before))
-        xp.put(lit, near, rest - hidden + crossed + abs(cos) * (common - crossed))
+        xp.put(side, some, xp.select(hidden > 1 - rest, g[:, band], before))
+        xp.put(lit, some, rest - hidden + crossed + abs(cos) * (common - crossed))
     open_ = share(xp, facing)
     lit = xp.minimum(xp.minimum(lit, open_) / open_.clip(1e-6), 0 * open_ + 1)
     rest = xp.sqrt((1 - facing * facing).clip(0.0))
