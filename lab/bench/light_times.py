@@ -24,7 +24,7 @@ from scenelang import compile as compile_scene
 from scenelang.drawing.metrics import over_white
 from scenelang.drawing.solid.network import SolidArrays
 
-SCENES, TURNS, SIZE = 6, 5, 256
+SCENES, TURNS, SIZE = 6, 9, 256
 MOVED, STEP = 128, 1e-4  # pixels a side, and world units
 
 
