@@ -218,7 +218,7 @@ class Around:
             buried = found.distance < 0  # in what touches the surface
             if self.field.mixed:
                 buried = buried & (found.register[0] < 0.5)
-            p = p + 2 * ELSEWHERE * buried
+            p = self.xp.select(buried, p + 2 * ELSEWHERE, p)
             there = self.xp.where(p[0] < ELSEWHERE)
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
 
@@ -429,8 +429,7 @@ class Around:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
         ``finer``, places nearer than nodes may be, and in hollows those where nodes differ, send rays.
         """
-        xp, least = self.xp, self.few if finer else OFTEN
-        few = self.few and min(max(least, LAST / (1 + p.shape[1])), OFTEN)
+        xp, few = self.xp, self.few and max(self.few if finer else OFTEN, min(OFTEN, LAST / (1 + p.shape[1])))
         limit = to_ground(xp, self.stage.ground, p[1], way)
         hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
         light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()

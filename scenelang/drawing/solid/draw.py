@@ -403,7 +403,7 @@ class Lighting:
         """
         xp, way = self.xp, p - lamp.at[:, None]
         r = xp.length(way)
-        limit, steps = r - CLEAR * ~edge, HASTY if seen.work.lost else STEPS
+        limit, steps = xp.select(edge, r, r - CLEAR), HASTY if seen.work.lost else STEPS
         ways, begin = way / r.clip(1e-9), lamp.light.radius
         few = 0.0 if exact else self.few and max(3 * self.few, LAST / (10 * LAST + len(r)))
         trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)

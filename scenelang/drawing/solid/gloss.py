@@ -31,7 +31,7 @@ def coated(xp: Arrays, n: Array, back: Array, colour: Array, rough: Array) -> tu
     """Colours (R, K) of diffuse bases, and coats (4 + R, K): roughness, 0 for none, unit way back, and what
     is reflected along the normal. ``rough`` is that of `Material`.
     """
-    straight = xp.select(rough < 0, colour, 0 * colour + GLAZE * (rough > 0))
+    straight = xp.select(rough < 0, colour, GLAZE * (0 * colour + (rough > 0)))
     left = (1 - _fresnel(straight, (n * back).sum(0))) * (rough > 0) + (rough == 0)
     return colour * left, xp.concat([abs(rough)[None], back, straight], 0)
 
@@ -74,7 +74,7 @@ def from_lamp(xp: Arrays, at: Array, radius: float, p: Array, n: Array, coat: Ar
     v = _cross(xp, r, u)
     widest = xp.select(x > rim, 0 * x + np.pi, xp.acos(xp.sqrt(1 - (sin / aside).clip(0.0, 1.0) ** 2)))
     for place in ((np.arange(TURNS) * 2 + 1 - TURNS) * (np.pi / 2 / TURNS)).tolist():
-        turn, ends = widest * np.sin(place), []
+        turn, ends = widest * float(np.sin(place)), []
         y = aside * xp.cos(turn)
         size = xp.length([x, y]).clip(1e-6)
         cos = (rim / size).clip(0.0, 1.0)
@@ -82,13 +82,13 @@ def from_lamp(xp: Arrays, at: Array, radius: float, p: Array, n: Array, coat: Ar
         for side in (-1, 1):  # tangents of half the angles from r, and of how many facets lie before
             t = ((y * cos + side * x * half) / (size + x * cos - side * y * half).clip(1e-4)).clip(0.0) ** 2
             ends.append(t / (t + square))
-        part = (ends[1] - ends[0]) * widest * (2 * np.pi / TURNS / NODES * np.cos(place)) / square
+        part = (ends[1] - ends[0]) * widest * float(2 * np.pi / TURNS / NODES * np.cos(place)) / square
         for node in ((np.arange(NODES) + 0.5) / NODES).tolist():
             share = (ends[0] + (ends[1] - ends[0]) * node).clip(0.0, 1 - 1e-6)
             t = square * share / (1 - share)
             way = ((1 - t) * r + 2 * xp.sqrt(t) * (xp.cos(turn) * u + xp.sin(turn) * v)) / (1 + t)
             total = total + lobe(xp, n, coat, way) * (part * ((t + square) / (1 + t)) ** 2)
-    return total * ((far > radius) / radius**2)
+    return total * (far > radius) / radius**2
 
 
 def reflected(lighting: Any, p: Array, n: Array, coat: Array, received: Array, mirrors: int) -> Array:

@@ -32,7 +32,6 @@ from scenelang.drawing.solid.passes import INF, inverse_of
 
 Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
-Slices = tuple[slice, ...]
 
 NODES, MANY = (18**3, 22**3), 32**3  # of a lattice, with lamps within, and where media are dense
 FINE = 0.5  # whose optical depth from a node to the next is this
@@ -59,10 +58,8 @@ class Segment(NamedTuple):
     here: Floats  # parts of the sources at a node and at the next that come along
     next: Floats
     surface: Floats | None  # part of J that an opaque surface between sends back
-    to: Slices  # nodes that have a next
-    on: Slices  # those
     base: Floats  # light that joins whatever J is
-    clear: list[tuple[Floats, Slices, Slices]]  # what comes through to the 1st, 2nd, 4th … next node
+    clear: list[tuple[Floats, int]]  # what comes through to the 1st, 2nd, 4th … next node, so far on
 
 
 class Mist:
@@ -94,6 +91,7 @@ class Mist:
         if ground is not None and high[1] > ground.y:
             self.low[1] = max(self.low[1], ground.y + 1e-3)
         self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
+        self.strides = self.sides[1] * self.sides[2], self.sides[2], 1
         axes = [a + h * np.arange(n) for a, n in zip(self.low, self.sides, strict=True)]
         faces = np.array([[axis[at] for axis in axes] for at in (0, -1)], np.float32)
         self.faces = [self.xp.array(face[:, None], self.field.network.codes) for face in faces]
@@ -114,17 +112,16 @@ class Mist:
         self.reflected, self.shining = colour.clip(0.0, WHITEST) * self.opaque, glow * self.opaque
         looks = np.concatenate([colour.clip(0.0, ALBEDO), glow, density[None]]) * self.mist
         # nodes around media have what those next to them have
-        around, count, hard = 0 * looks, 0 * d, 1.0 * self.opaque
+        self.count, hard = 0 * d, np.float32(1) * self.opaque
         for shift in AROUND:
             to, on = pair_of(self.sides, shift)
             hard[to] += self.opaque[on]
-            around[:, *to] += looks[:, *on]
-            count[to] += self.mist[on]
-        looks = np.where(self.mist, looks, around / count.clip(1.0))
+            self.count[to] += self.mist[on]
+        self._take_around(looks, ~self.mist & (self.count > 0))
         self.albedo, self.glow, self.density = looks[:3], looks[3:6], looks[6]
         self.thin = np.minimum(1.0, DEEPEST / (self.h * self.density).clip(1e-9))
         self.thinned = self.density * self.thin
-        active = np.flatnonzero(((count > 0) | self.mist) & ~self.opaque)
+        active = np.flatnonzero(((self.count > 0) | self.mist) & ~self.opaque)
         normal = -np.array(np.gradient(hard))  # of what is opaque, next to it; not yet of length 1
         self.slopes = np.array(np.gradient(d, self.h))
         # what arrives (n…,), where it is uneven, and colours with their power
@@ -146,6 +143,13 @@ class Mist:
             self.lamps.append((own, uneven, light.power * rgb))
             facing = (normal * (at - self.p)).sum(0).clip(0.0) / (r * np.linalg.norm(normal, axis=0) + 1e-6)
             self.received += 4 * light.power * rgb * own * facing
+
+    def _take_around(self, values: Floats, wanted: np.ndarray) -> None:
+        """Set values (R, n…) of the nodes wanted (n…,) to the mean of their neighbours' in media, if any."""
+        some, flat = np.flatnonzero(wanted), values.reshape(len(values), -1)
+        dense = flat * self.mist.reshape(-1)
+        around = sum(dense.take(some + far, 1, mode="wrap") for far in np.dot(AROUND, self.strides))
+        flat[:, some] = around / self.count.reshape(-1)[some].clip(1.0)
 
     def _reached(self, light: Light, p: np.ndarray) -> np.ndarray:
         """Parts of a lamp's light (K,) that arrive at points (3, K)."""
@@ -169,11 +173,11 @@ class Mist:
             # the part of the way, from begin to end, that is in the medium
             cross = abs(d[to]) / (abs(d[to]) + abs(d[on])).clip(1e-9)
             begin, end = np.where(m0, 0.0, cross), np.where(m1, 1.0, cross)
-            density = (self.thinned[to] * m0 + self.thinned[on] * m1) / (m0 * 1.0 + m1).clip(1.0)
+            density = (self.thinned[to] * m0 + self.thinned[on] * m1) / (m0 * np.float32(1) + m1).clip(1.0)
             depth = density * (self.h * steps**0.5) * (end - begin)
             t = depth.clip(1e-4)
             gone = np.exp(-t)
-            e0, e1 = 1 - gone, np.where(t < 1e-2, t / 2, (1 - (1 + t) * gone) / t)
+            e0, e1 = 1 - gone, np.where(t < 3e-2, t * (0.5 - t / 3), (1 - (1 + t) * gone) / t)
             stop = self.opaque[on]  # nothing is known of light behind it
             following = (e0 * begin + e1 * (end - begin)) * ~stop
             parts = np.zeros((2, *sides), np.float32)
@@ -185,7 +189,7 @@ class Mist:
                 last = np.where(stop, first, sent[on].clip(DARK))
                 x = (1 + (np.log(first / last) / t).clip(-8.0, 50.0)) * t
                 x = np.where(abs(x) < 1e-4, 1e-4, x)
-                along = np.where(m0 | m1, first * t * (1 - np.exp(-x)) / x, 0.0)
+                along = np.where(m0 | m1, first * t * -np.expm1(-x) / x, 0.0)
                 evenly = parts[0][to] * sent[to] + parts[1][to] * sent[on]
                 along = np.where(uneven[to] | uneven[on], evenly, along)
                 base[:, *to] += self.albedo[:, *to] * rgb * along
@@ -196,14 +200,11 @@ class Mist:
                 base += surface * self.received
                 base[:, *to] += self.shining[:, *on] * shown
             through[to] = np.where(stop | self.opaque[to], 0.0, np.exp(-depth))
-            clear, step = [(through, to, on)], shift
-            while all(2 * abs(s) < n for s, n in zip(step, sides, strict=True)):
-                more, (to2, on2) = np.zeros(sides, np.float32), pair_of(sides, step)
-                more[to2] = through[to2] * through[on2]
-                through, step = more, tuple(2 * s for s in step)
-                clear.append((through, *pair_of(sides, step)))
+            clear = [(through, far := int(np.dot(shift, self.strides)))]
+            while (through := _pass_on(0 * through, through, through, far)).any():
+                clear.append((through, far := 2 * far))
             base = base.astype(np.float32)
-            self.segments.append(Segment(shares[steps], parts[0], parts[1], surface, to, on, base, clear))
+            self.segments.append(Segment(shares[steps], parts[0], parts[1], surface, base, clear))
 
     def relight(self, floor: Callable[[Array], Array] | None = None) -> None:
         """Find the light at the nodes, beginning with what it was; ``floor`` tells what the ground sends
@@ -211,9 +212,9 @@ class Mist:
         """
         horizon, zenith = np.reshape((self.sky.horizon, self.sky.zenith), (2, 3, 1)) * self.sky.power
         base, ground = [1 * segment.base for segment in self.segments], self.stage.ground
-        for shift, segment, light in zip(self.directions, self.segments, base, strict=True):
+        for shift, light in zip(self.directions, base, strict=True):
             edge = np.ones(self.sides, bool)  # nodes that have no next
-            edge[segment.to] = False
+            edge[pair_of(self.sides, shift)[0]] = False
             p, rise = self.p[:, edge], shift[1] / sum(map(abs, shift)) ** 0.5
             sent = horizon + (zenith - horizon) * min(max(2 * rise + HALF_UP, 0.0), 1.0)
             if ground is not None and floor is not None and rise < 0:
@@ -227,17 +228,12 @@ class Mist:
             sends += self.albedo * sent * rgb
         dense = self.density * (0.5 - self.d / self.h).clip(0.0, 1.0)
         if self.opaque.any():  # there as around, lest rays begin and end in less than there is
-            around, count = 0 * sends, 0 * self.d
-            for shift in AROUND:
-                to, on = pair_of(self.sides, shift)
-                around[:, *to] += sends[:, *on] * self.mist[on]
-                count[to] += self.mist[on]
-            sends = np.where(self.opaque, around / count.clip(1.0), sends)
-            dense = dense * (~self.opaque | (count > 0))
+            self._take_around(sends, self.opaque)
+            dense = dense * (~self.opaque | (self.count > 0))
         rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
         rows += [dense * sends, dense[None]]
-        table = np.concatenate(rows).reshape(13, -1)
-        self.table = self.xp.array(np.ascontiguousarray(table, np.float32), self.field.network.codes)
+        table = np.concatenate(rows, dtype=np.float32).reshape(13, -1)
+        self.table = self.xp.array(table, self.field.network.codes)
 
     def _solve(self, base: list[Floats], enough: float) -> None:
         """Sweep until the light changes by no more than that (Anderson 1965)."""
@@ -262,11 +258,11 @@ class Mist:
         source, result = self.albedo * self.light, 0 * self.light
         for segment, more in zip(self.segments, base, strict=True):
             light = segment.here * source + more
-            light[:, *segment.to] += segment.next[segment.to] * source[:, *segment.on]
+            _pass_on(light, segment.next, source, segment.clear[0][1])
             if segment.surface is not None:
                 light += segment.surface * self.light
-            for clear, to, on in segment.clear:  # with each the light of twice as many nodes has joined
-                light[:, *to] += clear[to] * light[:, *on]
+            for clear, far in segment.clear:  # with each the light of twice as many nodes has joined
+                _pass_on(light, clear, light, far)
             result += segment.share * light
         return result
 
@@ -321,11 +317,19 @@ class Mist:
         return result
 
 
-def pair_of(sides: tuple[int, ...], shift: Shift) -> tuple[Slices, Slices]:
+def pair_of(sides: Shift, shift: Shift) -> tuple[tuple[slice, ...], ...]:
     """Slices of the nodes from which a shift leads to another, and of those others."""
     ends = list(zip(sides, shift, strict=True))
     to = tuple(slice(max(0, -s), n - max(0, s)) for n, s in ends)
     return to, tuple(slice(max(0, s), n - max(0, -s)) for n, s in ends)
+
+
+def _pass_on(light: Floats, parts: Floats, sent: Floats, far: int) -> Floats:
+    """Light (…, n…) with parts (n…) of what nodes so far on send, 0 where there are none, in place."""
+    n = parts.size
+    to, on = (slice(max(0, s), n + min(0, s)) for s in (-far, far))
+    light.reshape(-1, n)[:, to] += parts.reshape(-1)[to] * sent.reshape(-1, n)[:, on]
+    return light
 
 
 def _received(r: np.ndarray, radius: float) -> np.ndarray:

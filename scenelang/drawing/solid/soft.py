@@ -134,7 +134,7 @@ def _parted(
     u = xp.stack([y * c - z * b, z * a - x * c, x * b - y * a], 0)
     u = u / xp.sqrt((u * u).sum(0)).clip(1e-6)
     v = xp.stack([y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]], 0)
-    turns = [(np.cos(i), np.sin(i)) for i in (np.arange(PARTS) * 2 * np.pi / PARTS + 0.3).tolist()]
+    turns = [(float(np.cos(i)), float(np.sin(i))) for i in np.arange(PARTS) * 2 * np.pi / PARTS + 0.3]
     # how axes of parts go apart from the ray, back from the point
     aside = xp.concat([ASIDE * seen[2] * (cos * u + sin * v) for cos, sin in turns], 1)
     spread = WIDE * spread
@@ -157,8 +157,7 @@ def _parted(
         along = (met.gradient * ways).sum(0) / length
         two.append((t, met.distance / length, along, met.gradient / length - along * ways))
         step = (STRIDE / WIDE * spreads + HASTE) * left + FLOOR
-        t = xp.select(along > 0, t - step, t + step)
-        t = xp.minimum(t.clip(radius), fars - FLOOR)
+        t = xp.minimum(xp.select(along > 0, t - step, t + step).clip(radius), fars - FLOOR)
     (t, d, along, g), (u, e, beyond, h) = two
     # planes through what is nearest at both meet beside the axis, where an edge is; of thin plates, never
     both = along * beyond < 0
