@@ -12,6 +12,7 @@ from scenelang.compiler.spaces import Sky, Stage
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
+from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.soft import ASIDE, WIDE, shown
 from tests.drawing.solids import Object, field, moved, scaled
 
@@ -67,6 +68,28 @@ def test_a_corner_sees_half_of_the_sky(off: float) -> None:
     p = np.stack([np.full(64, off), np.zeros(64), np.linspace(-1, 1, 64)]).astype(np.float32)
     n = np.tile(np.float32([[0.0], [1.0], [0.0]]), 64)
     assert received([floor, wall], EVEN, p, n).mean(1) == pytest.approx([0.15, 0.24, 0.3], rel=0.05)
+
+
+def test_fields_are_asked_in_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mask times a number is double in numpy, and all that it joins; that takes half as long again."""
+    found: set[str] = set()
+    before = SolidField.meet
+
+    def meet(field: SolidField, *args: Any, **more: Any) -> Any:
+        result = before(field, *args, **more)
+        found.add(str(result.distance.dtype))
+        return result
+
+    monkeypatch.setattr(SolidField, "meet", meet)
+    nsg.render(
+        nsg.compile(
+            nsg.loads("""nsg 1; canvas(64, 64); sky(1); light([2, 3, 1], 9, radius = 0.5);
+        light([-2, 3, 1], 9); sphere { scale(0.6); material glossy { color(#888); } }
+        box { scale(0.4); translate(0.4, 0, 0.9); material metal { color(#a85); roughness(0.1); } }
+        sphere { scale(0.8); translate(-0.9, 0, 0); material volumetric { color(#ccc); density(2); } }""")
+        )
+    )
+    assert found == {"float32"}
 
 
 def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
