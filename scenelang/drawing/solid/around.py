@@ -35,7 +35,7 @@ RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where some
 # light by which nodes around a place differ, and world units from a place, for which that sends so many rays
 DIFFER, SHORT, AGAIN = 0.3, 0.6, 5
 GAP = 0.01  # world units, as of `MarchSettings`
-# part of rays that are given up, or number, but where they may leave what is closed, and of rays to nodes
+# part of rays that are given up, or number, but where they may leave what is closed; at most, or of nodes'
 RARE, LAST, OFTEN = 5e-3, 16, 0.06
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
