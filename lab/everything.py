@@ -41,6 +41,7 @@ STEPS: Final = (
         "lab bench light_rivals sky --scenes 1 --size 32 --chart {out}/rivals.png -o {out}/rivals.json",
         needs=("mitsuba", "numba", "pyoidn"),
     ),
+    Step("lab bench mitsuba_paths {few}", needs=("mitsuba", "numba")),
     Step("lab bench light_times --scenes 1 -o {out}/light-times.json"),
     Step("lab shadows --scenes {scenes} -o {out}/shadows"),
     Step("lab frontier shapes2d --scenes {scenes} -o {out}/frontier-shapes2d"),
