@@ -2,6 +2,7 @@
 
 Unions of spheres and boxes under affine maps, without ground, whose fade Mitsuba does not know, and whose
 media are apart. A sky of power 1 is an environment map, a lamp of a radius an emitting ball, which blocks.
+Glossy and metal are a BSDF written for it, of Mitsuba's own microfacets and warps.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ import math
 import sys
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lab.bench.mitsuba_scenes import NO_BSDF, diffuse
+from lab.bench.mitsuba_scenes import NO_BSDF, SCALAR, diffuse
 from lab.light.families import Rng
 from lab.light.field import world_of
 from lab.light.measure import scene_of
@@ -26,6 +28,60 @@ from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import psnr
 
 _ROWS = 1024  # of the environment map
+mi.set_variant(SCALAR)
+
+
+class Reflecting(mi.BSDF):
+    """GGX with separable Smith masking and Schlick's Fresnel; glossy has a diffuse base below 1 - F(n.v)."""
+
+    def __init__(self, props: Any) -> None:
+        mi.BSDF.__init__(self, props)
+        self.rgb = mi.Color3f(props["red"], props["green"], props["blue"])
+        self.metal = props["metal"]
+        self.facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, props["alpha"])
+        self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
+        self.m_flags = self.m_components[0]
+
+    def fresnel(self, cosine: Any) -> Any:
+        f0 = self.rgb if self.metal else mi.Color3f(0.04)
+        return f0 + (1.0 - f0) * (1.0 - cosine) ** 5
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        wi = si.wi
+        if not active or wi.z <= 0.0 or wo.z <= 0.0:
+            return mi.Color3f(0.0)
+        m = dr.normalize(wi + wo)
+        lobe = self.facets.eval(m) * self.facets.G(wi, wo, m) * self.fresnel(dr.dot(wi, m)) / (4.0 * wi.z)
+        return lobe if self.metal else lobe + (1.0 - self.fresnel(wi.z)) * self.rgb * (wo.z / math.pi)
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        if not active or si.wi.z <= 0.0 or wo.z <= 0.0:
+            return 0.0
+        m = dr.normalize(si.wi + wo)
+        odds = self.facets.pdf(si.wi, m) / (4.0 * dr.dot(wo, m))
+        return odds if self.metal else 0.5 * (odds + mi.warp.square_to_cosine_hemisphere_pdf(wo))
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def sample(self, ctx: Any, si: Any, which: float, uv: Any, active: Any = True) -> Any:
+        found = mi.BSDFSample3f()
+        if self.metal or which < 0.5:
+            found.wo = mi.reflect(si.wi, self.facets.sample(si.wi, uv)[0])
+        else:
+            found.wo = mi.warp.square_to_cosine_hemisphere(uv)
+        found.pdf, found.eta = self.pdf(ctx, si, found.wo, active), 1.0
+        found.sampled_type = int(mi.BSDFFlags.GlossyReflection)
+        found.sampled_component = 0
+        if not found.pdf:
+            return found, mi.Color3f(0.0)
+        return found, self.eval(ctx, si, found.wo, active) / found.pdf
+
+    def to_string(self) -> str:
+        return f"Reflecting[metal = {self.metal}]"
+
+
+mi.register_bsdf("reflecting", Reflecting)
 
 
 def _rgb(values: Any) -> dict[str, Any]:
@@ -43,21 +99,16 @@ def _shape(leaf: Leaf, steps: tuple[Any, ...]) -> dict[str, Any]:
     if look.material == "volumetric":
         medium = {"type": "homogeneous", "sigma_t": look.density or EXTINCTION, "albedo": _rgb(rgb)}
         return shape | {"bsdf": NO_BSDF, "interior": medium | {"phase": {"type": "isotropic"}}}
-    if look.roughness < 0.0:
-        rough = {
-            "type": "roughconductor",
-            "material": "none",
-            "distribution": "ggx",
-            "alpha": look.roughness**2,
-        }
-        return shape | {"bsdf": rough | {"specular_reflectance": _rgb(rgb)}}
+    if look.roughness:
+        own = {"type": "reflecting", "metal": look.roughness < 0.0, "alpha": look.roughness**2}
+        return shape | {"bsdf": own | {"red": rgb[0], "green": rgb[1], "blue": rgb[2]}}
     glow = {"emitter": {"type": "area", "radiance": _rgb(look.glow)}} if max(look.glow) else {}
     return shape | {"bsdf": diffuse(rgb)} | glow
 
 
 def picture(graph: Graph, samples: int, seed: int = 0) -> np.ndarray[Any, Any]:
     """Linear light (H, W, 3) of a graph, of ``samples`` at the centre of each pixel, nearly."""
-    mi.set_variant("scalar_rgb")
+    mi.set_variant(SCALAR)
     stage = graph.stage
     assert stage is not None
     assert stage.ground is None
@@ -95,7 +146,7 @@ def _lit(stage: Stage) -> dict[str, Any]:
     return found
 
 
-KINDS = "sky", "soft", "mist", "glow", "metal"
+KINDS = "sky", "soft", "mist", "glow", "metal", "glossy"
 
 
 def scene_text(rng: Rng, kind: str) -> str:
@@ -107,10 +158,10 @@ def scene_text(rng: Rng, kind: str) -> str:
     def solid(x: float) -> str:
         own = {
             "mist": f"density({rng.uniform(1, 9):.3f});",
-            "metal": f"roughness({rng.uniform(0.25, 0.8):.3f});",
         }
+        own |= dict.fromkeys(("metal", "glossy"), f"roughness({rng.uniform(0.25, 0.8):.3f});")
         own |= {"glow": "glow(#fc8, 3);" if x > 0 else ""}
-        name = {"mist": "volumetric", "metal": "metal"}.get(kind, "diffuse")
+        name = {"mist": "volumetric", "metal": "metal", "glossy": "glossy"}.get(kind, "diffuse")
         turned = f"rotate({rng.uniform(0, 360):.1f}deg, axis = {row(-1, 1)});"
         box = f"box {{ scale({rng.uniform(0.3, 0.7):.3f}); {turned}"
         leaf = (box, f"sphere {{ scale({rng.uniform(0.2, 0.6):.3f});")[int(rng.integers(2))]
