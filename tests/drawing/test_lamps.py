@@ -91,6 +91,21 @@ def test_media_of_several_densities_and_what_glows(library: str) -> None:
     assert off.max() < 0.03
 
 
+@pytest.mark.parametrize("library", ["closed", "torch"])
+def test_a_dense_ball_in_thin_media_is_as_deep_as_its_chords(library: str) -> None:
+    """At its rim too, where these are short beside the whole way."""
+    box = Object("box", (scaled(3.0**0.5 * 2),), "volumetric")
+    ball = Object("sphere", (scaled(0.3), moved(0.1, 0.2, 0.25)), "volumetric")
+    field = field_of([box, ball], [0.1, 5.0], net=torch_network() if library == "torch" else None)
+    off, like = np.linspace(0.0, 0.29, 30), field.network.codes
+    begin = np.stack([0.1 + off, 0 * off + 0.2, 0 * off + 5.0]).astype(np.float32)
+    way = np.tile(np.float32([[0], [0], [-1]]), 30)
+    with field.xp.inference():
+        rays = (field.xp.array(part, like) for part in (begin, way, np.full(30, 10, np.float32)))
+        depth = field.xp.to_numpy(march(field, *rays).depth)
+    assert depth == pytest.approx(0.1 * 4 + 4.9 * 2 * np.sqrt(0.09 - off * off), abs=0.05)
+
+
 def test_solids_glow_and_lamps_add_up() -> None:
     glow = [(0.0, 0.4, 0.0), (0.0, 0.0, 0.0)]
     ours, exact = compared(SOLIDS, Stage(lights=TWO), 60, glow=glow)

@@ -46,8 +46,8 @@ FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
 PIXELS = 4096  # on surfaces, likewise
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
-
-
+TILE = 1 << 16  # samples at a time
+ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
@@ -581,9 +581,6 @@ def _dot(a: Array, b: Array) -> Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-TILE = 1 << 16  # samples at a time
-
-
 def draw_solids(
     field: SolidField,
     stage: Stage,
@@ -696,9 +693,6 @@ def rough(picture: np.ndarray, contrast: float = CAREFUL.contrast) -> np.ndarray
     across = abs(shown[:, 1:-1, 2:] + shown[:, 1:-1, :-2] - here).max(0)
     along = abs(shown[:, 2:, 1:-1] + shown[:, :-2, 1:-1] - here).max(0)
     return np.asarray(np.maximum(across, along) > contrast)
-
-
-ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 
 
 def solid_outputs(

@@ -36,6 +36,11 @@ DENSE, WITHIN, SINCE, LENGTH, MISTY = range(14, 19)
 FULL = 0.7  # of rays that are asked at least so many are under way,
 FEW = 8  # but for these
 SMALL = 2000  # rays are too few for two batches
+# of a way through media, where its material is asked for, and the like of each object's part of it
+LOOKS, PARTS = (0.003, *(i / 8 for i in range(1, 8)), 0.997), (0.3, 0.5, 0.7)
+JUMP = 0.03  # of materials that differ: linear colours, or extinction
+BETWEEN = 8  # halvings of the way between
+HALVINGS = 16  # of the interval in which a medium gives way to a solid
 WAIT = 4  # times as many are under way as wait to join them at most
 
 
@@ -414,11 +419,6 @@ def lengths(solids: SolidField, passes: Passes) -> tuple[Array, int]:
     return each.reshape(slots.shape[1:]).sum(0) * (solids.sigma or 1.0), len(flat)
 
 
-LOOKS = (0.003, *(i / 8 for i in range(1, 8)), 0.997)  # of a piece, where its material is asked for
-JUMP = 0.03  # of materials that differ: linear colours, or extinction
-BETWEEN = 8  # halvings of the way between
-
-
 def parted(solids: SolidField, trail: Trail, coloured: bool) -> Piece:
     """The ways of rays through media, cut where one medium's density, or colour if ``coloured``, gives way to
     another's.
@@ -441,7 +441,10 @@ def parted(solids: SolidField, trail: Trail, coloured: bool) -> Piece:
         result = [tuple(xp.take(part, xp.where(~several)) for part in piece)]
         ray, begin, end, before, _ = (xp.take(part, some) for part in piece)
         passes = trail.at(xp, ray)
-        places = [begin + (end - begin) * share for share in LOOKS]
+        first, last = (begin + (end - begin) * LOOKS[at] for at in (0, -1))
+        into, out = (xp.minimum(xp.maximum(passes.slots[side], first), last) for side in (BEGIN, END))
+        looks = [row for share in PARTS * dense for row in into + (out - into) * share]
+        places = list(xp.rising(xp.stack(looks + [begin + (end - begin) * share for share in LOOKS], 0)))
         seen = [material(passes, t) for t in places]
         steps = [xp.where(abs(a - b).sum(0) > JUMP) for a, b in pairwise(seen)]
         which = xp.concat(steps, 0)
@@ -483,9 +486,6 @@ def _stacked(xp: Arrays, piece: Piece, depth: Array) -> Piece:
     before = xp.narrow(total - xp.take(base, ray))
     xp.add(depth[None], ray, own[None])
     return ray, begin, end, before / sigma, sigma
-
-
-HALVINGS = 16  # of the interval in which a medium gives way to a solid
 
 
 class MarchSettings(NamedTuple):
