@@ -170,6 +170,20 @@ def test_an_edge_hides_the_half_of_what_glows(worth: float) -> None:
     assert free.std() < 0.1
 
 
+def test_a_colour_whose_glow_is_hidden_does_not_come() -> None:
+    """A black wall hides a bright red bar from the ground beyond, and nothing hides a dim blue one."""
+    around = around_of("""nsg 1; canvas(16, 16); light(none); sky(0); ground(-1);
+        box { scale(0.2, 0.2, 2); translate(-1.5, 0, 0); material diffuse { glow(#f00, 20); } }
+        box { scale(0.2, 0.2, 2); translate(1.5, 0, 0); material diffuse { glow(#00f, 1); } }
+        box { scale(0.1, 9, 9); material diffuse { color(#000); } }""")
+    x, z = np.random.default_rng(6).uniform([[0.5], [-1]], [[2.5], [1]], (2, 200))
+    p, n = np.stack([x, 0 * x - 1 + 1e-3, z]).astype(np.float32), np.tile(np.float32([[0], [1], [0]]), 200)
+    light, free = around.emitters.received(p, n)
+    assert light[0].mean() > light[2].mean()
+    assert (free[0] < 0.02).all()
+    assert free[2] == pytest.approx(1.0, abs=0.05)
+
+
 BOWL = """sphere { shell(0.09); scale(1.1); translate(0, 0.12, 0); material diffuse { color(#fff); } }
     capsule { scale(0.3); rotate(90deg); translate(1.4, -0.85, 0.5); material diffuse { color(#fff); } }"""
 GREY = "material diffuse { color(#ccc); }"

@@ -148,7 +148,7 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    # (R, L) from everywhere, and if something glows the part of its light that nothing hides; then how these
+    # (R, L) from everywhere, and if something glows the parts of its light that nothing hides; then how these
     # change from a point to the next across, and down
     received: Array
 
@@ -242,7 +242,7 @@ class Around:
             for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
-            every = [light, everywhere(free[None])] if self.emitters.there else [light]
+            every = [light, everywhere(free)] if self.emitters.there else [light]
             even = self.xp.concat([self._smoothed(each) for each in every], 0)
             slopes = [self._evened(even, part=part) for part in (1, 2)]
             self.seen = Seen(p, n, self.xp.concat([even, *slopes], 0))
@@ -397,7 +397,7 @@ class Around:
             result[3:, alone] = self.emitters.received(here, up, self.worth)[1]
         if not self.emitters.there:
             return result
-        return result[:3] + result[3].clip(None, 1.0) * self.emitters.received(p, n, INF)[0]
+        return result[:3] + result[3:].clip(None, 1.0) * self.emitters.received(p, n, INF)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""

@@ -60,14 +60,16 @@ class Emitters:
 
     def received(self, p: Array, n: Array, worth: float = 0.0) -> tuple[Array, Array]:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows if nothing
-        hides it, and the part (K,) that arrives; ``worth`` as of `seen`.
+        hides it, and the parts (3, K) that arrive; ``worth`` as of `seen`.
         """
-        result, part = 0 * p, 0 * p[:1]
+        result, both = 0 * p, self.xp.concat([0 * p] * 2, 0)  # of all rays, and of those that arrive
         for start in range(0, p.shape[1] if self.there else 0, BAND):
             band = slice(start, start + BAND)
             result[:, band], point, _, light, clear = self.seen(p[:, band], n[:, band], worth)
-            self.xp.add(part[:, band], point, (light.sum(0) * clear)[None])
-        return result, part[0] / result.sum(0).clip(1e-9)
+            self.xp.add(both[:, band], point, self.xp.concat([light, light * clear], 0))
+        # of a channel that hardly any ray has all of them tell
+        drawn, free = (each + each.sum(0) / 1000 for each in (both[:3], both[3:]))
+        return result, free / drawn.clip(1e-9)
 
     def seen(self, p: Array, n: Array | None, worth: float) -> tuple[Array, Array, Array, Array, Array]:
         """Light (3, K) that surfaces receive at points (3, K) with unit normals (3, K) if nothing hides it;
