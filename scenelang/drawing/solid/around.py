@@ -58,8 +58,8 @@ OFF, AHEAD = 1e-3, 3e-4  # world units off a surface, and on their way, where th
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, and in hollows; above it rays are sent again, so often and at most, turned so
-NOISE, MORE, FURTHER = (0.05, 0.03), (3, 7), np.array([[1.3756], [-0.5877]])
+# of the light on the lattice, and in hollows; above it rays are sent again, so often at most, turned so
+NOISE, MORE, FURTHER = (0.035, 0.025), 7, np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
 LEVEL = 0.1  # of squares of steps: planes through few points are as level
@@ -223,7 +223,7 @@ class Around:
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
 
             def everywhere(values: Array) -> Array:
-                result = 0 * p[: len(values)]
+                result = self.xp.full((len(values), p.shape[1]), 0.0, p)
                 self.xp.put(result, there, values)
                 return result
 
@@ -232,16 +232,15 @@ class Around:
             def received(turn: int) -> Array:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
-            self.seen, self.rings, light = Seen(p, n, p), dict[int, tuple[Array, ...]](), received(0)
-            self.worth = WORTH * float(light.sum()) / max(len(there), 1)
+            light, self.seen, self.rings = received(0), Seen(p, n, p), dict[int, tuple[Array, ...]]()
+            self.worth = WORTH * float(light[:3].sum()) / max(len(there), 1)
             glow, free = self.emitters.received(at, up, self.worth)
-            whole = max(float(light.sum()) + float((glow * free).sum()), 1e-9)
-            noise = float(abs(self._evened(light) - light).sum()) / whole
-            over, (few, most) = max(noise / NOISE[self.finer] - 1, 0.0), MORE
-            more = min(few * over, max(few, (few + over) / 2), most)
-            for turn in range(ceil(more)):  # inside of what is closed; the last ones count in part
+            whole = float(light[:3].sum()) + float((glow * free).sum())
+            over = float(abs(self._evened(light[3:])).sum()) / max(NOISE[self.finer] * whole, 1e-9)
+            light, more = light[:3], min(max(over * over - 1, 0.0), MORE)
+            for turn in range(ceil(more)):  # the last one counts in part
                 part = min(more - turn, 1.0)
-                light = light + (received(turn + 1) - light) * (part / (1 + turn + part))
+                light = light + (received(turn + 1)[:3] - light) * (part / (1 + turn + part))
             every = [light, everywhere(free)] if self.emitters.there else [light]
             even = self.xp.concat([self._smoothed(each) for each in every], 0)
             slopes = [self._evened(even, part=part) for part in (1, 2)]
@@ -383,7 +382,7 @@ class Around:
         xp = self.xp
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
-            return self.gathered(p, n, numbers, POINT_RAYS) + self._glowing(p, n)
+            return self.gathered(p, n, numbers, POINT_RAYS)[:3] + self._glowing(p, n)
         side, u, v = self._places(p)
         result, fits = self._between(p, n, side, u, v)
         alone = xp.where(~fits)
@@ -393,8 +392,8 @@ class Around:
             at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
             numbers = np.rint(at * (EIGHTHS * self.step))
             here, up = xp.take(p, alone), xp.take(n, alone)
-            xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow))
-            result[3:, alone] = self.emitters.received(here, up, self.worth)[1]
+            xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow)[:3])
+            result[3:, alone] = self.emitters.received(here, up, self.worth)[1][: len(result) - 3]
         if not self.emitters.there:
             return result
         return result[:3] + result[3:].clip(None, 1.0) * self.emitters.received(p, n, INF)[0]
@@ -405,12 +404,12 @@ class Around:
         return light * free
 
     def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool = True) -> Array:
-        """What points (3, K) with unit normals receive (3, K) by so many rays, which numbers (2, K) turn."""
-        result = 0 * p
-        for start in range(0, p.shape[1], BATCH // rays):
-            band = slice(start, start + BATCH // rays)
-            result[:, band] += self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer)
-        return result
+        """What points (3, K) with unit normals receive by so many rays that numbers (2, K) turn, and how far
+        halves of these are from it (6, K).
+        """
+        bands = [slice(at, at + BATCH // rays) for at in range(0, max(1, p.shape[1]), BATCH // rays)]
+        parts = [self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer) for band in bands]
+        return self.xp.concat(parts, 1)
 
     def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
         xp, (shift, turn) = self.xp, (TURNS @ numbers + 0.5) % 1.0
@@ -423,7 +422,8 @@ class Around:
         if self.mist is not None:
             more, clear = self.mist.along(begin, way, reach)
             light = light * clear + more
-        return light.reshape(3, rays, -1).mean(1)
+        light, sign = light.reshape(3, rays, -1), 1.0 - np.arange(1, rays + 1)[:, None] // 2 % 2 * 2
+        return xp.concat([light.mean(1), (light * xp.array(sign.astype(np.float32), p)).mean(1)], 0)
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
@@ -448,7 +448,7 @@ class Around:
         if again:
             colour, at, n, sent, part, place = (xp.concat(x, -1) for x in zip(*again, strict=True))
             turns = SCATTER[:, None] * np.asarray(xp.to_numpy(at), np.float64)
-            here = self.lamps(at, n) + self.gathered(at, n, turns[:2] + turns[2], AGAIN, False)
+            here = self.lamps(at, n) + self.gathered(at, n, turns[:2] + turns[2], AGAIN, False)[:3]
             xp.put(light, place, xp.take(light, place) + part * (colour * here - sent))
         return light, reach
 
