@@ -33,7 +33,7 @@ from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
 # light by which nodes around a place differ, and world units from a place, for which that sends so many rays
-DIFFER, SHORT, AGAIN = 0.3, 0.6, 5
+DIFFER, SHORT, AGAIN = 0.3, 1.2, 5
 GAP = 0.01  # world units, as of `MarchSettings`
 # part of rays that are given up, or number, but where they may leave what is closed; at most, or of nodes'
 RARE, LAST, OFTEN = 5e-3, 16, 0.06
