@@ -58,8 +58,8 @@ OFF, AHEAD = 1e-3, 3e-4  # world units off a surface, and on their way, where th
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
 SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
 EIGHTHS = 8  # of pixels are places told apart by
-# of the light on the lattice, and in hollows; above it rays are sent again, so often at most, turned so
-NOISE, MORE, FURTHER = (0.035, 0.025), 7, np.array([[1.3756], [-0.5877]])
+# of the light on the lattice, in hollows; above it rays are sent again, so often, far above more, turned so
+NOISE, MORE, FURTHER = (0.035, 0.025), (3, 7), np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
 BATCH = 1 << 16  # rays at once
 LEVEL = 0.1  # of squares of steps: planes through few points are as level
@@ -236,8 +236,8 @@ class Around:
             self.worth = WORTH * float(light[:3].sum()) / max(len(there), 1)
             glow, free = self.emitters.received(at, up, self.worth)
             whole = float(light[:3].sum()) + float((glow * free).sum())
-            over = float(abs(self._evened(light[3:])).sum()) / max(NOISE[self.finer] * whole, 1e-9)
-            light, more = light[:3], min(max(over * over - 1, 0.0), MORE)
+            over = (float(abs(self._evened(light[3:])).sum()) / max(NOISE[self.finer] * whole, 1e-9)) ** 2
+            light, more = light[:3], min(max(over - 1, 0.0), max(MORE[0], over / MORE[0]), MORE[1])
             for turn in range(ceil(more)):  # the last one counts in part
                 part = min(more - turn, 1.0)
                 light = light + (received(turn + 1)[:3] - light) * (part / (1 + turn + part))
