@@ -28,7 +28,6 @@ from scenelang.drawing.image import encoded
 from scenelang.drawing.metrics import psnr
 
 _ROWS = 1024  # of the environment map
-mi.set_variant(SCALAR)
 
 
 class Reflecting(mi.BSDF):

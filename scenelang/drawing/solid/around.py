@@ -404,8 +404,8 @@ class Around:
         return light * free
 
     def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool = True) -> Array:
-        """What points (3, K) with unit normals receive by so many rays that numbers (2, K) turn, and how far
-        halves of these are from it (6, K).
+        """Light that points (3, K) with unit normals receive by so many rays, which numbers (2, K) turn, and
+        how far halves of these are from it (6, K).
         """
         bands = [slice(at, at + BATCH // rays) for at in range(0, max(1, p.shape[1]), BATCH // rays)]
         parts = [self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer) for band in bands]
