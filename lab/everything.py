@@ -63,7 +63,6 @@ STEPS: Final = (
 """Commands in their order: each command of the laboratory and each benchmark that a page cites."""
 
 ELSEWHERE: Final = {
-    "device": "a GPU",
     "play": "a browser",
     "viewer": "a browser",
 }

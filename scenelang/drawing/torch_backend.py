@@ -15,7 +15,7 @@ from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError, replaced
 from scenelang.drawing.how import RenderError, keep_memory, threads_for
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.neural.load import Framed, Model, Network, Solids, load_model, place_of
+from scenelang.drawing.neural.load import Framed, Model, Solids, load_model, place_of
 from scenelang.drawing.neural.paper import draw_whole
 
 try:
@@ -63,17 +63,6 @@ def open_model(name: str, device: str = "cpu", weights: str = "") -> Model:
         raise RenderError(str(error)) from None
 
 
-def _by_kernel(network: Network, program: Program, samples: str) -> Drawing | None:
-    """The picture by one kernel, None where that cannot draw it: of solids, or on a CPU."""
-    if not isinstance(network, Framed) or place_of(network).type != "cuda":
-        return None
-    try:
-        from scenelang.drawing.neural.device import draw_on_device, ready
-    except ModuleNotFoundError:  # Triton comes with builds of torch for CUDA on Linux
-        return None
-    return draw_on_device(network, program, samples) if ready() else None
-
-
 def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Unpack[Run]) -> Drawing:
     """Draw a Program, as of `Run`; one drawing runs at a time, on all of ``threads``.
 
@@ -94,10 +83,7 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
         try:
             program.check_weights(model.digest)
             if isinstance(network, Framed | Solids):
-                drawing = _by_kernel(network, program, samples) if skip else None
-                if drawing is not None and progress is not None:
-                    progress(1.0)
-                drawing = drawing or draw_objects(network, program, skip=skip, **run)
+                drawing = draw_objects(network, program, skip=skip, **run)
                 drawing.image.credit = credit_of(program.elements)
                 return drawing
             if samples != "adaptive" or program.samples != 4:

@@ -16,7 +16,6 @@ GIVEN = dict.fromkeys(
         "all objects eight times",
         "a slope of 1.05",
         "looked up, four times where no",
-        "8 × 8 pixels",
         "up to 0.009 further",
         "at least 0.002",
         "6 or 12 numbers",

@@ -1,4 +1,4 @@
-// The framed network at points of the plane, as scenelang/drawing/neural/device.py computes it, and the pixels that
+// The framed network at points of the plane, as scenelang/drawing/neural/field.py computes it, and the pixels that
 // take 4 or 16 samples, as in scenelang/drawing/neural/coverage.py. In front stand sizes and angles.glsl, behind it the
 // decoders.
 
