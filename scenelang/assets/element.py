@@ -111,6 +111,19 @@ class Element:
         return None if self.material or not isinstance(size, int | float) or not size > 0 else float(size)
 
     @property
+    def centre(self) -> tuple[float, ...] | None:
+        """Middle of its unit ball in the file that it was made of, y up, None where it does not say."""
+        found = [self.about.get(axis) for axis in "xyz"[: self.dimension]]
+        numbers = [float(x) for x in found if isinstance(x, int | float)]
+        return tuple(numbers) if len(numbers) == len(found) and not self.material else None
+
+    @property
+    def values(self) -> dict[str, float | tuple[float, ...]]:
+        """Values of scenes that it brings, by name."""
+        said = {f"{self.name}_size": self.size, f"{self.name}_centre": self.centre}
+        return {name: value for name, value in said.items() if value is not None}
+
+    @property
     def kind(self) -> str:
         """Its kind, as manifests name it."""
         return FORMS[self.form].kinds[self.dimension]

@@ -193,8 +193,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
 
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     centre = [f"{x:.6g}" for x in shape.centre]
-    job.say(f"{name}: {name}_size is {shape.size:.6g}, the file's ({', '.join(centre)}) is the origin")
-    job = job._replace(about=job.about | {"size": shape.size, "centre": " ".join(centre)})
+    job.say(f"{name}: {name}_size is {shape.size:.6g}, {name}_centre is [{', '.join(centre)}]")
     element, tried = fit(shape, name, max_error=asked, report=report, progress=grown, **job.terms)
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
