@@ -16,7 +16,7 @@ import os
 import re
 import sys
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -113,8 +113,8 @@ class Font:
 
     def line(self, text: str) -> tuple[list[Placed], float]:
         """The letters of a line that begins at the origin, and its width, em; raises `FontError`."""
-        pen, placed = 0.0, list[Placed]()
-        for place, character in enumerate(text):
+        pen, placed, last = 0.0, list[Placed](), ""
+        for place, character in self._composed(text):
             at = self.letters.get(character, -1)
             if character in "\n\r\v\f\x85\u2028\u2029":
                 raise FontError("a line break in a text, which is one line", place)
@@ -122,13 +122,31 @@ class Font:
                 code = f"U+{ord(character):04X}"
                 shown = f"`{character}` ({code})" if character.isprintable() else code
                 raise FontError(f"the font has no {shown}", place)
-            if place:
-                pen += self.kerning(text[place - 1], character)
-            letter = self.metrics[at]
+            if last:
+                pen += self.kerning(last, character)
+            letter, last = self.metrics[at], character
             if letter.radius > _SMALL:
                 placed.append(Placed(name_of(character), pen + letter.x, letter.y, letter.radius))
             pen += letter.advance
         return placed, pen
+
+    def _composed(self, text: str) -> Iterator[tuple[int, str]]:
+        """Places and characters of a text, where a letter and its marks are one if the font has it."""
+        if text.isascii():
+            yield from enumerate(text)
+            return
+        from unicodedata import category, normalize
+
+        joins = [
+            category(c)[0] == "M" or "\u1160" <= c <= "\u11ff" for c in text
+        ]  # marks, and parts of Hangul
+        starts = [at for at, joined in enumerate(joins) if not (at and joined)]
+        for start, end in pairwise([*starts, len(text)]):
+            part, whole = text[start:end], normalize("NFC", text[start:end])
+            if not self.letters.keys() >= {*whole} and self.letters.keys() >= {*part}:
+                whole = part
+            for at, character in enumerate(whole):
+                yield max(start, end - len(whole) + at) if at else start, character
 
     def kerning(self, left: str, right: str) -> float:
         """By how much a letter goes farther from another than that advances, em."""
@@ -218,7 +236,7 @@ _HEADERS.append(_HEADERS[1] | {"font?": {"about": dict, "columns": range(1, MOST
 def read_zoo(data: bytes) -> ElementFile:
     """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
     file = read_tensors(data, MOST_ELEMENT_BYTES, (1, 2, 3))
-    check_fields(file.header, _HEADERS[file.header["format"] - 1], "the header of a file of elements")
+    check_fields(file.header, _HEADERS[file.header["format"] - 1], "its header")
     font = None
     if entry := file.header.get("font"):
         font = read_font(entry["columns"], _about(entry["about"], "the font"), file.tensors, file.body)

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import field
 from functools import cache
 from typing import Any, Final, TypeVar
+from unicodedata import normalize
 
 from scenelang.assets.element import Element, Gradient
 from scenelang.assets.element_file import load_textures, name_of
@@ -237,7 +238,7 @@ class Writer:
             case nodes.Bool():
                 return expr.value
             case nodes.String():
-                self.written |= {*expr.value}
+                self.written |= {*expr.value, *normalize("NFC", expr.value)}
                 return ["'", expr.value]
             case nodes.ColorLiteral():
                 return ["#", *(round(255 * part) for part in expr.rgb)]

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 import numpy as np
 import pytest
@@ -18,10 +19,11 @@ from safetensors.numpy import save
 import scenelang as nsg
 from scenelang.assets import element as elements
 from scenelang.assets.element import FORMS, Element, Part
-from scenelang.assets.element_file import element_file_bytes, entry_of, load_element_file, read_zoo
+from scenelang.assets.element_file import FontError, element_file_bytes, entry_of, load_element_file, read_zoo
 from scenelang.assets.picture import frame_of, painted, size_of, texels
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact.outline import Picture, fit_picture
+from scenelang.language import library
 from tests.assets.scenes import IMPORT, changed, good, retyped
 from tests.assets.shapes import ball, element, letters, noise, torus
 
@@ -59,9 +61,9 @@ def test_damaged_files() -> None:
     refused(
         [
             (b"", "header"),
-            (written(elements=None), "header of a file of elements has missing"),
-            (written(elements=[]), "`elements` of the header of a file of elements is not an object"),
-            (written(extra=1), "header of a file of elements has missing or unknown fields"),
+            (written(elements=None), "its header has missing"),
+            (written(elements=[]), "`elements` of its header is not an object"),
+            (written(extra=1), "its header has missing or unknown fields"),
             (written(name="other"), "other elements than it holds"),
             (written({"form": "octree"}), "form that this version does not know"),
             (written({"dimension": 4}), "`dimension` of element `ring` is not a whole number from 2 to 3"),
@@ -193,6 +195,23 @@ def test_headers_of_other_types_are_refused_or_drawn(tmp_path: Path) -> None:
     assert 20 < read < 400
 
 
+def test_letters_and_their_marks_are_one_where_the_font_has_them() -> None:
+    font = load_element_file(library.find("std/letters") or "").font
+    assert font is not None
+    text = "Ag\u00e9\u1ec7\u00c5\u00fc"
+    known = "".join(c for c in text if c in font.letters)
+    assert len(known) > 3
+    assert font.line(normalize("NFD", known)) == font.line(known)
+    assert font.line("\u2126") == font.line("\u03a9")  # of ohm, and omega
+    for text, at in (("e\u0301x\u0301", 3), ("e\u0301\u6f22", 2), ("\u0301", 0), ("e\u0301\u0489", 2)):
+        with pytest.raises(FontError) as error:
+            font.line(text)
+        assert error.value.at == at
+    with pytest.raises(FontError, match=r"U\+00C1") as error:
+        letters().line(" A\u0301")
+    assert error.value.at == 1
+
+
 def test_volumes_are_determinants() -> None:
     for d in (2, 3):
         rows = np.random.default_rng(d).normal(size=(d, d))
@@ -259,7 +278,7 @@ def test_damaged_entries() -> None:
             (other(coding="av1"), "damaged"),
             (other(form="colours"), "missing or unknown fields"),
             (other(elements={"bark": {}}), "other elements than it holds"),
-            (other(format=1), "header of a file of elements has missing or unknown fields"),
+            (other(format=1), "its header has missing or unknown fields"),
         ]
     )
 

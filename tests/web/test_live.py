@@ -375,6 +375,11 @@ def test_sizes_and_centres_of_elements(garage: Path, viewer_page: Any) -> None:
     assert check_cases(viewer_page, source, [({}, 0)], garage / "scene.nsg") == 1
 
 
+def test_letters_and_their_marks(viewer_page: Any) -> None:
+    text = 'import "std/letters" as abc; abc.text("e\u0301A\u030a"); disc { scale(abc.width("xu\u0308")); }'
+    assert check_cases(viewer_page, SourceFile("scene.nsg", text), [({}, 0)]) == 1
+
+
 MODEL = load_manifest("shapes2d")
 LITERALS = """0 1 2 3 0.5 -1 -2.5 7 1e-3 10 0.1 -0 1e200 255 30deg -45deg 0.5rad 0.25turn 0deg 2s 40ms -1s 0s
     [1,2] [0,1,0.5] X #d33 #7a5c3e [] [1,[2,3]] [10deg,20deg] [-1,0.5] true false "a" "day" "ä😀" none PI TAU

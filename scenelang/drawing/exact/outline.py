@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
+from unicodedata import normalize
 from xml.etree import ElementTree
 
 import numpy as np
@@ -385,7 +386,8 @@ def drawn(data: bytes, face: Face | None = None) -> tuple[list[Layer], tuple[str
         others = {type(e).__name__.lower() for e in parsed} & {"image"}
         layers, left_out, edges = list[Layer](), dict[str, None](), 0
         texts = [element.text or "" for element in parsed if isinstance(element, svgelements.Text)]
-        letters = "".join(sorted({*" ".join(["", *texts])}))
+        joined = " ".join(["", *texts])
+        letters = "".join(sorted({*joined, *normalize("NFC", joined)}))
         font = None if not texts else face(letters) if face else load_element_file(_LETTERS).font
         for element in parsed:
             if isinstance(element, svgelements.Shape):
