@@ -169,7 +169,7 @@ def fit_picture(
 MOST_EDGES: Final = 200_000
 MOST_TRACED: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
-_STRIP: Final = 64  # points of neighbouring heights
+STRIP: Final = 64  # points of neighbouring heights
 _TOGETHER: Final = 10_000  # edges that are asked at a time
 _FINE: Final = 0.002  # leaf units: longest edge along a curve of an element
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
@@ -328,8 +328,8 @@ def winding(edges: Edges, odd: bool) -> Inside:
 
     def inside(p: Points) -> npt.NDArray[np.bool_]:
         total, order = np.zeros(len(p), np.int64), np.argsort(p[:, 1])
-        for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
-            at = order[first : first + _STRIP]
+        for first in range(0, len(p), STRIP):  # points of a strip, and the edges that reach into it
+            at = order[first : first + STRIP]
             x, y = p[at].T[..., None]
             reach = edges[(low <= y[-1]) & (high >= y[0])]
             for part in (reach[k : k + _TOGETHER] for k in range(0, len(reach), _TOGETHER)):
