@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any, ClassVar, Final, NamedTuple
 
 from scenelang.assets.records import Record
-from scenelang.assets.tensors import TensorError
+from scenelang.assets.tensors import TensorError, check_fields
 
 MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
 MOST_PIXELS: Final = 2048  # along a side of a picture
@@ -28,7 +28,7 @@ Facts = dict[str, str | float]
 class Encoding(NamedTuple):
     """Form of elements."""
 
-    sizes: tuple[str, ...]  # names of its numbers in headers
+    sizes: dict[str, range]  # its numbers in headers, by name
     codings: tuple[str, ...]  # of its bytes; the first is the default of a header without one
     kinds: dict[int, str]  # its names in manifests, by dimension
 
@@ -36,17 +36,21 @@ class Encoding(NamedTuple):
 FORMS: Final = {
     # a geometry: grids of distances over [-1, 1]^d (`scenelang.assets.pyramid`)
     "pyramid": Encoding(
-        ("dimension", "cells", "levels"),
+        {"dimension": range(2, 4), "cells": range(2, 9), "levels": range(1, 10)},
         ("deflate", "bzip2"),
         {2: "element of the plane", 3: "element of space"},
     ),
     # a geometry: closed outlines of quadratic curves in the unit disc, which have the inside on their left:
     # 16-bit numbers of a start, a control point and an end, in 1 / `GRAIN`
-    "outline": Encoding(("curves",), ("plain",), {2: "element of the plane"}),
+    "outline": Encoding({"curves": range(1, MOST_CURVES + 1)}, ("plain",), {2: "element of the plane"}),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
-    "picture": Encoding(("height", "width"), ("webp", "av1"), {2: "texture"}),
+    "picture": Encoding(
+        dict.fromkeys(("height", "width"), range(1, MOST_PIXELS + 1)), ("webp", "av1"), {2: "texture"}
+    ),
     # a material: colours over [-1, 1]^3, at nodes on its faces too (`scenelang.assets.pyramid`)
-    "colours": Encoding(("side", "steps"), ("bzip2",), {3: "colouring of space"}),
+    "colours": Encoding(
+        {"side": range(2, MOST_SIDE[3] + 1), "steps": range(4, 256)}, ("bzip2",), {3: "colouring of space"}
+    ),
 }
 
 
@@ -107,6 +111,19 @@ class Element:
         return None if self.material or not isinstance(size, int | float) or not size > 0 else float(size)
 
     @property
+    def centre(self) -> tuple[float, ...] | None:
+        """Middle of its unit ball in the file that it was made of, y up, None where it does not say."""
+        found = [self.about.get(axis) for axis in "xyz"[: self.dimension]]
+        numbers = [float(x) for x in found if isinstance(x, int | float)]
+        return tuple(numbers) if len(numbers) == len(found) and not self.material else None
+
+    @property
+    def values(self) -> dict[str, float | tuple[float, ...]]:
+        """Values of scenes that it brings, by name."""
+        said = {f"{self.name}_size": self.size, f"{self.name}_centre": self.centre}
+        return {name: value for name, value in said.items() if value is not None}
+
+    @property
     def kind(self) -> str:
         """Its kind, as manifests name it."""
         return FORMS[self.form].kinds[self.dimension]
@@ -165,19 +182,6 @@ def credit_of(elements: Iterable[Element]) -> str:
     return "\n".join(dict.fromkeys(f"{name}: {', '.join(what)}" for name, what in said if what))
 
 
-def in_range(form: str, sizes: tuple[int, ...]) -> bool:
-    """Return whether a form allows these sizes."""
-    if form == "picture":
-        return all(1 <= side <= MOST_PIXELS for side in sizes)
-    if form == "colours":
-        return 2 <= sizes[0] <= MOST_SIDE[3] and 4 <= sizes[1] <= 255
-    if form == "outline":
-        return 1 <= sizes[0] <= MOST_CURVES
-    dimension, cells, levels = sizes
-    fits = dimension in MOST_SIDE and 2 <= cells <= 8 and 1 <= levels <= 9
-    return fits and cells * 2 ** (levels - 1) < MOST_SIDE[dimension]
-
-
 MOST_PARTS: Final = 256
 _MOST: Final = 1e4  # how far away or how large a part may be, and how small by its inverse
 _Numbers = tuple[float, ...]
@@ -196,6 +200,12 @@ class Part(NamedTuple):
 
 
 Group = tuple[Part, ...]  # in the order of painting
+_NUMBER: Final = (-_MOST, _MOST)
+_PART: Final = {
+    "geometry": str, "place": [_NUMBER], "size": (1 / _MOST, _MOST), "turn?": [[_NUMBER]],
+    "color?": [(0, 1)], "material?": str,
+}  # fmt: skip
+"""A part in a header, as `check_fields` takes it."""
 
 
 def read_group(
@@ -206,21 +216,19 @@ def read_group(
         raise TensorError(f"a group has the name {name[:40]!r}")
     if not isinstance(entry, list) or not 1 <= len(entry) <= MOST_PARTS:
         raise TensorError(f"group `{name}` is not a list of 1 to {MOST_PARTS} parts")
+    check_fields(entry, [_PART], f"group `{name}`")
     group: list[Part] = []
-    needed, known = {"geometry", "place", "size"}, {*Part._fields}
     for fields in entry:
-        if not isinstance(fields, dict) or not needed <= fields.keys() <= known:
-            raise TensorError(f"a part of group `{name}` has missing or unknown fields")
         part = Part(**{key: _frozen(value) for key, value in fields.items()})
-        shape = geometries.get(part.geometry) if isinstance(part.geometry, str) else None
+        shape = geometries.get(part.geometry)
         first = geometries[group[0].geometry] if group else shape
         if shape is None or first is None or shape.dimension != first.dimension:
             raise TensorError(f"group `{name}` has a part that is not a geometry of its dimension")
-        worn = materials.get(part.material) if isinstance(part.material, str) else None
+        worn = materials.get(part.material)
         if part.material and (worn is None or worn.dimension > shape.dimension):
             raise TensorError(f"group `{name}` has a material that the file does not hold")
         if not _lies(part, shape.dimension):
-            raise TensorError(f"group `{name}` has numbers out of range")
+            raise TensorError(f"group `{name}` has a place, a turn or a colour that is none")
         group.append(part)
     return tuple(group)
 
@@ -239,14 +247,9 @@ def _frozen(value: Any) -> Any:
 
 
 def _lies(part: Part, d: int) -> bool:
-    """Return whether the numbers of a part have the right types, counts and bounds."""
-    rows = (part.place, (part.size,), *(part.turn if isinstance(part.turn, tuple) else (0,)), part.color)
-    if not all(isinstance(row, tuple) and all(type(x) in (int, float) for x in row) for row in rows):
-        return False
+    """Return whether the numbers of a part have the right counts, and its turn is one."""
     turned = not part.turn or ([len(row) for row in part.turn] == [d] * d and abs(_volume(part.turn)) > 1e-6)
-    placed = len(part.place) == d and all(abs(x) <= _MOST for x in (*part.place, *sum(part.turn, ())))
-    coloured = len(part.color) in (0, 3) and all(0 <= x <= 1 for x in part.color)
-    return turned and placed and coloured and 1 / _MOST <= part.size <= _MOST
+    return turned and len(part.place) == d and len(part.color) in (0, 3)
 
 
 def _volume(rows: tuple[_Numbers, ...]) -> float:

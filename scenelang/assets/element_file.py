@@ -16,18 +16,18 @@ import os
 import re
 import sys
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from scenelang.assets.element import FORMS, MOST_CURVES, ROOM, Element, Facts, Group, in_range, read_group
+from scenelang.assets.element import FORMS, MOST_CURVES, MOST_SIDE, ROOM, Element, Facts, Group, read_group
 from scenelang.assets.element import entry_of as group_entry
 from scenelang.assets.files import read_regular
 from scenelang.assets.picture import pixels
-from scenelang.assets.tensors import Tensor, TensorError, read_tensors
+from scenelang.assets.tensors import Tensor, TensorError, check_fields, read_tensors
 
 MOST_LETTERS: Final = 40_000
 MOST_CLASSES: Final = 1 << 22  # entries of a table of kerning
@@ -86,7 +86,7 @@ class Font:
         fit = len(numbers) == 4 * count == 2 * len(classes) and len(ends) == count
         if not (fit and codes[0] >= 0 and codes[-1] <= sys.maxunicode):
             raise TensorError("a font whose tables do not fit together")
-        rows = len(self._kerning) // columns if type(columns) is int and columns > 0 else 0
+        rows = len(self._kerning) // columns
         if rows * columns != len(self._kerning) or not 0 < rows * columns <= MOST_CLASSES:
             raise TensorError("a font with a damaged table of kerning")
         if not (min(classes) >= 0 and max(classes[:count]) < rows and max(classes[count:]) < columns):
@@ -113,8 +113,8 @@ class Font:
 
     def line(self, text: str) -> tuple[list[Placed], float]:
         """The letters of a line that begins at the origin, and its width, em; raises `FontError`."""
-        pen, placed = 0.0, list[Placed]()
-        for place, character in enumerate(text):
+        pen, placed, last = 0.0, list[Placed](), ""
+        for place, character in self._composed(text):
             at = self.letters.get(character, -1)
             if character in "\n\r\v\f\x85\u2028\u2029":
                 raise FontError("a line break in a text, which is one line", place)
@@ -122,13 +122,31 @@ class Font:
                 code = f"U+{ord(character):04X}"
                 shown = f"`{character}` ({code})" if character.isprintable() else code
                 raise FontError(f"the font has no {shown}", place)
-            if place:
-                pen += self.kerning(text[place - 1], character)
-            letter = self.metrics[at]
+            if last:
+                pen += self.kerning(last, character)
+            letter, last = self.metrics[at], character
             if letter.radius > _SMALL:
                 placed.append(Placed(name_of(character), pen + letter.x, letter.y, letter.radius))
             pen += letter.advance
         return placed, pen
+
+    def _composed(self, text: str) -> Iterator[tuple[int, str]]:
+        """Places and characters of a text, where a letter and its marks are one if the font has it."""
+        if text.isascii():
+            yield from enumerate(text)
+            return
+        from unicodedata import category, normalize
+
+        joins = [
+            category(c)[0] == "M" or "\u1160" <= c <= "\u11ff" for c in text
+        ]  # marks, and parts of Hangul
+        starts = [at for at, joined in enumerate(joins) if not (at and joined)]
+        for start, end in pairwise([*starts, len(text)]):
+            part, whole = text[start:end], normalize("NFC", text[start:end])
+            if not self.letters.keys() >= {*whole} and self.letters.keys() >= {*part}:
+                whole = part
+            for at, character in enumerate(whole):
+                yield max(start, end - len(whole) + at) if at else start, character
 
     def kerning(self, left: str, right: str) -> float:
         """By how much a letter goes farther from another than that advances, em."""
@@ -209,25 +227,23 @@ def _load(path: str, *version: int) -> ElementFile:
 
 _TABLES: Final = {"elements": "", "materials": "material."}
 """Tables of a header, and the prefixes of their tensors' names."""
+_HEADER: Final = {"format": int, "elements": {str: dict}}
+_HEADERS: Final = [_HEADER, _HEADER | {"materials": {str: dict}, "groups": {str: list}}]
+_HEADERS.append(_HEADERS[1] | {"font?": {"about": dict, "columns": range(1, MOST_CLASSES + 1)}})
+"""Headers by format, from 1, as `check_fields` takes them."""
 
 
 def read_zoo(data: bytes) -> ElementFile:
     """The elements in a file's bytes, each unpacked once as a check; raises `TensorError`."""
     file = read_tensors(data, MOST_ELEMENT_BYTES, (1, 2, 3))
-    entry = file.header.pop("font", None) if file.header["format"] == 3 else None
-    known = {"format", "elements"} | ({"materials", "groups"} if file.header["format"] > 1 else set())
-    tables = {key: file.header.get(key) for key in sorted(known - {"format"})}
-    if file.header.keys() != known or not all(isinstance(table, dict) for table in tables.values()):
-        raise TensorError("not a file of elements")
+    check_fields(file.header, _HEADERS[file.header["format"] - 1], "its header")
     font = None
-    if entry is not None:
-        if not isinstance(entry, dict) or entry.keys() != {"about", "columns"}:
-            raise TensorError("its font has missing or unknown fields")
+    if entry := file.header.get("font"):
         font = read_font(entry["columns"], _about(entry["about"], "the font"), file.tensors, file.body)
         for name in TENSORS:
             del file.tensors[name]
-    listed_groups = tables.pop("groups", None) or {}
-    entries = [(key, name, entry) for key, table in tables.items() for name, entry in (table or {}).items()]
+    listed_groups = file.header.get("groups", {})
+    entries = [(key, name, e) for key in _TABLES for name, e in file.header.get(key, {}).items()]
     tensors = [_TABLES[key] + name for key, name, _ in entries]
     if len(set(tensors)) < len(tensors) or {*tensors} != file.tensors.keys():
         raise TensorError("its header names other elements than it holds")
@@ -270,20 +286,19 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
     form = FORMS.get(str(entry.get("form"))) if isinstance(entry, dict) else None
     if form is None:
         raise TensorError(f"element `{name}` has a form that this version does not know")
-    if entry.keys() - {"coding"} != {"form", "about", *form.sizes}:
-        raise TensorError(f"element `{name}` has missing or unknown fields")
+    check_fields(entry, {"form": str, "about": dict, "coding?": str, **form.sizes}, f"element `{name}`")
     coding = entry.get("coding", form.codings[0])
     if coding not in form.codings:
         raise TensorError(f"element `{name}` has a coding that this version does not know")
     sizes = tuple(entry[key] for key in form.sizes)
-    if not all(type(size) is int for size in sizes) or not in_range(entry["form"], sizes):
+    if entry["form"] == "pyramid" and sizes[1] << sizes[2] - 1 >= MOST_SIDE[sizes[0]]:
         raise TensorError(f"element `{name}` has sizes out of range")
     about = _about(entry["about"], f"element `{name}`")
     return Element(name, entry["form"], sizes, coding, bytes(body[tensor.first : tensor.last]), about)
 
 
-def _about(said: Any, whose: str) -> Facts:
-    if not isinstance(said, dict) or not all(k.isidentifier() and is_said(v) for k, v in said.items()):
+def _about(said: Facts, whose: str) -> Facts:
+    if not all(key.isidentifier() and is_said(value) for key, value in said.items()):
         raise TensorError(f"what {whose} says of itself is not text and numbers")
     return said
 

@@ -20,6 +20,7 @@ _TYPES: Final = {
     "F64": "<f8", "F32": "<f4", "F16": "<f2", "I64": "<i8", "I32": "<i4", "I16": "<i2", "I8": "<i1",
     "U8": "<u1", "BOOL": "|b1",
 }  # fmt: skip
+_KINDS: Final = {str: "text", int: "a whole number", list: "a list", dict: "an object"}
 
 
 class TensorError(ValueError):
@@ -95,6 +96,33 @@ def _object(data: bytes, what: str) -> dict[str, Any]:
     if not isinstance(result, dict):
         raise TensorError(f"{what} is not an object")
     return result
+
+
+def check_fields(value: Any, schema: Any, whose: str) -> None:
+    """Hold JSON to a schema; raises `TensorError`, which names the field that is of another type or range.
+
+    A schema is a type, a `range`, the least and the greatest of numbers, a list with that of all items, or a
+    dict with those of fields, of which ``name?`` may lack, or with that of all fields for `str`.
+    """
+    kind = schema if isinstance(schema, type) else type(schema)
+    fits, wanted = type(value) is kind, _KINDS.get(kind, "")
+    if isinstance(schema, range):
+        fits = type(value) is int and value in schema
+        wanted = f"a whole number from {schema[0]:,} to {schema[-1]:,}"
+    elif isinstance(schema, tuple):
+        fits = type(value) in (int, float) and schema[0] <= value <= schema[1]
+        wanted = f"a number from {schema[0]:g} to {schema[1]:g}"
+    if not fits:
+        raise TensorError(f"{whose} is not {wanted}")
+    for item in value if isinstance(schema, list) else ():
+        check_fields(item, schema[0], whose)
+    if isinstance(schema, dict):
+        known = dict.fromkeys(value, schema[str]) if str in schema else schema
+        fields = {name.removesuffix("?"): inner for name, inner in known.items()}
+        if not known.keys() & fields.keys() <= value.keys() <= fields.keys():
+            raise TensorError(f"{whose} has missing or unknown fields")
+        for name, item in value.items():
+            check_fields(item, fields[name], f"`{name[:40]}` of {whose}")
 
 
 def _tensor(name: str, entry: Any) -> Tensor:

@@ -28,7 +28,7 @@ from scenelang.assets import notebook
 from scenelang.assets.element import Element, Gradient, stops_fault
 from scenelang.assets.element_file import MOST_ELEMENT_BYTES, entry_of, read_elements
 from scenelang.assets.files import read_regular, write_output
-from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, read_tensors
+from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, check_fields, read_tensors
 from scenelang.compiler.graph import MOST_STEPS, ColourStep
 from scenelang.compiler.groups import OPERATOR, token_fault
 from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
@@ -398,8 +398,12 @@ _LAYOUT |= {"objects": ("I32", ()), "places": ("I32", (5,))}
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
 _TABLES: _Columns = {"paints": ("I32", (2,)), "steps": ("F32", (4,)), "stops": ("F32", (5,))}
 _PAINTS = {"paints", "steps"}
-_HEADER: dict[str, Any] = {"background": list | None, "format": int, "model": str, "weights": str}
-_HEADER |= dict.fromkeys(("canvas", "files", "geometries"), list)
+_HEADER: dict[Any, Any] = dict.fromkeys(("format", "samples?"), int) | dict.fromkeys(
+    ("model", "weights"), str
+)
+_HEADER |= {"canvas": [range(1, MOST_PIXELS + 1)], "background": [(0, 1)], "stage?": dict, "elements?": list}
+_HEADER |= {"files": [str], "geometries": [str]}
+"""A header of the newest format, as `check_fields` takes it."""
 
 
 def load_program(path: str | Path, *, weights: str | None = None) -> Program:
@@ -422,6 +426,10 @@ def parse_program(data: bytes) -> Program:
     """The Program in a file's bytes, checked but for the weights' digest; raises `ProgramError`."""
     try:
         file = read_tensors(data, MOST_PROGRAM_BYTES, range(FORMAT, NEWEST + 1))
+        clear = {"background": type(None)} if file.header.get("background", 0) is None else {}
+        newer = {"samples?"} if file.header["format"] < NEWEST else set()
+        schema = {name: each for name, each in (_HEADER | clear).items() if name not in newer}
+        check_fields(file.header, schema, "the header")
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
@@ -429,13 +437,7 @@ def parse_program(data: bytes) -> Program:
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
     header = file.header
-    newer = {"samples"} if header["format"] == NEWEST else set()
-    complete = header.keys() - {"stage", "elements", *newer} == _HEADER.keys()
-    if not complete or not all(isinstance(header[k], _HEADER[k]) for k in _HEADER):
-        raise ProgramError("the header has missing, unknown or damaged fields")
     geometries, files = header["geometries"], header["files"]
-    if not all(isinstance(name, str) for name in (*geometries, *files)):
-        raise ProgramError("names in the header that are not text")
     objects, places = tensors["objects"], tensors["places"]
     known = places[:, 0] >= 0
     if count and not 0 <= objects.min() <= objects.max() < len(geometries):
@@ -475,10 +477,8 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
         raise TensorError("elements in a file of format 1")
     if file.header["format"] == 1 or (file.header["format"] >= GROUPED and "elements" not in file.header):
         return ()
-    listed = file.header.get("elements")
-    if not isinstance(listed, list) or not all(
-        isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed
-    ):
+    listed = file.header.get("elements", [None])
+    if not all(isinstance(item, list) and len(item) == 2 and isinstance(item[0], str) for item in listed):
         raise TensorError("its list of elements is damaged")
     result = []
     for at, (name, entry) in enumerate(listed):

@@ -529,8 +529,9 @@ class _Maker:
             if element.material == worn and element.form != "outline":
                 name, about = element.name, element.told()
                 yield Proposal(name, Kind.Class, f"{name} {{ $0 }}", "a", element.kind, about, True)
-            if element.size is not None and not worn:
-                yield Proposal(f"{element.name}_size", Kind.Constant, "", "b", f"{element.size:g}")
+            for name, value in element.values.items() if not worn else ():
+                numbers = ", ".join(f"{x:g}" for x in (value if isinstance(value, tuple) else (value,)))
+                yield Proposal(name, Kind.Constant, "", "b", numbers)
         if (library := self.docs.imported(self.document, symbol.node.path.value)) is None:
             return
         for known in library.names.exported():

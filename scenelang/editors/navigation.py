@@ -370,8 +370,7 @@ def _elements(docs: Workspace, document: Document, use: Use, picture: Callable[[
         about = (f"{key}: {value}" for key, value in zoo.font.about.items())
         letters = "\n".join([f"a font of {len(zoo.font.letters):,} letters", *about]).replace("`", "'")
         return f"{_word(words.LETTERS[name])}\n\n```text\n{letters}\n```"
-    names = (name, name.removesuffix("_size"))  # what an element says has its size
-    result = [element for element in zoo.elements if element.name in names and element.material == worn]
+    result = [e for e in zoo.elements if name in (e.name, *e.values) and e.material == worn]
     parts = [f"```text\n{e.told().replace('`', chr(39))}\n```{picture(e)}" for e in result]
     if name in zoo.groups and not worn:
         parts.append(f"```text\n{name}(): {told(zoo.groups[name])}\n```")

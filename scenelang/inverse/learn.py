@@ -141,7 +141,8 @@ def make(request: Mapping[str, Any], data: bytes, tell: Callable[..., None]) -> 
     options, suffix, name = LearnOptions(**request["options"]), request["suffix"], request["name"]
     job = _Job(options, request["about"], time.monotonic() + options.budget_s, tell)
     if suffix in MOST_OF_FONT:
-        found = read_font(data, request["about"], options.letters, lambda said: job.say(f"{name}: {said}"))
+        patient, heard = options.budget_s < math.inf, lambda said: job.say(f"{name}: {said}")
+        found = read_font(data, request["about"], options.letters, heard, patient)
         job.say(f"{name}: {', '.join(found[1])}")
         return element_file_bytes([], font=found[0])
     if options.paints(suffix):
@@ -193,8 +194,7 @@ def _shape(shape: Shape, name: str, size: float, job: _Job) -> Element:
 
     asked = (job.options.max_error or NEAR[shape.dimension]) * min(COARSER, 1 / size)
     centre = [f"{x:.6g}" for x in shape.centre]
-    job.say(f"{name}: {name}_size is {shape.size:.6g}, the file's ({', '.join(centre)}) is the origin")
-    job = job._replace(about=job.about | {"size": shape.size, "centre": " ".join(centre)})
+    job.say(f"{name}: {name}_size is {shape.size:.6g}, {name}_centre is [{', '.join(centre)}]")
     element, tried = fit(shape, name, max_error=asked, report=report, progress=grown, **job.terms)
     off = float(element.about["error"])
     short = "" if off <= asked else f", where {asked:g} was asked"
@@ -476,7 +476,12 @@ def learn(
 MOST_OF_FONT: Final = dict.fromkeys((".ttf", ".otf", ".ttc"), 32 << 20)  # bytes of a file
 _CUBIC: Final = 2e-5  # em: how far quadratic curves may be off a cubic one
 _MOST_CURVES: Final = 1_000_000  # of all letters
-_KERNED: Final = 3000  # letters whose pairs are asked
+_KERNED: Final = 3000  # letters whose pairs are asked,
+_KERNED_S: Final = 8.0  # of processor time at most, which some tables make long
+# work on outlines, in comparisons of points with edges, 10 to 30 ns each; letters of usual fonts take 100,000
+_LETTER_WORK: Final = 50_000_000
+_FONT_WORK: Final = 200_000_000  # of a font, and
+_USUAL_WORK: Final = 200_000  # more for each letter
 _ALPHABETS: Final = 0x2E80  # where those end that fonts kern
 _SAMPLES: Final = 8, 64  # edges of a curve, to see whether contours overlap, and where they do
 _BESIDE: Final = 1e-7  # of a radius: from a curve to where its sides are asked
@@ -486,12 +491,21 @@ _LEAST: Final = 1e-6  # em: the least radius of what shows
 Curves = npt.NDArray[np.float64]  # (n, 3, 2) start, control point, end
 
 
+class _Intricate(Exception):
+    """A letter of so many points, or points beside each other, that it takes more than `_LETTER_WORK`."""
+
+
 def read_font(
-    data: bytes, about: Facts, letters: str | None = None, say: Callable[[str], None] = lambda line: None
+    data: bytes,
+    about: Facts,
+    letters: str | None = None,
+    say: Callable[[str], None] = lambda line: None,
+    patient: bool = False,
 ) -> tuple[Font, list[str]]:
     """Read the letters of a font that lie in ranges, by default all, and lines about it; raises `FitError`.
 
-    ``say`` is called when the file is known to be a font, before its letters are read.
+    ``say`` is called when the file is known to be a font, before its letters are read. One that takes far
+    more work than usual is refused unless ``patient``.
     """
     with needed("uharfbuzz"):
         import uharfbuzz
@@ -510,10 +524,17 @@ def read_font(
         raise FitError(f"{len(held):,} of these letters, where 1 to {MOST_LETTERS:,} are allowed")
     say(plural(len(held), "letter"))
     codes, numbers, ends, parts = list[int](), list[float](), list[int](), list[bytes]()
-    left_out, count = list[str](), 0
-    for code, glyph in sorted(held.items()):
+    left_out, intricate, count, work = list[str](), list[str](), 0, [0]
+    for done, (code, glyph) in enumerate(sorted(held.items())):
+        if work[0] > _FONT_WORK + _USUAL_WORK * done and not patient:
+            most = f"more than the usual work on its first {plural(done, 'letter')}"
+            raise FitError(f"{most}; --letters takes some of them, --budget SECONDS all")
         advance = font.get_glyph_h_advance(glyph) / face.upem
-        disc, outline = _outline(_contours(font, glyph) / face.upem)
+        try:
+            disc, outline = _outline(_contours(font, glyph) / face.upem, work)
+        except _Intricate:
+            intricate.append(f"U+{code:04X}")
+            continue
         if not abs(advance) < 50 or len(outline) > MOST_CURVES or not _closed(outline):
             left_out.append(f"U+{code:04X}")
             continue
@@ -524,8 +545,10 @@ def read_font(
         codes.append(code)
         numbers += (advance, *disc)
         ends.append(count)
+    if not codes:
+        raise FitError("all of these letters are damaged or of too many points")
     glyphs = [held[code] for code in codes]
-    classes, kerning, columns = _kerning(uharfbuzz, font, codes, glyphs, face.upem)
+    classes, kerning, columns, kerned = _kerning(uharfbuzz, font, codes, glyphs, face.upem)
     values: list[Any] = [codes, numbers, ends, classes, kerning, b"".join(parts)]
     tables = {name: array(TENSORS[name][1], value) for name, value in zip(TENSORS, values, strict=True)}
     try:
@@ -533,7 +556,9 @@ def read_font(
     except TensorError as error:
         raise FitError(str(error)) from None
     notes = [plural(len(codes), "letter"), plural(count, "curve"), f"{len(kerning):,} pairs of classes"]
-    notes += [f"left out, as they are damaged: {', '.join(left_out[:20])}"] if left_out else []
+    notes += [f"kerning of the first {kerned:,} letters alone, as it takes long"] if kerned >= 0 else []
+    for listed, why in ((left_out, "damaged"), (intricate, "of too many points")):
+        notes += [f"left out, as they are {why}: {', '.join(listed[:20])}"] if listed else []
     return result, notes
 
 
@@ -550,12 +575,17 @@ def ranges_of(text: str) -> list[range]:
 def _contours(font: Any, glyph: int) -> Curves:
     """Closed contours of a glyph, in font units; cubic curves as quadratic ones that are near enough."""
     drawn, begin = list[tuple[Any, ...]](), (0.0, 0.0)
-    draw = dict.fromkeys(("lineTo", "qCurveTo", "curveTo"), lambda *points: drawn.append(points))
+
+    def add(*points: Any) -> None:
+        if len(drawn) <= MOST_CURVES:
+            drawn.append(points)
+
+    draw = dict.fromkeys(("lineTo", "qCurveTo", "curveTo"), add)
     end = dict.fromkeys(("closePath", "endPath"), lambda: None)
-    pen = SimpleNamespace(moveTo=lambda point: drawn.append((None, point)), **draw, **end)
+    pen = SimpleNamespace(moveTo=lambda point: add(None, point), **draw, **end)
     font.draw_glyph_with_pen(glyph, pen)
     found, at = [np.zeros((0, 3, 2))], begin
-    for first, *rest in [*drawn[: 4 * MOST_CURVES], (None, begin)]:
+    for first, *rest in [*drawn, (None, begin)]:
         closes = first is None
         points = np.array([at, begin] if closes else [at, first, *rest], float)
         at = (first, *rest)[-1]
@@ -564,7 +594,10 @@ def _contours(font: Any, glyph: int) -> Curves:
             points = np.stack([points[0], points.mean(0), points[1]])
         found.append(_quadratics(points, _CUBIC * font.face.upem) if len(points) == 4 else points[None])
     result = np.concatenate(found)
-    return np.asarray(result[(result != result[:, :1]).any((1, 2))])
+    result = result[(result != result[:, :1]).any((1, 2))]
+    if max(len(drawn), len(result)) > MOST_CURVES:
+        raise _Intricate
+    return np.asarray(result)
 
 
 def _quadratics(p: Curves, near: float) -> Curves:
@@ -591,12 +624,15 @@ def _part(curve: Curves, s: float, e: float) -> Curves:
     return np.stack([a + s * (u + s * w), a + u * (s + e) / 2 + w * s * e, a + e * (u + e * w)])
 
 
-def _outline(curves: Curves) -> tuple[tuple[float, float, float], npt.NDArray[np.int16]]:
-    """The disc of contours, and the outline of what they cover in it (n, 3, 2), in steps of `GRAIN`."""
+def _outline(curves: Curves, work: list[int]) -> tuple[tuple[float, float, float], npt.NDArray[np.int16]]:
+    """The disc of contours, and the outline of what they cover in it (n, 3, 2), in steps of `GRAIN`.
+
+    What that takes is added to ``work``, of one number.
+    """
     nothing = (0.0, 0.0, 0.0), np.zeros((0, 3, 2), np.int16)
     if not len(curves) or not abs(curves).max() < 50:
         return nothing
-    kept = _boundary(curves)
+    kept = _boundary(curves, work)
     if not len(kept):
         return nothing
     points = _edges(kept, _SAMPLES[1]).reshape(-1, 2)
@@ -609,25 +645,26 @@ def _outline(curves: Curves) -> tuple[tuple[float, float, float], npt.NDArray[np
     return (float(middle[0]), float(middle[1]), radius * GRAIN / (GRAIN - 1)), steps
 
 
-def _boundary(curves: Curves) -> Curves:
+def _boundary(curves: Curves, work: list[int]) -> Curves:
     """Parts of closed contours that have the inside on one side alone, turned to have it on their left."""
     size, few = abs(curves - curves.mean((0, 1))).max(), _edges(curves, _SAMPLES[0])
-    side = _sides(few, outline.winding(few.reshape(-1, 2, 2), odd=False), size)
+    side = _sides(few, few, size, work)
     if (side == 1).all() or (side == -1).all():
         return curves if side[0, 0] == 1 else curves[::-1, ::-1]
-    parts, count = _apart(curves, size), _SAMPLES[1]
+    parts, count = _apart(curves, size, work), _SAMPLES[1]
     many = _edges(parts, count)
-    side = _sides(many[:, count // 2], outline.winding(many.reshape(-1, 2, 2), odd=False), size)
+    side = _sides(many[:, count // 2], many, size, work)
     return np.asarray(np.where(side[:, None, None] > 0, parts, parts[:, ::-1])[side != 0])
 
 
-def _apart(curves: Curves, size: float) -> Curves:
+def _apart(curves: Curves, size: float, work: list[int]) -> Curves:
     """Parts of curves, cut where they cross others or end on them; whole ones where that is too much work."""
     low, high, n = curves.min(1) - _MEET * size, curves.max(1) + _MEET * size, _SAMPLES[0]
     close = (low[:, None] <= high).all(2) & (low <= high[:, None]).all(2)
     pairs = np.nonzero(np.triu(close, 1))
     if len(pairs[0]) > _CLOSE:
         return curves
+    work[0] += 600 * len(pairs[0])
     edges = _edges(curves, n)
     start, way = edges[:, :, 0], edges[:, :, 1] - edges[:, :, 0]
     between = start[pairs[1]][:, None] - start[pairs[0]][:, :, None]  # (pairs, n, n, 2)
@@ -643,9 +680,15 @@ def _apart(curves: Curves, size: float) -> Curves:
         t = t + np.stack([crossed(b - a, v), crossed(b - a, u)]) / np.where(turn, turn, np.inf)
         t = t.clip(-0.1, 1.1)
     met = (abs(t - 0.5) <= 0.5 + _MEET).all(0) & (np.hypot(*(a - b).T) < _MEET * size)
-    result = []
+    which = curve[:, met].reshape(-1)
+    if len(which) > 2 * MOST_CURVES:
+        raise _Intricate
+    work[0] += 3000 * len(which)
+    order, result = np.argsort(which), []
+    places = np.round(t[:, met].clip(0, 1), 6).reshape(-1)[order]
+    firsts = np.searchsorted(which[order], range(len(curves) + 1))
     for at, one in enumerate(curves):
-        cuts = np.unique([0, *np.round(t[:, met][curve[:, met] == at].clip(0, 1), 6), 1])
+        cuts = np.unique([0, *places[firsts[at] : firsts[at + 1]], 1])
         result += [_part(one, s, e) for s, e in pairwise(cuts)]
     return np.array(result)
 
@@ -656,10 +699,18 @@ def _moving(curves: Curves, t: Curves) -> tuple[Curves, Curves]:
     return curves[:, 0] + t * (u + t * w), u + 2 * t * w
 
 
-def _sides(edges: Curves, inside: Any, size: float) -> npt.NDArray[np.int8]:
-    """1 for edges (…, 2, 2) with the inside on the left alone, -1 on the right alone, else 0."""
-    flat = edges.reshape(-1, 2, 2)
+def _sides(edges: Curves, around: Curves, size: float, work: list[int]) -> npt.NDArray[np.int8]:
+    """1 for edges (…, 2, 2) with the inside of others on the left alone, -1 on the right alone, else 0."""
+    flat, others = edges.reshape(-1, 2, 2), around.reshape(-1, 2, 2)
     way, middle = flat[:, 1] - flat[:, 0], flat.mean(1)
+    low, high = np.sort([others[..., 1].min(1), others[..., 1].max(1)])
+    ends = np.sort(middle[:, 1])[[*range(0, len(flat), outline.STRIP), -1]]
+    met = np.searchsorted(low, ends[1:], "right") - np.searchsorted(high, ends[:-1])
+    needed = 2 * outline.STRIP * int(met.sum()) + 300 * len(flat)
+    if needed > _LETTER_WORK:
+        raise _Intricate
+    work[0] += needed
+    inside = outline.winding(others, odd=False)
     beside = np.stack([-way[:, 1], way[:, 0]], 1) / np.maximum(np.hypot(*way.T), 1e-12)[:, None]
     beside *= _BESIDE * size
     left, right = inside(middle + beside).astype(np.int8), inside(middle - beside).astype(np.int8)
@@ -676,8 +727,11 @@ def _closed(outline: npt.NDArray[np.int16]) -> bool:
 
 def _kerning(
     uharfbuzz: Any, font: Any, codes: list[int], glyphs: list[int], upem: int
-) -> tuple[list[int], list[int], int]:
-    """Classes of letters on the left and on the right of pairs, the table of these, and its columns."""
+) -> tuple[list[int], list[int], int, int]:
+    """Classes of letters on the left and on the right of pairs, the table of these, its columns, and how many
+    letters were asked, -1 where all were.
+    """
+    end_s, kerned = time.process_time() + _KERNED_S, -1
     asked = [at for at, code in enumerate(codes) if code < _ALPHABETS and category(chr(code))[0] != "M"]
     del asked[_KERNED:]
     advances = np.array([font.get_glyph_h_advance(glyphs[at]) for at in asked], np.int64)
@@ -699,7 +753,8 @@ def _kerning(
             if not odd and second == first + 1 and (left, right) == (glyphs[at], wanted[k]):
                 own[k] = place.x_advance - advance  # others join, or become other glyphs
         row = np.rint(own * (UNIT / upem)).clip(-32767, 32767).astype(np.int16)
-        if (len(rows) + 1) * len(asked) > MOST_CLASSES:
+        if (len(rows) + 1) * len(asked) > MOST_CLASSES or time.process_time() > end_s:
+            kerned = asked.index(at)
             break
         classes[0, at] = rows.setdefault(row.tobytes(), len(rows))
     table = np.array([np.frombuffer(row, np.int16) for row in rows])
@@ -707,4 +762,4 @@ def _kerning(
     for at, column in zip(asked, table.T, strict=True):
         classes[1, at] = columns.setdefault(np.ascontiguousarray(column).tobytes(), len(columns))
     table = np.array([np.frombuffer(column, np.int16) for column in columns]).T
-    return classes.reshape(-1).tolist(), table.reshape(-1).tolist(), len(columns)
+    return classes.reshape(-1).tolist(), table.reshape(-1).tolist(), len(columns), kerned

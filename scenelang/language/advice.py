@@ -152,9 +152,10 @@ def unknown_member(
     missing = f"`{alias}` has no {'material ' if what == 'material' else ''}`{rest}`"
 
     def advise() -> Advice:
-        element = exported.scope.names.get(rest.removesuffix("_size"))
-        if element is not None and element.kind == "element" and rest.endswith("_size"):
-            return f"its file does not say how large `{rest[:-5]}` was; learn it again", None
+        owner, _, fact = rest.rpartition("_")
+        element = exported.scope.names.get(owner)
+        if element is not None and element.kind == "element" and fact in ("size", "centre"):
+            return f"its file does not say how large or where `{owner}` was; learn it again", None
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
         shape = foreign.SHAPES.get(rest.lower()) if library.holds(exported.source) else None
         if help is None and shape is not None:

@@ -254,10 +254,9 @@ def _elements(path: Path, zoo: ElementFile, stmt: tree.Import, context: FileCont
     brought = FileContext(source, session, context.loader, context.defines, path)
     for name in (*zoo.geometries, *zoo.groups):
         brought.scope.names[name] = Binding("element", stmt.alias.span, value=f"{known}.{name}")
-    for name, element in zoo.geometries.items():
-        if element.size is not None and f"{name}_size" not in brought.scope.names:
-            size = Binding("let", stmt.alias.span, value=element.size, known=True)
-            brought.scope.names[f"{name}_size"] = size
+    for name, said in [pair for element in zoo.geometries.values() for pair in element.values.items()]:
+        value = Vec(said) if isinstance(said, tuple) else said
+        brought.scope.names.setdefault(name, Binding("let", stmt.alias.span, value=value, known=True))
     if zoo.font is not None:
         font = Letters(zoo.font, known)
         brought.scope.names["text"] = Binding("text", stmt.alias.span, value=font)

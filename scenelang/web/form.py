@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import field
 from functools import cache
 from typing import Any, Final, TypeVar
+from unicodedata import normalize
 
 from scenelang.assets.element import Element, Gradient
 from scenelang.assets.element_file import load_textures, name_of
@@ -69,7 +70,7 @@ class Bound(Record, frozen=False):
     at: int = -1  # index of a fn or module in `Writer.calls`, -1 for one that is not called
     uses: list[Bound] = field(default_factory=list)  # names of files
     element: str = ""  # the name in a Scene of a geometry from a file of elements
-    number: float | None = None  # the value of a size from one
+    constant: Json = None  # the value of a size or a centre from one
 
 
 Line = tuple[Json, Bound | None, list[Bound]]
@@ -138,7 +139,7 @@ class Writer:
                 for name, binding in brought.scope.names.items():
                     inside.names[name] = bound = Bound(binding.kind, inside, file=brought)
                     if binding.kind == "let":
-                        bound.number = binding.value
+                        bound.constant = _form(binding.value)
                     else:
                         bound.element = binding.value if binding.kind == "element" else known
             elif isinstance(stmt, nodes.Let | nodes.Param):
@@ -211,8 +212,8 @@ class Writer:
 
     def value(self, bound: Bound, scope: PageScope) -> Json:
         """A variable."""
-        if bound.number is not None:
-            return bound.number
+        if bound.constant is not None:
+            return bound.constant
         if bound.scope.frame is None:
             self.uses.append(bound)
             return ["g", bound.slot]
@@ -237,7 +238,7 @@ class Writer:
             case nodes.Bool():
                 return expr.value
             case nodes.String():
-                self.written |= {*expr.value}
+                self.written |= {*expr.value, *normalize("NFC", expr.value)}
                 return ["'", expr.value]
             case nodes.ColorLiteral():
                 return ["#", *(round(255 * part) for part in expr.rgb)]
@@ -259,7 +260,7 @@ class Writer:
                     return ["t", [*words.ANIMATED].index(expr.name.text)]
                 constant = CONSTANTS[expr.name.text]
                 if isinstance(constant, Vec):
-                    return ["[", *map(plain, constant.items)]
+                    return _form(constant)
                 return ["none"] if constant is None else constant
             case nodes.Unary():
                 inner = self.expression(expr.operand, scope)
@@ -467,6 +468,10 @@ class Writer:
             ops = [["move", "color", ["[", *map(plain, rgb)]] for rgb in inks]
             lines.append(["use", ["material", *self._look(name, self.brought.materials.get(name)), ops]])
         return ["object", self._shape(part.geometry), lines]
+
+
+def _form(value: float | Vec) -> Json:
+    return ["[", *map(plain, value.items)] if isinstance(value, Vec) else plain(value)
 
 
 def plain(number: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -40,3 +40,20 @@ def changed(data: bytes, change: Change) -> bytes:
     tensors = tensors_of(data)
     change(header, tensors)
     return save(tensors, metadata={"scenelang": json.dumps(header)})
+
+
+TYPES = (None, True, -1, 3, 10**400, 1e308, "x", [], [[]], {"a": {}})
+"""Values of every type of JSON, and the extremes of some."""
+
+
+def retyped(value: Any) -> Iterator[Any]:
+    """Copies of a value of JSON that each have one part, at any depth, of another type or left out."""
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    for key in keys:
+        for changed in (*TYPES, *retyped(value[key])):
+            copy = value.copy()
+            copy[key] = changed
+            yield copy
+        copy = value.copy()
+        del copy[key]
+        yield copy

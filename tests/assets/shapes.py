@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 
 import numpy as np
 
 from scenelang.assets.element import Element
+from scenelang.assets.element_file import TENSORS, Font
 from scenelang.assets.picture import painted
 from scenelang.assets.pyramid import Grid, packed, packed_colours, refine
 
@@ -40,6 +42,17 @@ def element(
         grid, found = refine(grid, len(axis), d, lambda _, true=true: true, finer and level == levels - 1)
         steps.append(found)
     return packed(name, cells, steps, {"license": "none needed"}, finer)
+
+
+def letters() -> Font:
+    """A font of a space and of an A that is a triangle, with kerning of two A."""
+    corners = np.array([(-20000, -15000), (20000, -15000), (0, 25000)])
+    ends = np.roll(corners, -1, 0)
+    curves = np.stack([corners, (corners + ends) // 2, ends], 1).astype("<i2").tobytes()
+    numbers = [0.25, 0, 0, 0, 0.7, 0.35, 0.3, 0.35]
+    values = [0x20, 0x41], numbers, [0, 3], [0, 1, 0, 1], [0, 0, 0, -800], curves
+    tables = {name: array(TENSORS[name][1], value) for name, value in zip(TENSORS, values, strict=True)}
+    return Font(tables, 2, {"license": "none needed"})
 
 
 def noise(*shape: int, name: str = "bark", seed: int = 0) -> Element:

@@ -9,20 +9,23 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 import numpy as np
 import pytest
 from PIL import Image
 from safetensors.numpy import save
 
+import scenelang as nsg
 from scenelang.assets import element as elements
 from scenelang.assets.element import FORMS, Element, Part
-from scenelang.assets.element_file import element_file_bytes, entry_of, load_element_file, read_zoo
+from scenelang.assets.element_file import FontError, element_file_bytes, entry_of, load_element_file, read_zoo
 from scenelang.assets.picture import frame_of, painted, size_of, texels
 from scenelang.assets.tensors import TensorError
 from scenelang.drawing.exact.outline import Picture, fit_picture
-from tests.assets.scenes import changed
-from tests.assets.shapes import ball, element, noise, torus
+from scenelang.language import library
+from tests.assets.scenes import IMPORT, changed, good, retyped
+from tests.assets.shapes import ball, element, letters, noise, torus
 
 
 def test_elements_come_back(tmp_path: Path) -> None:
@@ -58,14 +61,14 @@ def test_damaged_files() -> None:
     refused(
         [
             (b"", "header"),
-            (written(elements=None), "not a file of elements"),
-            (written(elements=[]), "not a file of elements"),
-            (written(extra=1), "not a file of elements"),
+            (written(elements=None), "its header has missing"),
+            (written(elements=[]), "`elements` of its header is not an object"),
+            (written(extra=1), "its header has missing or unknown fields"),
             (written(name="other"), "other elements than it holds"),
             (written({"form": "octree"}), "form that this version does not know"),
-            (written({"dimension": 4}), "sizes out of range"),
-            (written({"levels": True}), "sizes out of range"),
-            (written({"cells": 2.5}), "sizes out of range"),
+            (written({"dimension": 4}), "`dimension` of element `ring` is not a whole number from 2 to 3"),
+            (written({"levels": True}), "`levels` of element `ring` is not a whole number from 1 to 9"),
+            (written({"cells": 2.5}), "`cells` of element `ring` is not a whole number from 2 to 8"),
             (written({"cells": 8, "levels": 6}), "sizes out of range"),
             (written({"levels": 3}), "does not hold"),
             (written({"levels": 1}), "does not hold"),
@@ -125,16 +128,22 @@ def test_elements_without_groups_are_in_files_of_the_old_format() -> None:
 
 
 BAD_PARTS: dict[str, list[dict[str, Any]]] = {
-    "not a geometry": [{"geometry": "rng"}, {"geometry": "hide"}, {"geometry": ["ring"]}],
+    "not a geometry": [{"geometry": "rng"}, {"geometry": "hide"}],
     "not a geometry of its dimension": [{"geometry": "disc"}],
-    "a material that the file does not hold": [{"material": "hid"}, {"material": ["hide"]}],
-    "out of range": [
-        *({"place": value} for value in ((0, 0), (0, 0, 1e300), (0, 0, 1e5), (0, 0, "0"), 3)),
-        *({"size": value} for value in (0, -1, True)),
-        *({"turn": value} for value in (TURNED[:2], (*TURNED[:2], TURNED[1]), "abc")),
+    "a material that the file does not hold": [{"material": "hid"}],
+    "a turn or a colour that is none": [
+        {"place": (0, 0)},
+        *({"turn": value} for value in (TURNED[:2], (*TURNED[:2], TURNED[1]))),
+        {"color": (0, 0)},
+    ],
+    "is not (a number from|text|a list)": [
+        {"geometry": ["ring"]},
+        {"material": ["hide"]},
+        *({"place": value} for value in ((0, 0, 1e300), (0, 0, 1e5), (0, 0, "0"), 3)),
+        *({"size": value} for value in (0, -1, True, None)),
+        {"turn": "abc"},
         {"turn": (TURNED[0], TURNED[1], (0, 0, -1e300))},
         {"turn": ((0, [1], 0), *TURNED[1:])},
-        {"color": (0, 0)},
         {"color": (0, 0, 1.5)},
     ],
 }
@@ -160,8 +169,47 @@ def test_fields_are_those_of_parts(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(
             "scenelang.assets.element_file.group_entry", lambda group, damaged=damaged: damaged
         )
-        with pytest.raises(TensorError, match="group `car`"):
+        with pytest.raises(TensorError, match="`car`"):
             read_zoo(element_file_bytes(HELD, {"car": CAR}))
+
+
+def test_headers_of_other_types_are_refused_or_drawn(tmp_path: Path) -> None:
+    """Columns of a table of kerning that were a dict or null ended in a traceback."""
+    data = element_file_bytes(HELD[:3], {"car": CAR[:1]}, letters())
+    header = json.loads(
+        json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]["scenelang"]
+    )
+    read = 0
+    for change in retyped(header):
+        harmed = changed(data, lambda old, _, new=change: (old.clear(), old.update(new)))
+        try:
+            zoo = read_zoo(harmed)
+        except TensorError:
+            continue
+        read += 1
+        assert all(e.told() for e in zoo.elements)
+        if read % 10 == 0:
+            (tmp_path / "zoo.safetensors").write_bytes(harmed)
+            text = "".join(f"zoo.{name};" for name, e in zoo.geometries.items() if e.dimension == 2)
+            nsg.render(good(tmp_path, f"{IMPORT}{text}"), size=(16, 16))
+    assert 20 < read < 400
+
+
+def test_letters_and_their_marks_are_one_where_the_font_has_them() -> None:
+    font = load_element_file(library.find("std/letters") or "").font
+    assert font is not None
+    text = "Ag\u00e9\u1ec7\u00c5\u00fc"
+    known = "".join(c for c in text if c in font.letters)
+    assert len(known) > 3
+    assert font.line(normalize("NFD", known)) == font.line(known)
+    assert font.line("\u2126") == font.line("\u03a9")  # of ohm, and omega
+    for text, at in (("e\u0301x\u0301", 3), ("e\u0301\u6f22", 2), ("\u0301", 0), ("e\u0301\u0489", 2)):
+        with pytest.raises(FontError) as error:
+            font.line(text)
+        assert error.value.at == at
+    with pytest.raises(FontError, match=r"U\+00C1") as error:
+        letters().line(" A\u0301")
+    assert error.value.at == 1
 
 
 def test_volumes_are_determinants() -> None:
@@ -223,14 +271,14 @@ def test_damaged_entries() -> None:
     refused(
         [
             (other(height=6), "a picture of 7 x 5"),
-            (other(height=2049), "sizes out of range"),
-            (other(width=0), "sizes out of range"),
+            (other(height=2049), "`height` of element `bark` is not a whole number from 1 to 2,048"),
+            (other(width=0), "`width` of element `bark` is not a whole"),
             (other(coding="exr"), "a coding that this version does not know"),
-            (other(coding=["webp"]), "a coding that this version does not know"),
+            (other(coding=["webp"]), "`coding` of element `bark` is not text"),
             (other(coding="av1"), "damaged"),
             (other(form="colours"), "missing or unknown fields"),
             (other(elements={"bark": {}}), "other elements than it holds"),
-            (other(format=1), "not a file of elements"),
+            (other(format=1), "its header has missing or unknown fields"),
         ]
     )
 

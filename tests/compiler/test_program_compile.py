@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import struct
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from scenelang.language import scene as schema
 from scenelang.language.diagnostics import Diagnostics, SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError
+from tests.assets.scenes import retyped
 
 CHAIN = """chain {
   square { scale(0.8); translate(-0.2, 0); material flat { color(#d33); } }
@@ -237,6 +239,17 @@ def test_bad_headers(chain) -> None:
             outer["__metadata__"]["scenelang"] = json.dumps({**header, key: value})
             with pytest.raises(ProgramError):
                 parse_program(joined(outer, body))
+
+
+def test_headers_of_other_types_are_refused_or_read() -> None:
+    lit, _ = compiled("sky(); camera(); light(); light(radius = 0.1); sphere;")
+    outer, body = parts(program_bytes(lit))
+    read = 0
+    for header in retyped(json.loads(outer["__metadata__"]["scenelang"])):
+        outer["__metadata__"]["scenelang"] = json.dumps(header)
+        with suppress(ProgramError):
+            read += len(parse_program(joined(outer, body)))
+    assert read > 20
 
 
 def test_bad_layouts(chain) -> None:

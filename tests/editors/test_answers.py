@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64decode
+from dataclasses import replace
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -420,16 +421,27 @@ def test_elements_groups_and_materials_are_proposed_and_told_of(
 ) -> None:
     ring = Part("ring", (0.0, 0.5, 0.0), 0.5)
     elements = [element(torus, "ring"), element(ball, "ball"), noise(2, 3, name="ring"), noise(2, 2)]
+    elements[1] = replace(elements[1], about={"size": 2.5, "x": 0, "y": -1.5, "z": 4})
     groups = {"car": (ring, ring), "ring": (ring,)}
     (folder / "zoo.safetensors").write_bytes(element_file_bytes(elements, groups))
     text = 'import "zoo.safetensors" as zoo;\nzoo.ring { scale(0.5); }\nzoo.car();\n'
     client.replace(uri, text + "sphere { material diffuse zoo.ring; }\ntorus { material zoo.; }\nzoo.;\n")
-    assert labels(client, client.at(uri, "zoo.;\n", 4)) == ["ball", "car()", "ring", "ring()"]
+    assert labels(client, client.at(uri, "zoo.;\n", 4)) == [
+        "ball",
+        "car()",
+        "ring",
+        "ring()",
+        "ball_centre",
+        "ball_size",
+    ]
+    text += "sphere { scale(zoo.ball_size); translate(zoo.ball_centre); }\n"
+    client.replace(uri, text + "sphere { material diffuse zoo.ring; }\ntorus { material zoo.; }\nzoo.;\n")
     assert labels(client, client.at(uri, "zoo.; }", 4)) == ["bark", "ring"]
     assert set(labels(client, client.at(uri, "material diffuse", 9))) >= {"diffuse", "flat", "zoo", *PAINTS}
     assert labels(client, client.at(uri, "diffuse zoo", 8))[-1] == "zoo"
     shape = ["element of space: 33 × 33 × 33 distances", "license: none needed", "ring(): group of ring"]
     rows = [("zoo.ring {", 5, shape), ("zoo.ring;", 5, ["texture: 3 × 2 colours"])]
+    rows.append(("ball_centre", 5, ["size: 2.5", "y: -1.5"]))
     says(client, uri, [*rows, ("zoo.car", 5, ["car(): group of 2 ring"])])
     assert "distances" not in hover(client, client.at(uri, "zoo.ring;", 5))
     assert "data:image" not in hover(client, client.at(uri, "zoo.ring {", 5))  # this editor shows none

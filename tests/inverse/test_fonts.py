@@ -6,6 +6,7 @@ import hashlib
 import io
 import math
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ builder = pytest.importorskip("fontTools.fontBuilder")
 from fontTools.feaLib.builder import addOpenTypeFeaturesFromString
 from fontTools.pens.t2CharStringPen import T2CharStringPen
 from fontTools.pens.ttGlyphPen import TTGlyphPen
+
+from tests.inverse.hostile_fonts import font_of, fonts, nested, taken, zigzag
 
 NAMES = {0x41: "A", 0x42: "B", 0x20: "space"}
 ADVANCES = {".notdef": 500, "A": 700, "B": 640, "space": 250}
@@ -169,6 +172,39 @@ def test_composites_that_hold_themselves_end() -> None:
     font.save(file)
     font, _ = read_font(file.getvalue(), {})
     assert len(font.letters) >= 1
+
+
+def test_letters_of_too_many_points_are_left_out_and_too_many_of_them_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """50 letters of 5,000 zigzags took 500 s, and 2,000 of 100 took 91 s."""
+    font, notes = read_font(font_of([zigzag(4), zigzag(5000, 8000, 8000), zigzag(4990, 8000, 8000)]), {})
+    assert [*font.letters] == ["\u4e00"]
+    assert "left out, as they are of too many points: U+4E01, U+4E02" in notes
+    with pytest.raises(FitError, match="all of these letters are damaged or of too many points"):
+        read_font(font_of([zigzag(5000, 8000, 8000)]), {})
+    many = font_of([zigzag(30, random=Random(k)) for k in range(4)])
+    read_font(many, {})
+    monkeypatch.setattr("scenelang.inverse.learn._FONT_WORK", 1000)
+    with pytest.raises(FitError, match="more than the usual work on its first 1 letter; --letters"):
+        read_font(many, {})
+    read_font(many, {}, patient=True)
+
+
+def test_letters_within_letters_and_long_kerning_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scenelang.inverse.learn.MOST_CURVES", 30)
+    font, notes = read_font(nested(12, 2), {})
+    assert "\u4e00" in font.letters
+    assert any("of too many points" in note and "U+4E0A" in note for note in notes)
+    monkeypatch.setattr("scenelang.inverse.learn._KERNED_S", -1.0)
+    assert "kerning of the first 0 letters alone, as it takes long" in read_font(made(True), {})[1]
+
+
+@pytest.mark.slow
+def test_no_hostile_font_takes_long() -> None:
+    for name, data in fonts(300, 1):
+        seconds, megabytes, status = taken(data)
+        assert (seconds < 20, megabytes < 1000, status) == (True, True, 0), (name, seconds, megabytes)
 
 
 def test_files_of_fonts_are_read_as_a_strangers() -> None:

@@ -23,6 +23,7 @@ from scenelang.drawing.exact.outline import (
     read_picture,
     winding,
 )
+from scenelang.drawing.exact.outline import drawn as drawn_layers
 from scenelang.drawing.neural.assets import GridShape
 from scenelang.inverse import grids
 from scenelang.inverse.grids import fit, measured, settled
@@ -160,10 +161,71 @@ def test_colours_of_drawings() -> None:
     ):  # fmt: skip
         found = drawn(body.replace("@", 'width="10" height="10"'))
         assert [colour for colour, _ in found.painted()] == [pytest.approx(c, abs=0.01) for c in colours]
-    lost = '<text font-family="Times">a</text><clipPath id="c"><rect/></clipPath><pattern id="p"/>'
-    lost += '<rect width="9" height="9"/>'
-    notes = drawn(f"{lost}<filter/>").notes
-    assert {f"{what} left out" for what in ("clip paths", "patterns", "filters")} <= {*notes}
+
+
+def test_what_of_a_drawing_is_not_read_is_said_with_its_lines() -> None:
+    rect = '<rect width="9" height="9" '
+    for body, note in (
+        (f'{rect} clip-path="url(#c)"/>', "clip paths left out (line 2)"),
+        (f'\n{rect} style="filter: url(#f); mask: none"/>', "filters left out (line 3)"),
+        (f'<pattern id="p"/>{rect}/>', "patterns left out (line 2)"),
+        (f'<path stroke="red" stroke-dasharray="4 2" d="M0 0h9"/>{rect}/>', "dashes drawn solid (line 2)"),
+        (f'<style>rect {{\nstroke-linejoin: bevel }}</style>{rect}/>', "joins drawn round (line 2)"),
+        (f'\n{rect}/>'.join(["<g>", *['<path stroke-linecap="butt" d="M0 0h9"/>'] * 7, "</g>"]),
+         "ends drawn round (lines 3, 4, 5, 6, 7 and 2 more)"),
+        (f'{rect} fill="oklch(0.7 0.1 50)"/>', "`oklch(0.7 0.1 50)` drawn black (line 2)"),
+        (f'<style>g > rect {{ fill: red }}</style>{rect}/>', "the rule of `g > rect` left out (line 2)"),
+        ('<rect width="9" height="1em"/><image/>', "the unit of `1em` left out (line 2)"),
+    ):  # fmt: skip
+        layers, notes = drawn_layers(f'<svg xmlns="http://www.w3.org/2000/svg">\n{body}</svg>'.encode())
+        assert layers
+        assert note in notes, notes
+    for plain in (
+        f'{rect} style="stroke:none;stroke-linejoin:miter;stroke-dasharray:none;mix-blend-mode:normal"/>',
+        f'{rect} fill="RED" stroke="#1234" color="blue" stroke-linejoin="round"/><clipPath/><mask/>',
+        f'<style>.a, #b, rect.c {{ fill: currentColor !important }}</style>{rect} fill="inherit"/>',
+        f'{rect} fill="rgb(1, 2, 3)" stroke="hsl(20deg 10% 5%)" stroke-width="3mm"/>',
+    ):
+        assert drawn_layers(f"<svg>{plain}</svg>".encode())[1][1:] == (), plain
+
+
+def test_colours_with_spaces_between_their_numbers() -> None:
+    for fill, colour in (
+        ("rgb(0 128 255 / 50%)", (0.5, 0.75, 1)),
+        ("RGB(0%, 50%, 100%)", (0, 0.5, 1)),
+        ("rgba(0 128 255 / .5)", (0.5, 0.75, 1)),
+        ("hsl(210deg 100% 50%)", (0, 0.5, 1)),
+        ("hsla(210, 100%, 50%, 50%)", (0.5, 0.75, 1)),
+    ):
+        for said in (f'fill="{fill}"', f'style="fill: {fill}"'):
+            (layer,), notes = drawn_layers(f'<svg><rect {said} width="9" height="9"/></svg>'.encode())
+            assert layer.color == pytest.approx(colour, abs=0.01), fill
+            assert len(notes) == 1
+    gradient = '<linearGradient id="g"><stop stop-color="rgb(255 0 0)"/></linearGradient>'
+    (layer,), _ = drawn_layers(f'<svg>{gradient}<rect fill="url(#g)" width="9" height="9"/></svg>'.encode())
+    assert layer.color == (1, 0, 0)
+
+
+def test_drawings_within_drawings_lie_where_their_views_say() -> None:
+    square = '<rect width="10" height="10"/>'
+    view, sized = 'viewBox="0 0 10 10"', 'x="5" width="20" height="20"'
+    high = f'<svg width="20" height="40" {view}'
+    for body, box in (
+        (f'<svg x="50" y="50" width="20" height="20" {view}>{square}</svg>', (50, 50, 70, 70)),
+        (f'<svg x="50" y="50" width="50%" height="20">{square}</svg>', (50, 50, 60, 60)),
+        (f"{high}>{square}</svg>", (0, 10, 20, 30)),
+        (f'{high} preserveAspectRatio="xMidYMax">{square}</svg>', (0, 20, 20, 40)),
+        (f'{high} preserveAspectRatio="none">{square}</svg>', (0, 0, 20, 40)),
+        (f'{high} preserveAspectRatio="xMinYMin slice">{square}</svg>', (0, 0, 40, 40)),
+        (f'<svg viewBox="-10 -10 20 20">{square}</svg>', (50, 50, 100, 100)),
+        (f'<svg x="10" {view}><svg width="50%" height="50%" {view}>{square}</svg></svg>', (10, 0, 60, 50)),
+        (f'<g transform="scale(2)"><svg {sized} {view}>{square}</svg></g>', (10, 0, 50, 40)),
+        (f'<symbol id="s" {view}>{square}</symbol><use href="#s" x="10" y="20" width="50" height="50"/>',
+         (10, 20, 60, 70)),
+    ):  # fmt: skip
+        (layer,), _ = drawn_layers(f'<svg viewBox="0 0 100 100">{body}</svg>'.encode())
+        (left, low), (right, high) = layer.box()
+        assert (left, -high, right, -low) == pytest.approx(box, abs=1e-6), body
 
 
 RAMP = np.linspace(20, 235, 12 * 8 * 3).reshape(12, 8, 3).astype(np.uint8)

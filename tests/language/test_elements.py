@@ -383,11 +383,14 @@ def test_mistakes(garage: Path) -> None:
 
 def test_sizes_are_values_that_early_files_lack(tmp_path: Path) -> None:
     old, new = element(ball, "old", d=2, levels=3), element(square, "tile", d=2, levels=3)
-    new = replace(new, about={**new.about, "size": 2.5})
+    new = replace(new, about={**new.about, "size": 2.5, "x": 3, "y": -0.5})
     (tmp_path / "zoo.safetensors").write_bytes(element_file_bytes([old, new]))
     text = "module m(k = zoo.tile_size) { zoo.tile { scale(k); } } m(); let a = 2 * zoo.tile_size; m(a);"
     scene = good(tmp_path, IMPORT + text)
     assert [node.transforms for node in scene.nodes] == [(nsg.Scale(2.5),), (nsg.Scale(5),)]
-    (tmp_path / "scene.nsg").write_text(f"{IMPORT} zoo.old {{ scale(zoo.old_size); }}")
-    (one,) = check(tmp_path / "scene.nsg")
-    assert (one.code, "learn it again" in (one.help or "")) == ("E0212", True)
+    placed = good(tmp_path, f"{IMPORT} zoo.tile {{ translate(zoo.tile_centre); scale(zoo.tile_centre.x); }}")
+    assert placed.nodes[0].transforms == (nsg.Translate(3, -0.5), nsg.Scale(3))
+    for fact in ("size", "centre"):
+        (tmp_path / "scene.nsg").write_text(f"{IMPORT} zoo.old {{ scale(zoo.old_{fact}); }}")
+        (one,) = check(tmp_path / "scene.nsg")
+        assert (one.code, "learn it again" in (one.help or "")) == ("E0212", True)

@@ -6,6 +6,7 @@ import math
 import random
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ import pytest
 from lab.sets.plane import SETS
 from lab.sets.plane import random_scene as random_set_scene
 from lab.sets.solids import SOLID_SETS, random_solid
+from scenelang.assets.element_file import element_file_bytes
 from scenelang.compiler.compile import compile_scene, find_model
 from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.compiler.passes import OPTIONAL
@@ -33,6 +35,7 @@ from scenelang.web.arrays import rows_of, worn_of
 from scenelang.web.export import beyond_pages
 from scenelang.web.form import PageProgram, PageScope, Writer, form_of
 from tests.assets.scenes import IMPORT
+from tests.assets.shapes import element, square
 from tests.compiler.random_scenes import blob_scene, full_scene
 from tests.language.test_elements import garage
 
@@ -362,6 +365,19 @@ def test_elements_and_imports(garage: Path, viewer_page: Any) -> None:
         changes = {"lib.k": 0.7} if "lib" in text else {"n": 1} if "param" in text else {}
         source = SourceFile("scene.nsg", IMPORT + text)
         assert check_cases(viewer_page, source, [({}, 0), (changes, 0)], garage / "scene.nsg") == 2, text
+
+
+def test_sizes_and_centres_of_elements(garage: Path, viewer_page: Any) -> None:
+    tile = replace(element(square, "tile", d=2, levels=3), about={"size": 0.5, "x": 0.25, "y": -0.1})
+    (garage / "sized.safetensors").write_bytes(element_file_bytes([tile]))
+    text = "z.tile { scale(z.tile_size); translate(z.tile_centre); scale(z.tile_centre.x); }"
+    source = SourceFile("scene.nsg", f'import "sized.safetensors" as z; {text}')
+    assert check_cases(viewer_page, source, [({}, 0)], garage / "scene.nsg") == 1
+
+
+def test_letters_and_their_marks(viewer_page: Any) -> None:
+    text = 'import "std/letters" as abc; abc.text("e\u0301A\u030a"); disc { scale(abc.width("xu\u0308")); }'
+    assert check_cases(viewer_page, SourceFile("scene.nsg", text), [({}, 0)]) == 1
 
 
 MODEL = load_manifest("shapes2d")

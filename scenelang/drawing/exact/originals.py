@@ -173,7 +173,9 @@ def _original(name: str, element: Element, folder: str | Path | None) -> Shape:
         advice = f"`--originals FOLDER` ({FOLDER}) says where it is{means}"
         raise FitError(f"{origin}, which is not in `{folder}`; {advice}")
     version = path.stat().st_mtime_ns, path.stat().st_size
-    part = int(element.about.get("part", 0))
+    part = element.about.get("part", 0)
+    if not isinstance(part, int) or part < 0:
+        raise FitError(f"the exact shape of `{name}` is not known: it is part `{part}` of its file")
     if (shape := _shape(path, digest, element.about.get("sign") == "closed", part, *version)) is None:
         raise FitError(f"{origin}, and `{path}` is another file of that name")
     return shape

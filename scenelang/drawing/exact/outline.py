@@ -15,11 +15,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
+from unicodedata import normalize
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ExifTags, Image, ImageCms, ImageOps, UnidentifiedImageError, features
+from PIL import ExifTags, Image, ImageCms, ImageColor, ImageOps, UnidentifiedImageError, features
 
 from scenelang.assets.element import TEXELS, Element, Facts, Painted
 from scenelang.assets.element_file import Font, FontError, load_element_file
@@ -168,7 +170,7 @@ def fit_picture(
 MOST_EDGES: Final = 200_000
 MOST_TRACED: Final = 16_000_000
 PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest middle is of a near piece
-_STRIP: Final = 64  # points of neighbouring heights
+STRIP: Final = 64  # points of neighbouring heights
 _TOGETHER: Final = 10_000  # edges that are asked at a time
 _FINE: Final = 0.002  # leaf units: longest edge along a curve of an element
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
@@ -327,8 +329,8 @@ def winding(edges: Edges, odd: bool) -> Inside:
 
     def inside(p: Points) -> npt.NDArray[np.bool_]:
         total, order = np.zeros(len(p), np.int64), np.argsort(p[:, 1])
-        for first in range(0, len(p), _STRIP):  # points of a strip, and the edges that reach into it
-            at = order[first : first + _STRIP]
+        for first in range(0, len(p), STRIP):  # points of a strip, and the edges that reach into it
+            at = order[first : first + STRIP]
             x, y = p[at].T[..., None]
             reach = edges[(low <= y[-1]) & (high >= y[0])]
             for part in (reach[k : k + _TOGETHER] for k in range(0, len(reach), _TOGETHER)):
@@ -365,7 +367,34 @@ _OPACITY: Final = re.compile(r"(?<![-\w])opacity\s*:\s*([^;]*)")
 _MOST_DRAWN: Final = 50_000  # elements of a drawing, each counted as often as it is used
 _MOST_STYLE: Final = 100_000  # letters of its style sheets, which are read again for each element
 _MOST_SAID: Final = 1_000_000  # letters of its paths, transforms and styles
-_UNSEEN: Final = {"mask": "masks", "marker": "markers", "filter": "filters", "clipPath": "clip paths"}
+_UNSEEN: Final = frozenset(("mask", "marker", "filter", "clipPath"))
+_STYLED: Final = re.compile(r"([-\w]+)\s*:\s*([^;{}]+)")  # a declaration of a style
+_SELECTOR: Final = re.compile(r"[#.]?[-\w]+|\*|[-\w]+[.#][-\w]+")  # one that is understood
+_COLOUR: Final = re.compile(r"\b(rgb|hsl)a?\(([^()]*)\)", re.IGNORECASE)
+_NUMBERS: Final = r"(,?[-+.0-9]+%?){3},?[-+.0-9]+%?"
+_PLAIN: Final = re.compile(
+    rf"(#[0-9a-f]{{3,8}}|none|transparent|currentcolor|(rgb|hsl)a\({_NUMBERS}\))( *!important)?"
+)
+_LOST: Final = {
+    "stroke-dasharray": ("dashes drawn solid", {"none", "0"}),
+    "stroke-linejoin": ("joins drawn round", {"round"}),
+    "stroke-linecap": ("ends drawn round", {"round"}),
+    "vector-effect": ("widths of strokes scaled", {"none"}),
+    "paint-order": ("fills painted before strokes", {"normal", "fill", "fill stroke"}),
+    "mix-blend-mode": ("blend modes left out", {"normal"}),
+    "clip-path": ("clip paths left out", {"none"}),
+    **dict.fromkeys(("mask", "mask-image"), ("masks left out", {"none"})),
+    **{key: ("markers left out", {"none"}) for key in ("marker", "marker-start", "marker-mid", "marker-end")},
+    "filter": ("filters left out", {"none"}),
+}
+"""Properties that are not read, what that does, and the values that mean the same without."""
+_LOST_TAGS: Final = {
+    "image": "images", "foreignObject": "foreign objects", "textPath": "texts along paths",
+    "pattern": "patterns", "animateMotion": "animations",
+    **dict.fromkeys(("animate", "animateTransform", "set"), "animations"),
+}  # fmt: skip
+_RELATIVE: Final = re.compile(r"[-+.0-9]+(em|ex|rem|ch|vw|vh)")
+_NAMED_LINES: Final = 5  # of a note
 
 
 def read_outline(data: bytes, suffix: str, face: Face | None = None) -> Outline:
@@ -379,13 +408,13 @@ def drawn(data: bytes, face: Face | None = None) -> tuple[list[Layer], tuple[str
         import svgelements
     try:  # a reader of a large format, which a stranger's file may break in many ways
         root = ElementTree.fromstring(data)
-        notes = _simplified(root, svgelements)
+        notes = [*_unread(root, data), *_simplified(root, svgelements)]
         simple = io.BytesIO(ElementTree.tostring(root))
         parsed = [*svgelements.SVG.parse(simple, reify=True).elements()]
-        others = {type(e).__name__.lower() for e in parsed} & {"image"}
         layers, left_out, edges = list[Layer](), dict[str, None](), 0
         texts = [element.text or "" for element in parsed if isinstance(element, svgelements.Text)]
-        letters = "".join(sorted({*" ".join(["", *texts])}))
+        joined = " ".join(["", *texts])
+        letters = "".join(sorted({*joined, *normalize("NFC", joined)}))
         font = None if not texts else face(letters) if face else load_element_file(_LETTERS).font
         for element in parsed:
             if isinstance(element, svgelements.Shape):
@@ -403,7 +432,76 @@ def drawn(data: bytes, face: Face | None = None) -> tuple[list[Layer], tuple[str
         raise FitError(f"damaged or not a drawing: {str(error) or type(error).__name__}"[:200]) from error
     strokes = sum(layer.inside is None for layer in layers)
     counts = f"{plural(len(layers) - strokes, 'area')}, {plural(strokes, 'stroke')}"
-    return layers, (counts, *(f"{name} left out" for name in sorted(others)), *notes)
+    return layers, (counts, *notes)
+
+
+def _unread(root: Any, data: bytes) -> list[str]:
+    """What a drawing has that is not read, with its lines; colours are rewritten as svgelements has them."""
+    lines, found = list[int](), dict[str, list[int]]()
+    reader = expat.ParserCreate()
+    reader.StartElementHandler = lambda *_: lines.append(reader.CurrentLineNumber)
+    reader.Parse(data, True)
+    for element, line in zip(root.iter(), lines, strict=True):
+        tag = element.tag.rpartition("}")[2]
+        for key, value in element.items():
+            if key in ("fill", "stroke", "stop-color", "style"):
+                element.set(key, _COLOUR.sub(_commas, value))
+            if key in ("fill", "stroke") and value.strip() == "inherit":
+                del element.attrib[key]
+        styles = [element.get("style", "")]
+        if tag == "style":
+            element.text = _COLOUR.sub(_commas, re.sub(r"/\*.*?\*/", "", element.text or "", flags=re.DOTALL))
+            styles = [element.text]
+            for selector in re.findall(r"([^{}]+)\{", element.text):
+                if not all(_SELECTOR.fullmatch(one.strip()) for one in selector.split(",")):
+                    rule = " ".join(selector.split())[:40]
+                    found.setdefault(f"the rule of `{rule}` left out", []).append(line)
+        said = [f"{_LOST_TAGS[tag]} left out"] if tag in _LOST_TAGS else []
+        declared = [*element.items(), *(pair for text in styles for pair in _STYLED.findall(text))]
+        bare = ("stroke", "none") in declared
+        for key, value in ((key, value.strip().lower()) for key, value in declared):
+            if key in _LOST and value not in _LOST[key][1] and not (bare and key.startswith("stroke-")):
+                said.append(_LOST[key][0])
+            paint = key in ("fill", "stroke", "stop-color") and not value.startswith("url(")
+            if paint and not _PLAIN.fullmatch(value) and value.split(" ")[0] not in ImageColor.colormap:
+                said.append(f"`{value[:40]}` drawn black")
+            if _RELATIVE.fullmatch(value) and key != "font-size" and tag != "svg":
+                said.append(f"the unit of `{value[:40]}` left out")
+        for note in dict.fromkeys(said):
+            found.setdefault(note, []).append(line)
+    return [f"{note} ({_places(at)})" for note, at in found.items()]
+
+
+def _places(lines: list[int]) -> str:
+    shown = ", ".join(map(str, list(dict.fromkeys(lines))[:_NAMED_LINES]))
+    more = len(set(lines)) - _NAMED_LINES
+    return f"line{'s' * (len(set(lines)) > 1)} {shown}{f' and {more} more' if more > 0 else ''}"
+
+
+def _commas(match: re.Match[str]) -> str:
+    """A colour with commas between its numbers, as svgelements has it."""
+    *channels, alpha = [*re.split(r"[\s,/]+", match[2].strip().lower()), "1"][:4]
+    return f"{match[1].lower()}a({','.join(c.removesuffix('deg') for c in channels)},{_share(alpha)})"
+
+
+def _fitted(
+    element: Any, outer: tuple[float, float], view: str, how: str, svg: Any
+) -> tuple[str, tuple[float, float]]:
+    """Where the contents of an inner drawing lie, by its place, size and view, and the size that they see."""
+
+    usual = (("x", "0"), ("y", "0"), ("width", "100%"), ("height", "100%"))
+    lengths = [svg.Length(element.get(key, text)) for key, text in usual]
+    x, y, width, height = (float(one.value(96, outer[k % 2], 16)) for k, one in enumerate(lengths))
+    numbers = [float(number) for number in re.split(r"[\s,]+", view.strip()) if number]
+    if len(numbers) != 4 or not min(numbers[2:]) > 0:
+        return f"translate({x} {y})", (width, height)
+    wide, high = width / numbers[2], height / numbers[3]
+    if "none" not in how:
+        wide = high = max(wide, high) if "slice" in how else min(wide, high)
+        x += (width - wide * numbers[2]) * (0.0 if "xMin" in how else 1.0 if "xMax" in how else 0.5)
+        y += (height - high * numbers[3]) * (0.0 if "YMin" in how else 1.0 if "YMax" in how else 0.5)
+    moves = f"translate({x} {y}) scale({wide} {high}) translate({-numbers[0]} {-numbers[1]})"
+    return moves, (numbers[2], numbers[3])
 
 
 def _simplified(root: Any, svg: Any) -> list[str]:
@@ -419,9 +517,21 @@ def _simplified(root: Any, svg: Any) -> list[str]:
         raise FitError(f"a drawing of more than {_MOST_DRAWN:,} elements")
     gradients = [element for element, tag in result if tag.endswith("Gradient")]
     means = {element.get("id"): _mean(element, named, svg) for element in gradients}
-    notes = [f"{said} left out" for tag, said in _UNSEEN.items() if any(tag == t for _, t in result)]
-    notes += ["gradients in their mean colours"] if means else []
-    notes += ["patterns left out"] if any(tag == "pattern" for _, tag in result) else []
+    notes = ["gradients in their mean colours"] if means else []
+    seen = _fitted(root, (300.0, 150.0), root.get("viewBox", ""), "", svg)[1]
+    views = dict.fromkeys(root, seen)  # the size of what each lies in
+    for element, tag in result[1:]:
+        used = named.get(next((v[1:] for k, v in element.attrib.items() if k.endswith("href")), None))
+        inner = element if tag == "svg" else used if tag == "use" and used is not None else None
+        size = views[element]
+        if inner is not None and (tag == "svg" or (inner.tag.endswith("symbol") and inner.get("viewBox"))):
+            ratio = inner.get("preserveAspectRatio", "")
+            moves, size = _fitted(element, size, inner.get("viewBox", ""), ratio, svg)
+            element.set("transform", f"{element.get('transform', '')} {moves}")
+            for key in ("x", "y", "width", "height", "viewBox"):
+                element.attrib.pop(key, None)
+            element.tag = element.tag.removesuffix("svg") + "g" if tag == "svg" else element.tag
+        views |= dict.fromkeys(element, size)
     for element, _ in result:
         for key in ("fill", "stroke", "style"):
             if key in element.attrib:
