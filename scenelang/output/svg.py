@@ -70,6 +70,18 @@ def operands(tokens: npt.NDArray[np.int8]) -> list[Operand]:
     return stack[0]
 
 
+def tokens_of(fold: Sequence[Operand]) -> list[int]:
+    """Tokens of the rows of operands that follow each other, whatever groups they were taken from."""
+    result: list[int] = []
+    for operand in fold:
+        own = tokens_of(operand.inner) if operand.inner else [UNION]
+        if result:  # in the first operand nothing has been met
+            own[0] = operand.operator | (BEGINS if operand.inner else 0) | own[0] & -1 << ENDS
+            own[-1] += (1 << ENDS) * bool(operand.inner)
+        result += own
+    return result
+
+
 class SvgLayer(NamedTuple):
     """A region of one look: where all of its terms are negative."""
 
@@ -133,12 +145,8 @@ class Shapes:
 
     def fold(self, fold: Sequence[Operand]) -> Field:
         """The field of operands that follow each other."""
-        tokens = [self.program.tokens[operand.rows.start : operand.rows.stop].copy() for operand in fold]
-        tokens[0][0] &= ~(OPERATOR | BEGINS)
-        if fold[0].inner:
-            tokens[0][-1] -= 1 << ENDS
         rows = [row for operand in fold for row in operand.rows]
-        return self.field(rows, np.concatenate(tokens))
+        return self.field(rows, np.array(tokens_of(fold), np.int8))
 
     def ask(self, field: Field, p: Floats, half_px: float = 0.0) -> Floats:
         """Distances (G, B) of a field at points (2, G, B); right within half a side around them."""
