@@ -227,7 +227,7 @@ class Region:
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
         a, b = (first[:, None] + node * step for node in (inside, outside))
         f, g = (grid[node[1], node[0]] for node in (inside, outside))
-        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS, False)
+        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS, False, 0.0)
         off = 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
         around = self.at(points[:, None] + off)
         normals = np.stack([around[0] - around[1], around[2] - around[3]])
