@@ -107,8 +107,8 @@ class Sampler:
             side, longest = size / SEARCHED, size
             counts = np.ceil((self.high - self.low) / side).clip(1).astype(np.intp)
             cells = self.touched(np.indices(counts).reshape(3, -1).T, self.low, side)
-            ends = (cells.min(0), cells.max(0) + 1) if len(cells) else np.zeros((2, 3))
-            self.low, self.high = (np.minimum(self.low + end * side, self.high) for end in ends)
+            first, last = (cells.min(0), cells.max(0) + 1) if len(cells) else (0, 0)
+            self.low, self.high = self.low + first * side, np.minimum(self.low + last * side, self.high)
 
     def widen(self, by: float) -> None:
         """Let objects take part up to some way outside of their balls, world units."""
