@@ -160,7 +160,7 @@ def test_options_of_pictures_are_refused(tmp_path: Path) -> None:
         result = CliRunner().invoke(cli, call)
         assert result.exit_code == 2
         assert options.split()[0] in result.output
-        assert re.search(r"(is of|draws) pictures", result.output)
+        assert re.search(r"(is of|draws) (pictures|meshes)", result.output)
         assert not out.exists()
 
 
