@@ -198,7 +198,7 @@ def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
 def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:
     """The distance behind an object, its share in that and in colours (3, M)."""
     if token == SMOOTH:
-        h = (0.5 + 0.5 * (state - d) / k).clip(0, 1)
+        h = (0.5 + 0.5 * (state - d) / np.maximum(k, 1e-9)).clip(0, 1)  # k is 0 for other tokens
         return np.stack([(1 - h) * state + h * (d - k * (1 - h)), h, h])
     if token == UNION:
         return np.stack([np.minimum(state, d), d < state, d < np.maximum(state, 0)])

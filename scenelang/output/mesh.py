@@ -17,28 +17,33 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets.files import write_output
 from scenelang.compiler.program import Program
-from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import decoded, encoded
 from scenelang.drawing.solid.field import Meeting, SolidField
 from scenelang.drawing.solid.network import EMPTY, Wanted
+from scenelang.drawing.solid.passes import INF
 
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Up = Literal["y", "z"]
 
 MOST_CELLS: Final = 1 << 22
 POINTS: Final = 1 << 15  # that the field is asked for at once
 COARSE: Final = 8  # cells along the longest side to begin with, about
 STEEP: Final = 1.1  # how much faster than exact ones learned distances change at most
-HALVINGS, STEPS = 14, 3  # that find a crossing, where a medium may begin and elsewhere
+SEARCHED: Final = 32  # cells along the longest side when the box is made smaller
+TIGHT: Final = 0.9  # of a side: a box that comes out longer is small enough
+HALVINGS, STEPS = 14, 12  # that find a crossing at most, where a medium may begin and elsewhere
+NEAR: Final = 1e-5  # of a cell: how far off the surface a crossing may be
 TINY: Final = 1e-9  # world units: of nodes that are taken out of the solid
-FLAT: Final = 0.05  # of the largest: a smaller spread of normals says nothing of where their planes meet
+FLAT: Final = 0.01  # of the largest: a smaller spread of normals says nothing of where their planes meet
+OUTSIDE: Final = 1.0  # cells: how far outside of its own a vertex may be, where an edge cuts a side of it
 SKEW: Final = 1e-3  # of a cell: how far off a plane the corners of a quad may be that is cut either way
 JUMP: Final = 0.06  # between sRGB colours that no triangle runs between
 GAP: Final = 0.002  # of a triangle: between vertices on both sides of a jump
@@ -62,14 +67,22 @@ class TriangleMesh(NamedTuple):
     triangles: Index
     colours: Floats
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file, whole or not at all: .stl (without colours), .ply, .obj or .glb.
+    def save(self, path: str | os.PathLike[str], up: Up = "y") -> None:
+        """Write a file, whole or not at all, as `encode`; raises OSError where it cannot be written."""
+        write_output(path, self.encode(Path(path).suffix.lower(), up))
 
-        Raises `ValueError` for another suffix, OSError where it cannot be written.
+    def encode(self, suffix: str, up: Up = "y") -> bytes:
+        """Make the bytes of a file: .stl (without colours), .ply, .obj or .glb, by its axis that points up.
+
+        Raises `ValueError` for another suffix, and for a .glb with z up, which the format does not have.
         """
-        if (write := WRITERS.get(Path(path).suffix.lower())) is None:
+        if (write := WRITERS.get(suffix)) is None:
             raise ValueError(f"not one of {', '.join(WRITERS)}")
-        write_output(path, write(self))
+        if up == "y":
+            return write(self)
+        if suffix == ".glb":
+            raise ValueError("a .glb is y up")
+        return write(self._replace(vertices=self.vertices[:, [0, 2, 1]] * [1, -1, 1]))
 
 
 class Sampler:
@@ -88,12 +101,25 @@ class Sampler:
         ends = [np.asarray(s.centre, np.float64) + side * s.extent for s in drawn for side in (-1, 1)]
         corners = np.array(ends).reshape(-1, 3) if ends else np.zeros((1, 3))
         self.low, self.high = corners.min(0), corners.max(0)
-        self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
+        longest = INF
+        while (size := float((self.high - self.low).max())) and size < TIGHT * longest:  # booleans leave less
+            self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
+            side, longest = size / SEARCHED, size
+            counts = np.ceil((self.high - self.low) / side).clip(1).astype(np.intp)
+            cells = self.touched(np.indices(counts).reshape(3, -1).T, self.low, side)
+            first, last = (cells.min(0), cells.max(0) + 1) if len(cells) else (0, 0)
+            self.low, self.high = self.low + first * side, np.minimum(self.low + last * side, self.high)
 
     def widen(self, by: float) -> None:
         """Let objects take part up to some way outside of their balls, world units."""
         pairs = zip(self.solids, self._stretch, strict=True)
         self.field.solids = [replace(s, ball=s.ball + by * rate, extent=s.extent + by) for s, rate in pairs]
+
+    def touched(self, cells: Index, first: Floats, side: float) -> Index:
+        """Those of some cells (M, 3), numbered from a point, that the surface may touch."""
+        reach = 3**0.5 / 2 * side
+        self.widen(reach)
+        return cells[abs(self.at(first + (cells + 0.5) * side)) <= self.steep * reach]
 
     def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
         """As `SolidField.meet`, at points (M, 3); those that meet nothing are far outside."""
@@ -167,38 +193,44 @@ class Grid:
     """Cells of one size, by numbers, with the field's values at their corners."""
 
     def __init__(self, sampler: Sampler, resolution: int) -> None:
-        self.sampler = sampler
-        levels = max(0, int(np.log2(resolution / COARSE)))
-        self.side = float((sampler.high - sampler.low).max()) / resolution
-        self.first = sampler.low - 1.37 * self.side  # so that no plane of symmetry is one of the grid
-        counts = np.ceil((sampler.high - self.first) / self.side / 2**levels).astype(np.intp) + 1
-        self.shape = (counts << levels) + 1  # of nodes
-        cells = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
-        for level in range(levels, 0, -1):
-            reach = 3**0.5 / 2 * self.side * 2**level
-            sampler.widen(reach)
-            middle = self.first + (cells + 0.5) * (self.side * 2**level)
-            cells = cells[abs(sampler.at(middle)) <= sampler.steep * reach]
-            cells = (2 * cells[:, None] + _BITS).reshape(-1, 3)
-            if len(cells) > MOST_CELLS:
-                raise RenderError(f"more than {MOST_CELLS:,} cells at a resolution of {resolution}")
+        self.sampler, self.resolution = sampler, resolution
+        while (cells := self._split()) is None:
+            self.resolution -= self.resolution // 8
         sampler.widen(2 * self.side)
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values, self.holed = np.zeros(0, np.intp), np.zeros(0), False
+        self.inside = np.zeros(self.shape.prod(), bool)
         while True:
-            fresh = np.setdiff1d(self.cells[:, None] + self.bits, self.nodes)
+            fresh = self._others(self.cells[:, None] + self.bits, self.nodes)
             nodes = np.concatenate([self.nodes, fresh])
             order = np.argsort(nodes)
             self.values = np.concatenate([self.values, sampler.at(self.points(fresh))])[order]
             self.nodes, self.cells = nodes[order], np.sort(self.cells)
-            left = np.setdiff1d(self._around(), self.cells)  # the field may be steeper than it should be
+            self.inside[self.nodes] = self.values < 0
+            left = self._others(self._around(), self.cells)  # the field may be steeper than it should be
             if len(left):
                 self.cells = np.concatenate([self.cells, left])
             elif len(taken := self._pinched()):
                 self.values[np.searchsorted(self.nodes, taken)] = TINY
+                self.inside[taken] = False
                 self.holed = True
             else:
                 break
+
+    def _split(self) -> Index | None:
+        """Cells (K, 3) that the surface may touch; None where they are too many."""
+        sampler, levels = self.sampler, max(0, int(np.log2(self.resolution / COARSE)))
+        self.side = float((sampler.high - sampler.low).max()) / self.resolution
+        self.first = sampler.low - 1.37 * self.side  # so that no plane of symmetry is one of the grid
+        counts = np.ceil((sampler.high - self.first) / self.side / 2**levels).astype(np.intp) + 1
+        self.shape = (counts << levels) + 1  # of nodes
+        cells = np.indices(counts).reshape(3, -1).T
+        for level in range(levels, 0, -1):
+            cells = sampler.touched(cells, self.first, self.side * 2**level)
+            if 8 * len(cells) > MOST_CELLS:
+                return None
+            cells = (2 * cells[:, None] + _BITS).reshape(-1, 3)
+        return cells
 
     def number(self, place: Index) -> Index:
         """Numbers of nodes, or of cells by their first nodes, at places (…, 3)."""
@@ -216,7 +248,13 @@ class Grid:
 
     def cases(self) -> Index:
         """Corners of the cells that are inside, as bits (K,)."""
-        return np.asarray((self.value(self.cells[:, None] + self.bits) < 0) @ (1 << np.arange(8)))
+        return np.asarray(sum(self.inside[self.cells + bit] * (1 << i) for i, bit in enumerate(self.bits)))
+
+    def _others(self, numbers: Index, known: Index) -> Index:
+        """Numbers beside the known ones, each once, in order."""
+        result = np.zeros(len(self.inside), bool)
+        result[numbers], result[known] = True, False
+        return np.flatnonzero(result)
 
     def _around(self) -> Index:
         """Numbers of the cells around edges that the surface crosses, also more than once."""
@@ -242,10 +280,7 @@ class Grid:
 
 
 def surface_of(program: Program, resolution: int, exact: bool) -> tuple[TriangleMesh, dict[str, str]]:
-    """The surface of what is opaque in a Program of solids, and warnings by code.
-
-    Raises `RenderError` for too many cells.
-    """
+    """The surface of what is opaque in a Program of solids, and warnings by code."""
     sampler = Sampler(program, exact)
     said = {"W0551": "a mesh has no media: what is volumetric is left out"} if sampler.field.media else {}
     empty = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.intp), np.zeros((0, 3)))
@@ -270,12 +305,14 @@ def surface_of(program: Program, resolution: int, exact: bool) -> tuple[Triangle
     p, n = _crossings(grid, a, b)
     places = _places(quad, p, n, first[-1], side)
     box = grid.points(np.repeat(cells, table.number[cases]))
-    places = np.clip(places, box, box + side)
+    places = np.clip(places, box - OUTSIDE * side, box + (1 + OUTSIDE) * side)
     rising = grid.value(a) < 0  # from inside to outside
     back = rising == (turns == 1)
     quad[back] = quad[back][:, ::-1]
     triangles = _cut(sampler, quad, places, side)
     met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), Wanted.ALL)
+    if grid.resolution < resolution:
+        said["W0553"] = f"more than {MOST_CELLS:,} cells: a resolution of {grid.resolution}, not {resolution}"
     if thin:
         said["W0552"] = f"parts about as thin as a cell of {side:.2g} may be missing or have holes"
     return _parted(sampler, TriangleMesh(places, triangles, encoded(met.register[:3].T)), side), said
@@ -286,7 +323,8 @@ def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
     low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
-    zero, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed)
+    near = 0.0 if mixed else NEAR * grid.side
+    zero, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed, near)
     p = zero.T
     met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
@@ -457,7 +495,14 @@ def crossed(a: Floats, b: Floats) -> Floats:
 
 
 def zeros(
-    at: Callable[[Floats], Floats], a: Floats, b: Floats, f: Floats, g: Floats, steps: int, halved: bool
+    at: Callable[[Floats], Floats],
+    a: Floats,
+    b: Floats,
+    f: Floats,
+    g: Floats,
+    steps: int,
+    halved: bool,
+    near: float,
 ) -> tuple[Floats, Floats]:
     """Points (d, n) where a function is 0, and the ends outside of what is left to look in.
 
@@ -467,13 +512,18 @@ def zeros(
         at: values (n,) at points (d, n); one of a step is a jump, for which ways are ``halved``.
         a, b: points (d, n) between which there are zeros.
         f, g: values (n,) there, of different signs.
-        steps: how often the function is asked.
+        steps: how often the function is asked at most.
+        near: a value that is near enough to 0.
     """
+    a, b, f, g = (one.copy() for one in (a, b, f, g))
+    some = np.arange(len(f))
     for _ in range(steps):
-        middle = a + (0.5 if halved else (f / (f - g)).clip(0.01, 0.99)) * (b - a)
+        p, q, u, v = a[:, some], b[:, some], f[some], g[some]
+        middle = p + (0.5 if halved else (u / (u - v)).clip(0.01, 0.99)) * (q - p)
         value = at(middle)
-        same = (value < 0) == (f < 0)
-        f, g = np.where(same, value, f / 2), np.where(same, g / 2, value)
-        a, b = np.where(same, middle, a), np.where(same, b, middle)
+        same = (value < 0) == (u < 0)
+        f[some], g[some] = np.where(same, value, u / 2), np.where(same, v / 2, value)
+        a[:, some], b[:, some] = np.where(same, middle, p), np.where(same, q, middle)
+        some = some[abs(value) > near]
     zero = a + (0.5 if halved else f / (f - g)) * (b - a)
     return zero, np.where(f < 0, b, a)

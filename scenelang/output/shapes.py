@@ -71,14 +71,15 @@ def to_mesh(
         program_or_scene: what to mesh, or its file, as for `render`. A Program has what the camera sees.
         resolution: cells along the longest side, 8 to 512.
         backend: ``"neural"`` or ``"exact"``, whose surface it is.
-        diagnostics: collects warnings: W0551 for media, W0552 for what is thinner than a cell.
+        diagnostics: collects warnings: W0551 for media, W0552 for what is thinner than a cell, W0553 for a
+            resolution that takes too many cells.
 
     Returns:
-        Vertices, triangles and colours; ``save`` writes .stl, .ply, .obj or .glb.
+        Vertices, triangles and colours, y up; ``save`` writes .stl, .ply, .obj or .glb, with ``up="z"`` z up.
 
     Raises:
         SceneError: the Scene cannot be compiled, is flat or has no surface, or the file holds an animation.
-        RenderError: too many cells, or as for `to_svg`.
+        RenderError: as for `to_svg`.
         ProgramError, OSError, ValueError, TypeError: as for `render`.
     """
     diagnostics = diagnostics if diagnostics is not None else Diagnostics()
@@ -93,7 +94,7 @@ def to_mesh(
         raise SceneError(diagnostics)
     finer = f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
     for code, fact in warnings.items():
-        diagnostics.add(code, fact, None, help=None if code == "W0551" else finer)
+        diagnostics.add(code, fact, None, help=finer if code == "W0552" and "W0553" not in warnings else None)
     return mesh
 
 

@@ -70,6 +70,18 @@ def operands(tokens: npt.NDArray[np.int8]) -> list[Operand]:
     return stack[0]
 
 
+def tokens_of(fold: Sequence[Operand]) -> list[int]:
+    """Tokens of the rows of operands that follow each other, whatever groups they were taken from."""
+    result: list[int] = []
+    for operand in fold:
+        own = tokens_of(operand.inner) if operand.inner else [UNION]
+        if result:  # in the first operand nothing has been met
+            own[0] = operand.operator | (BEGINS if operand.inner else 0) | own[0] & -1 << ENDS
+            own[-1] += (1 << ENDS) * bool(operand.inner)
+        result += own
+    return result
+
+
 class SvgLayer(NamedTuple):
     """A region of one look: where all of its terms are negative."""
 
@@ -133,12 +145,8 @@ class Shapes:
 
     def fold(self, fold: Sequence[Operand]) -> Field:
         """The field of operands that follow each other."""
-        tokens = [self.program.tokens[operand.rows.start : operand.rows.stop].copy() for operand in fold]
-        tokens[0][0] &= ~(OPERATOR | BEGINS)
-        if fold[0].inner:
-            tokens[0][-1] -= 1 << ENDS
         rows = [row for operand in fold for row in operand.rows]
-        return self.field(rows, np.concatenate(tokens))
+        return self.field(rows, np.array(tokens_of(fold), np.int8))
 
     def ask(self, field: Field, p: Floats, half_px: float = 0.0) -> Floats:
         """Distances (G, B) of a field at points (2, G, B); right within half a side around them."""
@@ -219,7 +227,7 @@ class Region:
         inside, outside = (np.stack(np.divmod(node, grid.shape[1])[::-1]) for node in ends.T)
         a, b = (first[:, None] + node * step for node in (inside, outside))
         f, g = (grid[node[1], node[0]] for node in (inside, outside))
-        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS, False)
+        points, *_ = zeros(lambda p: self.at(p[:, None])[0], a, b, f, g, STEPS, False, 0.0)
         off = 0.02 * np.array([[1, -1, 0, 0], [0, 0, 1, -1]])[:, :, None]
         around = self.at(points[:, None] + off)
         normals = np.stack([around[0] - around[1], around[2] - around[3]])

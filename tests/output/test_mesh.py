@@ -54,6 +54,64 @@ def test_an_edge_between_two_spheres_is_kept() -> None:
     assert (on.max(0) < 0.004).sum() > 60  # the circle where both meet
 
 
+def normals(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals (T, 3) of triangles, and their areas."""
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    way = np.cross(b - a, c - a)
+    area = np.linalg.norm(way, axis=1)
+    return way / area[:, None].clip(1e-30), area / 2
+
+
+@pytest.mark.parametrize("turn", ["{}", "{ rotate(33deg, axis = [1, 2, 3]); }"])
+def test_faces_are_flat_and_where_they_are(turn: str) -> None:
+    mesh, _ = meshed(f'import "std/solids" as s; s.block(2, 1, 3) {turn}', 64)
+    frame = np.eye(3)
+    if len(turn) > 2:  # the rotation about an axis by its cross products (Rodrigues)
+        x, y, z = np.array([1, 2, 3]) / 14**0.5
+        across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = np.radians(33)
+        frame += np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
+    beyond = abs(mesh.vertices @ frame) - [1, 0.5, 1.5]
+    off = np.linalg.norm(beyond.clip(0), axis=1) + beyond.max(1).clip(max=0)
+    assert abs(off).max() < 2e-4
+    assert abs(beyond).max(0).min() > 0.1  # the surface has all three sides
+    assert ((abs(mesh.vertices @ frame) - [1, 0.5, 1.5]) > -2e-4).all(1).sum() == 8  # its corners
+    way, area = normals(mesh)
+    tilt = np.degrees(np.arccos(abs(way @ frame).max(1).clip(max=1)))
+    assert area[tilt > 0.1].sum() < 2e-4 * area.sum()
+
+
+def test_blunt_edges_are_kept() -> None:
+    sides = " ".join(f"s.block(1.6, 2, 1.6) {{ rotate({a}deg, axis = Y); }}" for a in (22.5, 45, 67.5))
+    mesh, _ = meshed(f'import "std/solids" as s; intersect {{ s.block(1.6, 1, 1.6); {sides} }}', 64)
+    angles = np.radians(22.5) * np.arange(16)  # a prism of sixteen sides
+    walls = mesh.vertices[:, [0, 2]] @ np.stack([np.cos(angles), np.sin(angles)])
+    off = np.maximum(walls.max(1) - 0.8, abs(mesh.vertices[:, 1]) - 0.5)
+    assert abs(off).max() < 2e-5
+
+
+def test_cells_are_those_of_the_result_in_any_order() -> None:
+    plain = len(meshed("sphere;", 24)[0].triangles)
+    for size in (20, 200):
+        big = f"box {{ scale({size}); }}"
+        for text in (f"intersect {{ {big} sphere; }}", f"intersect {{ sphere; {big} }}"):
+            assert len(meshed(text, 24)[0].triangles) == pytest.approx(plain, rel=0.2)
+
+
+def test_points_that_meet_nothing_are_outside() -> None:
+    spike = "cone { translate(0, -0.25, 0); scale(2, 1000, 2); translate(0, 500, 0); }"
+    mesh, _ = meshed(f"intersect {{ {spike} box {{ scale(1, 0.05, 1); }} }} cone;", 64)
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([3**0.5, 1.5, 3**0.5], abs=0.01)  # of the cone
+
+
+def test_what_takes_too_many_cells_is_coarser(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scenelang.output.mesh.MOST_CELLS", 1 << 16)
+    text = "cylinder { scale(0.2, 0.6, 0.2); translate(0.03, 0, 0); twist(70); }"
+    mesh, codes = meshed(text, 64)
+    assert codes == ["W0509", "W0553"]
+    assert volume(mesh) == pytest.approx(np.pi * 0.5**0.5 * 0.2**2 * 0.6, rel=0.1)  # as without the twist
+
+
 def test_thin_walls_touching_solids_and_noise_are_closed() -> None:
     rng = np.random.default_rng(3)
     for _ in range(4):
@@ -94,6 +152,14 @@ def test_colours_and_files(tmp_path: Path) -> None:
             assert abs(read.visual.vertex_colors[:, :3] / 255 - mesh.colours).max() < 0.005
     with pytest.raises(ValueError, match=r"not one of \.stl"):
         mesh.save(tmp_path / "a.fbx")
+    tall = mesh._replace(vertices=mesh.vertices * [1, 5, 1])
+    for suffix in (".ply", ".obj", ".stl"):
+        data = io.BytesIO(tall.encode(suffix, "z"))
+        read = trimesh.load(data, file_type=suffix[1:], process=False, force="mesh")
+        assert read.extents == pytest.approx(np.ptp(tall.vertices, axis=0)[[0, 2, 1]], rel=1e-4)
+        assert read.volume == pytest.approx(volume(tall), rel=1e-4)  # and nothing is mirrored
+    with pytest.raises(ValueError, match=r"a \.glb is y up"):
+        mesh.save(tmp_path / "b.glb", up="z")
 
 
 def test_colours_that_jump_do_so_at_the_edge() -> None:
@@ -136,6 +202,8 @@ def test_the_command_writes_a_file_or_nothing(tmp_path: Path) -> None:
         ("a.svg", [], "E0551"),
         ("b.stl", ["--size", "64x64"], "--size is of pictures"),
         ("b.png", ["--resolution", "16"], "--resolution is of meshes"),
+        ("b.svg", ["--up", "z"], "--up is of meshes"),
+        ("b.glb", ["--up", "z"], "a .glb is y up"),
         ("no/b.stl", [], "there is no folder"),
     ):
         result = CliRunner().invoke(cli, [*call, str(tmp_path / out), *options])

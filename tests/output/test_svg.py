@@ -16,8 +16,9 @@ from svgelements import Path as Curve
 import scenelang
 from scenelang.cli.main import cli
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
-from scenelang.output.svg import Operand, layers_of, operands
-from tests.groups import random_tokens
+from scenelang.output.svg import Operand, layers_of, operands, tokens_of
+from tests.compiler.random_scenes import random_scene
+from tests.groups import folded, random_tokens
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FINER = 6  # samples along a side of a pixel
@@ -109,6 +110,30 @@ def test_layers_over_each_other_show_what_the_fold_shows() -> None:
             assert seen == (row if distance < 0 else -1)
 
 
+def test_tokens_of_what_was_taken_from_groups_fold_the_same() -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(150):
+        stream = operands(np.array(random_tokens(rng, int(rng.integers(1, 9))), np.int8))
+        for layer in layers_of(stream, range(9)):
+            for part in (layer.shape, *(one for pair in layer.wins for one in pair[:2])):
+                tokens, rows = tokens_of(part), [row for operand in part for row in operand.rows]
+                d, c = rng.normal(0, 0.3, (9, 1)), np.zeros((1, 3))
+                state = folded(d[rows], [c] * len(rows), tokens, [0.0] * len(rows))
+                assert state is not None
+                assert state[0][0] == pytest.approx(fold(list(part), d[:, 0])[0])
+
+
+@pytest.mark.parametrize("seed", [16, 43, 46, 75])
+def test_random_trees_show_what_their_pictures_show(seed: int) -> None:
+    scene = random_scene(seed, warps=False).model_copy(update={"background": (0.2, 0.3, 0.4)})
+    found = scenelang.Diagnostics()
+    off = drawn(scenelang.to_svg(scene, diagnostics=found)) - scenelang.render(scene, samples="four")[..., :3]
+    assert -10 * np.log10((off**2).mean()) > 30
+    far = (abs(off) > 0.3).any(2)  # at outlines, and nowhere over nine pixels
+    whole = np.lib.stride_tricks.sliding_window_view(far, (3, 3)).all((2, 3))
+    assert not whole.any() or "W0550" in {d.code for d in found}
+
+
 def test_holes_and_colours_and_what_lies_behind() -> None:
     scene = scenelang.loads(
         "canvas(64, 48); background(none); chain { square { material flat { color(#d33); } }"
@@ -135,7 +160,7 @@ def test_options_of_pictures_are_refused(tmp_path: Path) -> None:
         result = CliRunner().invoke(cli, call)
         assert result.exit_code == 2
         assert options.split()[0] in result.output
-        assert re.search(r"(is of|draws) pictures", result.output)
+        assert re.search(r"(is of|draws) (pictures|meshes)", result.output)
         assert not out.exists()
 
 

@@ -23,6 +23,7 @@ from scenelang.drawing.metrics import psnr
 from scenelang.language.evaluation import Source
 from scenelang.web.arrays import MODULES, script, web
 from scenelang.web.export import alternative, colour_name, export, page, plain, still, view_of, viewed
+from scenelang.web.volume import Detail
 from tests.browser import watched
 from tests.test_docs import build_site
 
@@ -160,6 +161,21 @@ def loaded(page: Any, path: Path) -> Any:
     page.goto(path.as_uri())
     page.wait_for_function("() => canvas.classList.contains('drawn') || !note.hidden")
     return asked
+
+
+def test_bytes_of_objects_and_of_light_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As docs/viewer.md says, where nothing is alike: random objects, and the noise of few rays."""
+    monkeypatch.setattr("scenelang.web.export.FULL", Detail(rays=4, more=0))
+    place = "translate(rand(i + 1), rand(i + 2), rand(i + 3));"
+    look = "color([rand(i + 4), rand(i + 5), rand(i + 6)]);"
+    many = f"sphere {{ scale(0.01 + 0.01 * rand(i)); {place} material diffuse {{ {look} }} }}"
+    mist = f"sphere {{ scale(0.2); {place} material volumetric; }}"
+    for text, most in (
+        ("sphere;", 150_000),
+        (f"for (i in 0..<1000) {{ {many} }}", 150_000 + 120_000),
+        (f"sky(); for (i in 0..<20) {{ {mist} }}", 150_000 + 600_000),
+    ):
+        assert most / 3 < len(page(view_of(nsg.compile(nsg.loads(text))))) < most
 
 
 @pytest.mark.browser

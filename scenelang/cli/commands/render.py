@@ -26,16 +26,19 @@ if TYPE_CHECKING:
     from scenelang.cli.options import FilmOptions
     from scenelang.drawing.image import Image, Output
     from scenelang.output.frames import Target
+    from scenelang.output.mesh import Up
 
 _SECTIONS: Final = {
     "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
     "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
     "More than a picture": "--output --prove --redraw --verbose",
-    "Meshes": "--resolution",
+    "Meshes": "--resolution --up",
 }
 
 _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backend", "strict", "verbose")
 """Parameters that shapes have too."""
+
+_OF_MESHES: Final = ("resolution", "up")
 
 
 @click.command("render", cls=options.Sectioned, sections=_SECTIONS)
@@ -58,6 +61,7 @@ _OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backe
     type=options.Real(0, 1),
 )  # fmt: skip
 @options.count("--resolution", low=8, high=512, default=320, help="Cells of a mesh along its longest side.")
+@options.choice("--up", words="y z", help="Axis of a mesh that points up; slicers take z, a .glb has y.")
 @options.originals
 @options.strict
 @options.verbose
@@ -75,6 +79,7 @@ def command(
     max_ms: float | None,
     max_flip: float | None,
     resolution: int,
+    up: Up,
     strict: bool,
     verbose: bool,
 ) -> None:
@@ -94,7 +99,8 @@ def command(
     A run that was interrupted goes on where it stopped.
 
     OUT may hold shapes in place of pixels: curves of a flat scene (.svg), or the solids of a scene as one
-    closed mesh with colours (.glb .ply .obj) or without (.stl), wherever the camera looks.
+    closed mesh with colours (.glb .ply .obj) or without (.stl), wherever the camera looks. Scenes are y up,
+    and so are meshes; with --up z slicers lay them as they stand.
 
     With --output, PNG files have 16 bits and say what they hold in a text `scenelang`; an .exr holds the
     picture and all outputs as layers of floats.
@@ -107,11 +113,14 @@ def command(
     """
     from scenelang.cli.inputs import prepare_all, read_input, unused_defines
 
-    if Path(out).suffix.lower() in SHAPES and not Path(out).is_dir():
-        _shape(ctx, files, out, request, how, resolution, strict, verbose)
+    shape = Path(out).suffix.lower() in SHAPES and not Path(out).is_dir()
+    for name in _OF_MESHES:
+        given = ctx.get_parameter_source(name) == ParameterSource.COMMANDLINE
+        if given and not (shape and Path(out).suffix.lower() != DRAWING):
+            raise click.UsageError(f"--{name} is of meshes: .stl, .glb, .ply and .obj.")
+    if shape:
+        _shape(ctx, files, out, request, how, resolution, up, strict, verbose)
         return
-    if ctx.get_parameter_source("resolution") == ParameterSource.COMMANDLINE:
-        raise click.UsageError("--resolution is of meshes: .stl, .glb, .ply and .obj.")
     outputs, limits = tuple(dict.fromkeys(outputs)), max_ms is not None or max_flip is not None
     prove |= redraw or "proof" in outputs
     if request.frame is not None and film.certain:
@@ -179,6 +188,7 @@ def _shape(
     request: options.Request,
     how: How,
     resolution: int,
+    up: Up,
     strict: bool,
     verbose: bool,
 ) -> None:
@@ -186,11 +196,10 @@ def _shape(
     from scenelang.cli.inputs import prepare_all
     from scenelang.compiler.compile import compile_scene
     from scenelang.language.diagnostics import Diagnostics
-    from scenelang.output.mesh import WRITERS
     from scenelang.output.shapes import UNSEEN, refuse_animation, to_mesh, to_svg
 
     curves = Path(out).suffix.lower() == DRAWING
-    known = {*_OF_SHAPES, "size" if curves else "resolution"}
+    known = {*_OF_SHAPES, *(["size"] if curves else _OF_MESHES)}
     for param in ctx.command.params:
         given = ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
         if given and param.name not in known:
@@ -200,6 +209,8 @@ def _shape(
     if how.backend == "reference":
         raise click.UsageError("--backend reference draws pictures; shapes are those of the model's field.")
     path = Path(out)
+    if up == "z" and path.suffix.lower() == ".glb":
+        raise click.UsageError("--up z is of .stl, .ply and .obj: a .glb is y up.")
     if not path.parent.is_dir():
         raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
     clock, result = Clock(), Diagnostics()
@@ -218,7 +229,7 @@ def _shape(
                 program = compile_scene(job.scene, spans=job.spans, without=UNSEEN)
             mesh = to_mesh(program, resolution=resolution, backend=how.backend, diagnostics=result)
             job.notes.append(f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")
-            data = WRITERS[path.suffix.lower()](mesh)
+            data = mesh.encode(path.suffix.lower(), up)
     say_diagnostics(result)
     if strict and result.items:
         ctx.exit(1)

@@ -728,7 +728,7 @@ class SolidField:
         """A mask of balls (K, M) around the points at t (M,), of objects that change something there."""
         inside = (passes.slots[BEGIN] <= t) & (t <= passes.slots[END])
         if not self.draws:  # the others change only what is there
-            touched = inside[0] & ~inside[0]
+            touched = t < t
             for slot in reversed(range(len(inside))):
                 inside[slot] &= touched | (passes.slots[OBJECT, slot] >= 0)
                 touched = touched | inside[slot]
