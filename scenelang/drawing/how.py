@@ -45,10 +45,11 @@ class How(NamedTuple):
         threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
             are usable cores. Numpy draws the plane in one.
         samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
-            elsewhere, which looks the same, ``"one"``, which is faster and has hard edges, or ``"draft"``, one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"``
-            with less care for solids: steps that may pass what is thinner than 0.04, as those of ``"one"``
-            and ``"draft"`` may. Of a scene with ``samples(16)`` four are sixteen; 4 and 16 are
-            ``"adaptive"`` with so many, whatever the scene says.
+            elsewhere, which looks the same, ``"one"``, which is faster and has hard edges, or ``"draft"``,
+            one for each 2 x 2 pixels, enlarged. ``"quick"`` is ``"adaptive"`` with less care for solids:
+            steps that may pass what is thinner than 0.04, as those of ``"one"`` and ``"draft"`` may. Of a
+            scene with ``samples(16)`` four are sixteen; 4 and 16 are ``"adaptive"`` with so many, whatever
+            the scene says.
     """
 
     backend: Backend = "neural"
