@@ -127,9 +127,17 @@ _SUBJECTS = {
 """Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
-THIN_WALL: Final = 0.05  # world units; light of a sky leaks through thinner walls
+# world units; light of a sky leaks through thinner walls, and more shows where nothing is open
+THIN_WALL: Final = 0.05
+THIN_CLOSED: Final = 0.09, 0.2
+WAYS: Final = 100  # from the eye, that tell of walls around it,
+WALLS: Final = 0.06  # part of them that a thin wall takes at least,
+OPEN: Final = 0.4  # that may be free,
+BEYOND: Final = 0.04  # that meet a wall again behind another,
+SEVERAL: Final = 3  # and walls that are objects of their own: a hollow of one is drawn well
 SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
 CROWD: Final = 100  # objects; light between more of them is less exact
+_SEAM = 1e-3  # world units between walls that touch
 _TOLERANCE = 1e-9
 
 
@@ -197,6 +205,8 @@ def _check_light(
             fact = f"the wall of this hollow `{leaf.geometry}` is {thick:.3g} thick, and light leaks through"
             found.append((leaf, f"{fact} what is thinner than {THIN_WALL:g}"))
             break
+    if not found and (room := _room(graph, stage, len(rows))) is not None:
+        found.append(room)
     mist = [row.leaf for row in rows if not row.cuts and row.leaf.look.material == "volumetric"]
     lamps = [lamp for lamp in stage.lights if lamp.radius < SMALL_LAMP and lamp.power]
     for lamp in lamps if len(lamps) * len(rows) <= _TESTS else ():
@@ -216,6 +226,77 @@ def _check_light(
         fact = f"light under a `sky` may be wrong: {'; '.join(fact for _, fact in found)}"
         help = "compare with `render --backend reference`, which traces the light"
         context.diagnostics.add("W0514", fact, min(found, key=lambda at: at[0].number)[0].span, help=help)
+
+
+def _room(graph: Graph, stage: Stage, count: int) -> tuple[Leaf, str] | None:
+    """The thinnest wall of a room around the eye, if light leaks through, and what is to say of it.
+
+    Ways go evenly to all sides; bounds of leaves without deformations count as these.
+    """
+    walls, free, behind = list[tuple[float, Leaf]](), 0, list[Leaf]()
+    for i in range(WAYS if count * WAYS <= _TESTS else 0):
+        y, turn = 1 - (2 * i + 1) / WAYS, 2.39996 * i
+        flat = sqrt(1 - y * y)
+        spans = _spans(graph.root, stage.camera.eye, (flat * cos(turn), y, flat * sin(turn)))
+        spans.sort(key=itemgetter(0))
+        if not spans:
+            free += stage.ground is None or y > 0
+            continue
+        begin, end, wall = spans[0]
+        for a, b, leaf in spans:
+            if a > end + _SEAM:
+                behind.append(leaf)
+                break
+            end = max(end, b)  # as far as one goes on in another
+        walls.append((end - begin, wall))
+    # of closed rooms more shows; floors that go on beyond a wall are lit there
+    own = {id(leaf) for _, leaf in walls}
+    beyond = sum(id(leaf) in own for leaf in behind) >= BEYOND * WAYS
+    limit = THIN_WALL if free else THIN_CLOSED[beyond]
+    thin = [(thick, leaf) for thick, leaf in walls if thick < limit]
+    if len(thin) < WALLS * WAYS or free > OPEN * WAYS or len({id(leaf) for _, leaf in thin}) < SEVERAL:
+        return None
+    thick, wall = min(thin, key=itemgetter(0))
+    fact = f"this `{wall.geometry}` is a wall around the eye, {thick:.2g} thick, and what is thinner than"
+    return wall, f"{fact} {limit:g} lets light through, or has dark edges"
+
+
+Span_ = tuple[float, float, Leaf]
+
+
+def _spans(fold: Fold, eye: Point, way: Point) -> list[Span_]:
+    """Where a ray from the eye is within what is opaque of a fold, and whose."""
+    found = list[Span_]()
+    for link in fold.links:
+        node = link.node
+        own = _spans(node, eye, way) if isinstance(node, Fold) else _span(node, eye, way)
+        if link.op in ("union", "smooth"):
+            found += own
+        elif link.op == "intersect":
+            found = [(max(a, c), min(b, d), leaf) for a, b, leaf in found for c, d, _ in own]
+        for c, d, _ in own if link.op == "subtract" else ():
+            found = [part for a, b, leaf in found for part in ((a, min(b, c), leaf), (max(a, d), b, leaf))]
+        found = [part for part in found if part[0] < part[1]]
+    return found
+
+
+def _span(leaf: Leaf, eye: Point, way: Point) -> list[Span_]:
+    row = GEOMETRIES.get(leaf.geometry)
+    if (
+        row is None
+        or leaf.look.material == "volumetric"
+        or not all(isinstance(s, Affine) for s in leaf.steps)
+    ):
+        return []
+    rows = leaf.noted("inverse", lambda leaf: steps.inverted(steps.composed(leaf.steps)))
+    begin, end = 0.0, inf
+    for i, half in enumerate(row.half):
+        a, b, c, at = rows[4 * i : 4 * i + 4]
+        at += a * eye[0] + b * eye[1] + c * eye[2]
+        speed = a * way[0] + b * way[1] + c * way[2] or 1e-12
+        near, far = sorted(((-half - at) / speed, (half - at) / speed))
+        begin, end = max(begin, near), min(end, far)
+    return [(begin, end, leaf)] if begin < end else []
 
 
 def _within(box: Box, p: Point) -> bool:
