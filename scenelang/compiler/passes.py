@@ -32,7 +32,7 @@ from scenelang.compiler.graph import (
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.rewrites import Context, cover_of, covered
-from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space, Stage
+from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Light, Space, Stage
 from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span
 from scenelang.language.scene import Scene
@@ -127,13 +127,13 @@ _SUBJECTS = {
 """Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
-# world units; light of a sky leaks through thinner walls, and more shows where nothing is open
+# world units; light of a sky leaks through thinner walls, and more shows in the dark
 THIN_WALL: Final = 0.05
 THIN_CLOSED: Final = 0.09, 0.2
 WAYS: Final = 100  # from the eye, that tell of walls around it,
 WALLS: Final = 0.06  # part of them that a thin wall takes at least,
 OPEN: Final = 0.4  # that may be free,
-BEYOND: Final = 0.04  # that meet a wall again behind another,
+BEYOND: Final = 0.1  # that meet a wall again behind another,
 SEVERAL: Final = 3  # and walls that are objects of their own: a hollow of one is drawn well
 SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
 CROWD: Final = 100  # objects; light between more of them is less exact
@@ -249,10 +249,11 @@ def _room(graph: Graph, stage: Stage, count: int) -> tuple[Leaf, str] | None:
                 break
             end = max(end, b)  # as far as one goes on in another
         walls.append((end - begin, wall))
-    # of closed rooms more shows; floors that go on beyond a wall are lit there
+    # of dark rooms more shows, and floors that go on beyond a wall are lit there
     own = {id(leaf) for _, leaf in walls}
     beyond = sum(id(leaf) in own for leaf in behind) >= BEYOND * WAYS
-    limit = THIN_WALL if free else THIN_CLOSED[beyond]
+    lit = free or any(_in_reach(graph, stage.camera.eye, lamp) for lamp in stage.lights)
+    limit = THIN_WALL if lit else THIN_CLOSED[beyond]
     thin = [(thick, leaf) for thick, leaf in walls if thick < limit]
     if len(thin) < WALLS * WAYS or free > OPEN * WAYS or len({id(leaf) for _, leaf in thin}) < SEVERAL:
         return None
@@ -261,12 +262,19 @@ def _room(graph: Graph, stage: Stage, count: int) -> tuple[Leaf, str] | None:
     return wall, f"{fact} {limit:g} lets light through, or has dark edges"
 
 
-Span_ = tuple[float, float, Leaf]
+def _in_reach(graph: Graph, eye: Point, lamp: Light) -> bool:
+    """Whether a lamp shines to the eye."""
+    far = dist(eye, lamp.position)
+    x, y, z = ((b - a) / (far or 1.0) for a, b in zip(eye, lamp.position, strict=True))
+    return lamp.power > 0 and all(begin > far for begin, *_ in _spans(graph.root, eye, (x, y, z)))
 
 
-def _spans(fold: Fold, eye: Point, way: Point) -> list[Span_]:
+Within = tuple[float, float, Leaf]
+
+
+def _spans(fold: Fold, eye: Point, way: Point) -> list[Within]:
     """Where a ray from the eye is within what is opaque of a fold, and whose."""
-    found = list[Span_]()
+    found = list[Within]()
     for link in fold.links:
         node = link.node
         own = _spans(node, eye, way) if isinstance(node, Fold) else _span(node, eye, way)
@@ -280,7 +288,7 @@ def _spans(fold: Fold, eye: Point, way: Point) -> list[Span_]:
     return found
 
 
-def _span(leaf: Leaf, eye: Point, way: Point) -> list[Span_]:
+def _span(leaf: Leaf, eye: Point, way: Point) -> list[Within]:
     row = GEOMETRIES.get(leaf.geometry)
     if (
         row is None

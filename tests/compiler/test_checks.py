@@ -297,7 +297,7 @@ def test_frames_share_the_limits_of_one(monkeypatch: pytest.MonkeyPatch) -> None
 
 SHELL = "sky(); light(none); subtract { box { shell(%g); scale(%g); } sphere { %s } }"
 IN_MIST = "sky(); light([0, %g, 0], radius = %g); %s { material volumetric; }"
-INSIDE = "camera([0, 0, 0.8]); sky(); light(none); ground(none);"
+INSIDE = "camera([0, 0, 0.8]); sky(); ground(none); light(none);"
 
 
 def room(thick: float, side: float, hole: str = "", stage: str = INSIDE) -> str:
@@ -320,6 +320,7 @@ MEASURED = {
     room(0.03, 2.06, WINDOW): "0.03 thick, and what is thinner than 0.05",
     room(0.07, 2.14, WINDOW): None,
     room(0.03, 2.06, "s.block(4, 1.9, 4) { translate(0, 1, 0); }"): None,  # hardly anything is left around it
+    room(0.07, 2.14, stage=INSIDE.replace("light(none)", "light([0.5, 0.5, 0])")): None,  # a lamp in it
     room(0.07, 2.14, stage="sky();"): None,  # the eye is not in it
     room(0.07, 2.14, stage="camera([0, 0, 0.8]);"): None,
     'import "std/solids" as s; ' + INSIDE + "subtract { s.block(2.06); s.block(2); }": None,  # of one piece
