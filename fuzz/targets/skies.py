@@ -21,7 +21,8 @@ from scenelang.language.reports import SceneError
 SIDE_PX = 32
 MOST_S = 60.0
 """Processor time of a picture that is a finding."""
-COUNTS = (0, 0, 1, 1, 1, 2, 3, 5, 8, 13, 30, 100)  # of nodes at the top
+# of nodes at the top, and how often
+COUNTS = {0: 0.15, 1: 0.3, 2: 0.2, 3: 0.15, 5: 0.1, 8: 0.05, 30: 0.03, 100: 0.02}
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 IMPORTS = 'import "std/meshes" as m;\nimport "originals/wood.safetensors" as log;\n'
 
@@ -151,7 +152,7 @@ def drawn(seed: int) -> str:
         text = IMPORTS + scene_text(family, seed, 0).replace('import "std/meshes" as m;\n', "")
         text = text.replace("nsg 1;\n", "")
     else:
-        text += "".join(_node(rng) for _ in range(int(rng.choice(COUNTS))))
+        text += "".join(_node(rng) for _ in range(int(rng.choice(list(COUNTS), p=list(COUNTS.values())))))
     if rng.random() < 0.1:
         text += f"box {{ shell({_one(rng, 0.01, 0.1)}); scale({_one(rng, 5, 20)}); {_material(rng)} }}\n"
     return text

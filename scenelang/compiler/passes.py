@@ -134,6 +134,7 @@ WAYS: Final = 100  # from the eye, that tell of walls around it,
 WALLS: Final = 0.06  # part of them that a thin wall takes at least,
 OPEN: Final = 0.4  # that may be free,
 BEYOND: Final = 0.1  # that meet a wall again behind another,
+OBLIQUE: Final = 3  # times as long as a wall is thick is a way through it at most,
 SEVERAL: Final = 3  # and walls that are objects of their own: a hollow of one is drawn well
 SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
 CROWD: Final = 100  # objects; light between more of them is less exact
@@ -205,8 +206,12 @@ def _check_light(
             fact = f"the wall of this hollow `{leaf.geometry}` is {thick:.3g} thick, and light leaks through"
             found.append((leaf, f"{fact} what is thinner than {THIN_WALL:g}"))
             break
-    if not found and (room := _room(graph, stage, len(rows))) is not None:
-        found.append(room)
+    solid = [(_thick(row.leaf, space), row.leaf) for row in rows if not row.cuts]
+    if not found and sum(thick < THIN_CLOSED[True] for thick, _ in solid) >= SEVERAL:
+        middles = [(steps.composed(leaf.steps)[3::4], leaf) for thick, leaf in solid if thick > THIN_WALL]
+        places = [(stage.camera.eye, None), *middles][: _TESTS // (WAYS * len(rows))]
+        rooms = (_room(graph, stage, at, leaf) for at, leaf in places)
+        found += next(([room] for room in rooms if room is not None), [])
     mist = [row.leaf for row in rows if not row.cuts and row.leaf.look.material == "volumetric"]
     lamps = [lamp for lamp in stage.lights if lamp.radius < SMALL_LAMP and lamp.power]
     for lamp in lamps if len(lamps) * len(rows) <= _TESTS else ():
@@ -228,17 +233,16 @@ def _check_light(
         context.diagnostics.add("W0514", fact, min(found, key=lambda at: at[0].number)[0].span, help=help)
 
 
-def _room(graph: Graph, stage: Stage, count: int) -> tuple[Leaf, str] | None:
-    """The thinnest wall of a room around the eye, if light leaks through, and what is to say of it.
-
-    Ways go evenly to all sides; bounds of leaves without deformations count as these.
+def _room(graph: Graph, stage: Stage, at: Point, inside: Leaf | None) -> tuple[Leaf, str] | None:
+    """The thinnest wall of a room around the eye, or the middle of what is ``inside``, if light there may be
+    wrong, and what is to say of it. Ways go evenly to all sides; leaves without deformations count as boxes.
     """
     walls, free, behind = list[tuple[float, Leaf]](), 0, list[Leaf]()
-    for i in range(WAYS if count * WAYS <= _TESTS else 0):
+    for i in range(WAYS):
         y, turn = 1 - (2 * i + 1) / WAYS, 2.39996 * i
         flat = sqrt(1 - y * y)
-        spans = _spans(graph.root, stage.camera.eye, (flat * cos(turn), y, flat * sin(turn)))
-        spans.sort(key=itemgetter(0))
+        spans = _spans(graph.root, at, (flat * cos(turn), y, flat * sin(turn)))
+        spans = sorted((span for span in spans if span[2] is not inside), key=itemgetter(0))
         if not spans:
             free += stage.ground is None or y > 0
             continue
@@ -248,18 +252,28 @@ def _room(graph: Graph, stage: Stage, count: int) -> tuple[Leaf, str] | None:
                 behind.append(leaf)
                 break
             end = max(end, b)  # as far as one goes on in another
-        walls.append((end - begin, wall))
+        thick = _thick(wall, graph.space)
+        walls.append((thick if end - begin < OBLIQUE * thick else inf, wall))
     # of dark rooms more shows, and floors that go on beyond a wall are lit there
     own = {id(leaf) for _, leaf in walls}
     beyond = sum(id(leaf) in own for leaf in behind) >= BEYOND * WAYS
-    lit = free or any(_in_reach(graph, stage.camera.eye, lamp) for lamp in stage.lights)
+    lit = inside or free or any(_in_reach(graph, at, lamp) for lamp in stage.lights)
     limit = THIN_WALL if lit else THIN_CLOSED[beyond]
-    thin = [(thick, leaf) for thick, leaf in walls if thick < limit]
-    if len(thin) < WALLS * WAYS or free > OPEN * WAYS or len({id(leaf) for _, leaf in thin}) < SEVERAL:
+    thin = [(thick, leaf) for thick, leaf in walls if thick < limit - _TOLERANCE]
+    if len(thin) < WALLS * WAYS or len({id(leaf) for _, leaf in thin}) < SEVERAL:
+        return None
+    if free > OPEN * WAYS or (inside and not free):  # of what is closed nothing is seen
         return None
     thick, wall = min(thin, key=itemgetter(0))
-    fact = f"this `{wall.geometry}` is a wall around the eye, {thick:.2g} thick, and what is thinner than"
+    around = f"a `{inside.geometry}`" if inside else "the eye"
+    fact = f"this `{wall.geometry}` is a wall around {around}, {thick:.2g} thick, and what is thinner than"
     return wall, f"{fact} {limit:g} lets light through, or has dark edges"
+
+
+def _thick(leaf: Leaf, space: Space) -> float:
+    """How thick a leaf is where it is thinnest, inf where that is not known."""
+    row = GEOMETRIES.get(leaf.geometry)
+    return space.stretches(steps.composed(leaf.steps))[0] * row.thickness if row is not None else inf
 
 
 def _in_reach(graph: Graph, eye: Point, lamp: Light) -> bool:

@@ -306,7 +306,7 @@ def room(thick: float, side: float, hole: str = "", stage: str = INSIDE) -> str:
         str([thick if axis == i else side for i in range(3)]) for axis in range(3) for _ in range(2)
     )
     at = ", ".join(str([k * (axis == i) for i in range(3)]) for axis in range(3) for k in (-1, 1))
-    return f"""import "std/solids" as s; {stage} let sides = [{slabs}]; let at = [{at}];
+    return f"""{stage} import "std/solids" as s; let sides = [{slabs}]; let at = [{at}];
         subtract {{ group {{ for (i in 0..<6) {{ s.block(sides[i].x, sides[i].y, sides[i].z) {{
         translate({1 + thick / 2} * at[i]); }} }} }} {hole} }}"""
 
@@ -322,6 +322,7 @@ MEASURED = {
     room(0.03, 2.06, "s.block(4, 1.9, 4) { translate(0, 1, 0); }"): None,  # hardly anything is left around it
     room(0.07, 2.14, stage=INSIDE.replace("light(none)", "light([0.5, 0.5, 0])")): None,  # a lamp in it
     room(0.07, 2.14, stage="sky();"): None,  # the eye is not in it
+    "sky(); sphere { scale(0.3); }" + room(0.03, 2.06, WINDOW, ""): "around a `sphere`, 0.03 thick",
     room(0.07, 2.14, stage="camera([0, 0, 0.8]);"): None,
     'import "std/solids" as s; ' + INSIDE + "subtract { s.block(2.06); s.block(2); }": None,  # of one piece
     SHELL % (0.06, 0.8, "scale(0.6); translate(0, 0, 1);"): "of this hollow `box` is 0.048 thick",
