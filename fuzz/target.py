@@ -19,6 +19,7 @@ TARGETS: Final = (
     "zoo",
     "learn",
     "slow",
+    "skies",
 )
 """Names of the modules in `fuzz.targets`."""
 PUMPED: Final = "slow"

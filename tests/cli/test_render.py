@@ -185,6 +185,10 @@ def test_why_a_picture_has_one_colour(folder: Folder) -> None:
         ("square { scale(0.5); }", "a.png: one colour throughout; flat objects are white"),
         ("background(#222); square { scale(0.001); }", "smaller than a pixel"),
         ("background(#222); subtract { star; star; }", "cut away"),
+        (
+            "sky(); light(none); ground(none); camera([0, 0, 0.1]); sphere { shell(0.5); scale(3); }",
+            "black throughout: no light reaches what the eye sees",
+        ),
         ("background(#222); module part() { star; }", "no objects to draw"),
         ("group { scale(0.5); }", "no objects to draw"),
         ("square { scale(0.5); translate(4, 0); }", "W0402"),

@@ -30,6 +30,7 @@ COUNTS = {
     "zoo": (20, 150),
     "learn": (10, 30),
     "slow": (4, 4),
+    "skies": (3, 1),
 }
 """Numbers of seeds and mutations that a target takes in about two seconds."""
 

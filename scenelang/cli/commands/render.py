@@ -408,4 +408,8 @@ def _blank(job: Input, image: Image) -> str | None:
         return None
     if (image[0, 0] > 1 - 0.5 / 255).all():
         return "one colour throughout; flat objects are white without a colour, and so is the background"
+    stage = job.program.stage if job.program is not None else None
+    lit = job.scene.sky != "default" if job.scene is not None else stage is not None and stage.sky is not None
+    if lit and (image[0, 0, :3] < 0.5 / 255).all():
+        return "black throughout: no light reaches what the eye sees, or what it sees is black"
     return "one colour throughout: objects in the background's colour, cut away, or smaller than a pixel"

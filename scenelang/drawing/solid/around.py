@@ -170,26 +170,31 @@ class Around:
         )
         self.seen: Any = None  # a `Seen`, once a picture is looked at
         self.mist = Mist(field, stage) if field.media else None
-        for self.hollow in (hollow(field), True):  # again where walls turn out to be all around many nodes
-            own, floor = on_objects(field, stage, self.hollow), on_ground(field, stage, self.hollow)
-            self.emitters = Emitters(field, own)
-            kept = xp.where(own.place[4] > 0)
-            own = Nodes(*(xp.take(part, kept) for part in own))
-            self.first = own.p.shape[1]  # node of the ground
-            self.lookup: Any = Lookup(xp, own) if self.first else None
-            self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
-            self.count = self.nodes.p.shape[1]
-            self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
-            with xp.inference():
-                if self.hollow and self.lookup is not None:
-                    index = self.lookup.index
-                    first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
-                    free = self._open(xp.take(own.p, first), xp.take(own.n, first), index.reshape(-1))
-                    self.lookup.alike = free.reshape(index.shape) > 0
-                self.exchange = self._exchange(RAYS[self.hollow])
-            if self.hollow or self.closed < CLOSED:
-                break
+        with xp.inference():
+            for self.hollow in (hollow(field), True):  # again where walls turn out to be around many nodes
+                self._place()
+                if self.hollow or self.closed < CLOSED:
+                    break
         self.light(lamps)
+
+    def _place(self) -> None:
+        """Place the nodes, and find what they see."""
+        xp, field, stage = self.xp, self.field, self.stage
+        own, floor = on_objects(field, stage, self.hollow), on_ground(field, stage, self.hollow)
+        self.emitters = Emitters(field, own)
+        kept = xp.where(own.place[4] > 0)
+        own = Nodes(*(xp.take(part, kept) for part in own))
+        self.first = own.p.shape[1]  # node of the ground
+        self.lookup: Any = Lookup(xp, own) if self.first else None
+        self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
+        self.count = self.nodes.p.shape[1]
+        self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
+        if self.hollow and self.lookup is not None:
+            index = self.lookup.index
+            first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
+            free = self._open(xp.take(own.p, first), xp.take(own.n, first), index.reshape(-1))
+            self.lookup.alike = free.reshape(index.shape) > 0
+        self.exchange = self._exchange(RAYS[self.hollow])
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
         """Find what nodes send and receive under lamps."""

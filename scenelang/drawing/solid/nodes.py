@@ -113,8 +113,8 @@ def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
 
 def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
     """Whole numbers like these whose sum is no more; of very many some are 0."""
-    sums = np.cumsum(counts)
-    whole: np.ndarray = np.diff(np.floor(sums * min(1.0, most / max(float(sums[-1]), 1.0))), prepend=0.0)
+    part = min(1.0, most / max(float(counts.sum()), 1.0))
+    whole: np.ndarray = np.diff(np.floor(np.cumsum(counts) * part), prepend=0.0)
     return whole.astype(int)
 
 
