@@ -33,7 +33,8 @@ from scenelang.drawing.how import RenderError, Samples
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.drawing.render import exact_graph
-from scenelang.drawing.small import Load, draw_small
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.work import Load
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS

@@ -14,7 +14,7 @@ import scenelang as nsg
 from lab.frontier.record import FrameErrors, Frontier
 from scenelang.cli import inputs
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.small import load_of
+from scenelang.drawing.work import load_of
 from scenelang.output import frontier as frontier_file
 from scenelang.output.frontier import Cost
 from tests.cli.conftest import Folder

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 _SECTIONS: Final = {
     "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
-    "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
+    "How it is drawn": "--model --backend --samples --patient --max-ms --max-flip --originals "
+    "--device --threads",
     "More than a picture": "--output --prove --redraw --verbose",
     "Meshes": "--resolution",
 }
@@ -162,6 +163,7 @@ def command(
             def progress(share: float, done: int = index) -> None:
                 bar("drawing", done + share, len(able))
 
+            progress(0.0)
             told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
                 click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
