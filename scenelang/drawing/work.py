@@ -43,7 +43,7 @@ class Load(NamedTuple):
     def row(self, skip: bool) -> tuple[float, float, float, float, float]:
         """The terms of the sum; without skipping every object meets every pixel."""
         meetings = self.meetings if skip else float(self.objects * self.pixels)
-        return 1.0, float(self.objects), float(self.pixels), meetings + self.light, self.outline
+        return 1.0, float(self.objects), float(self.pixels), meetings, self.outline
 
 
 def load_of(program: Program, network: Any = None) -> Load:
@@ -102,10 +102,11 @@ _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 `python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
 _SOLID_NS: Final = (5e7, 3e5, 3000.0, 300.0, 0.0)
-"""The like for solids, whose sky is among the meetings."""
+"""The like for solids."""
+LIGHT_MS: Final = 3e-4  # for an evaluation of what comes from the sky
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Shares of that for other ways to sample."""
-_REFINED: Final = 0.15  # of the pixels of solids, of which all samples are taken
+_REFINED: Final = 0.1, 6.0  # share of the pixels of solids that take all samples, and more along a side
 _CARE: Final = 2.5  # evaluations for one of hasty ways to sample solids
 
 
@@ -113,11 +114,13 @@ def work_ms(program: Program, samples: Samples = "adaptive", load: Load | None =
     """Milliseconds to draw a Program on one core of the machine that was measured."""
     load, share, costs = load or load_of(program), _SHARES.get(samples, 1.0), _NS
     if program.stage is not None:
-        often = 1 + _REFINED * program.samples
+        often = 1 + program.samples * (_REFINED[0] + _REFINED[1] / load.pixels**0.5)
         ways = {"one": 1.0, "draft": 0.25, "quick": often, "four": _CARE * program.samples}
         share, costs = 1.0, _SOLID_NS
         load = load._replace(meetings=load.meetings * ways.get(str(samples), _CARE * often))
-    return share * sum(n * ns for n, ns in zip(load.row(True), costs, strict=True)) / 1e6
+    return (
+        share * sum(n * ns for n, ns in zip(load.row(True), costs, strict=True)) / 1e6 + LIGHT_MS * load.light
+    )
 
 
 BOUND_S, LEAST_S = 300.0, 45.0  # processor seconds that a picture of 256 x 256 may take, and the smallest

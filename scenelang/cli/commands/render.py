@@ -166,6 +166,11 @@ def command(
             progress(0.0)
             told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
+                if job.program is not None and job.program.stage is not None:
+                    from scenelang.drawing.work import work_ms
+
+                    ms = work_ms(job.program, job.how.care["samples"])
+                    job.notes.append(f"about {ms:,.0f} ms of work for the network were foretold")
                 click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
     for line in told:
         click.echo(line, err=True)
