@@ -21,7 +21,8 @@ from lab.bench.floor import of_set, stars
 from lab.frontier.fit import fit_cost
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import Samples
-from scenelang.drawing.small import _NS, _SHARES, draw_small, load_of, work_ms
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.work import _NS, _SHARES, load_of, work_ms
 from scenelang.output.frontier import UNITS
 
 EXAMPLES = ROOT / "examples"

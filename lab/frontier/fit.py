@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.drawing.small import Load
+from scenelang.drawing.work import Load
 from scenelang.output.frontier import UNITS, Cost
 
 ROUNDS = 20  # of weights

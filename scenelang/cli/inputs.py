@@ -244,7 +244,10 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Inp
     from scenelang.output import frontier
 
     for job in jobs:
-        if job.how._replace(threads=None, device="auto") != DEFAULT or job.how.device == "cuda":
+        if (
+            job.how._replace(threads=None, device="auto", patient=False) != DEFAULT
+            or job.how.device == "cuda"
+        ):
             asked = "--max-ms" if limits.ms is not None else "--max-flip"
             other = "--device cuda" if job.how.device == "cuda" else "--backend and --samples"
             raise click.UsageError(f"{asked} chooses how to draw on processors; leave out {other}.")
@@ -260,7 +263,7 @@ def choose_all(jobs: list[Input], limits: Limits, model: str | None) -> list[Inp
 
 def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> None:
     """The best choice whose model draws a job's scene without further warnings; raises `NothingFits`."""
-    from scenelang.drawing.small import load_of
+    from scenelang.drawing.work import load_of
     from scenelang.output import frontier
 
     program = job.program
@@ -287,7 +290,7 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
     # as it was measured
     device: Device = "cpu" if compiled.stage is None and point.backend == "neural" else "auto"
     samples = point.samples if point.backend == "neural" else "adaptive"
-    job.program, job.how = compiled, How(point.backend, device, job.how.threads, samples)
+    job.program, job.how = compiled, How(point.backend, device, job.how.threads, samples, job.how.patient)
     speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
     like = f"errors are promised for scenes like those of the set `{measured.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""

@@ -221,6 +221,8 @@ def _requested(defines: Mapping[str, str], frame: int | None, **own: Any) -> Req
 
 def field(name: str) -> Option:
     """The option for a field of `How`."""
+    if How._field_defaults[name] is False:
+        return click.option(f"--{name}", is_flag=True, help=HELP[name])
     if name in CHOICES:
         return choice(f"--{name}", words=" ".join(CHOICES[name]), help=HELP[name])
     return count(f"--{name}", help=HELP[name])

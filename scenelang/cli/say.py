@@ -117,20 +117,29 @@ class Bar:
         self._lock = threading.Lock()
         self._shown: Progress | None = None
         self._done = 0.0
+        self._told: tuple[str, float, float | None] = ("", 0.0, None)
+        self._timer = threading.Timer(PATIENCE_S, lambda: self(*self._told))  # though nothing is reported
+        self._timer.daemon = True
 
     def __enter__(self) -> Bar:
+        if self._wanted:
+            self._timer.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._timer.cancel()
+        with self._lock:
+            self._wanted = False
         if self._shown is not None:
             self._shown.stop()
 
-    def __call__(self, what: str, done: float, total: float) -> None:
+    def __call__(self, what: str, done: float, total: float | None) -> None:
         """Report how much of the total is done, from any thread; less than before begins the next stage."""
-        if not self._wanted:
-            return
         with self._lock:
+            if not self._wanted:
+                return
             if self._shown is None:
+                self._told = what, done, total
                 if time.perf_counter() - self._started < PATIENCE_S:
                     return
                 from rich.console import Console

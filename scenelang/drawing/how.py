@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from dataclasses import replace
 from typing import Final, Literal, NamedTuple, TypedDict, TypeVar, cast, get_args
 
@@ -22,6 +23,7 @@ class Care(TypedDict, total=False):
     """Fields of `How` that renderers take by these names, whichever library they use."""
 
     samples: Sampling
+    patient: bool
 
 
 class Options(TypedDict, total=False):
@@ -31,6 +33,7 @@ class Options(TypedDict, total=False):
     backend: Backend
     device: Device
     threads: int | None
+    patient: bool
 
 
 class How(NamedTuple):
@@ -50,12 +53,15 @@ class How(NamedTuple):
             steps that may pass what is thinner than 0.04, as those of ``"one"`` and ``"draft"`` may. Of a
             scene with ``samples(16)`` four are sixteen; 4 and 16 are ``"adaptive"`` with so many, whatever
             the scene says.
+        patient: draw all of it however long it takes. Else a picture of too much work is drawn coarser, or
+            not at all: of more than 300 processor seconds at 256 x 256, and of less or more at other sizes.
     """
 
     backend: Backend = "neural"
     device: Device = "auto"
     threads: int | None = None
     samples: Samples = "adaptive"
+    patient: bool = False
 
     def checked(self) -> How:
         """The same. Raises `ValueError` for other values, `RenderError` where two exclude each other."""
@@ -104,7 +110,17 @@ HELP: Final = {
     "threads": "Number of threads on the CPU.",
     "samples": "Samples of a pixel: four near outlines, four everywhere, four near strong outlines (solids), "
     "one, with hard edges, or one for each 2 x 2 pixels; or so many near outlines, whatever the scene says.",
+    "patient": "Draw all of a picture that takes very long, which else is drawn coarser, or not at all.",
 }  # The line of `--help` for each field of `How`
+
+LESS: Final = "draw it smaller, with fewer objects or lamps, or with --patient"
+
+
+def check_time(until_s: float) -> None:
+    """Raise `RenderError` where the process has used more than so many processor seconds."""
+    if time.process_time() > until_s:
+        raise RenderError(f"more work than was foretold, and than a picture may take; {LESS}")
+
 
 KEEP_BYTES = 256 << 20
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h

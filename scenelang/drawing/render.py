@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
@@ -73,11 +74,16 @@ def draw(program: Program, how: How = DEFAULT, *, place: str | None = None, **ru
     if place == "numpy":
         from scenelang.drawing.small import draw_small
 
-        return draw_small(program, exact=how.backend == "exact", **run)
-    from scenelang.drawing.torch_backend import choose_device, draw_program, open_model
+        drawing = draw_small(program, exact=how.backend == "exact", **run)
+    else:
+        from scenelang.drawing.torch_backend import choose_device, draw_program, open_model
 
-    model = open_model(program.model, choose_device(place), program.weights)
-    return draw_program(program, model, **run)
+        model = open_model(program.model, choose_device(place), program.weights)
+        drawing = draw_program(program, model, **run)
+    if drawing.coarser:
+        file = next((place.file + ": " for place in program.places if place), "")
+        warnings.warn(file + drawing.coarser, stacklevel=2)
+    return drawing
 
 
 def render(
@@ -99,7 +105,7 @@ def render(
             ``.safetensors``.
         size: canvas in pixels instead of the Scene's; a Program is compiled for its own.
         progress: called with the share done, in [0, 1], from any thread.
-        **how: ``backend``, ``device``, ``threads`` and ``samples``; see `scenelang.drawing.how.How`.
+        **how: ``backend``, ``device``, ``threads``, ``samples`` and ``patient``, as of `How`.
 
     Returns:
         The picture, float32 (H, W, 3), or (H, W, 4) where the background is none.

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Final, Literal, NamedTuple, Unpack
+from typing import Final, Literal, Unpack
 
 import numpy as np
 from PIL import Image as Pillow
@@ -25,55 +24,11 @@ from scenelang.drawing.closed import field_of
 from scenelang.drawing.how import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.drawing.image import Image
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.work import work_ms
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
-
-PROBE: Final = 16  # the root of the pixels that solids are drawn in to count evaluations
-
-
-class Load(NamedTuple):
-    """Numbers that a frame's time depends on."""
-
-    objects: int  # rows of the Program
-    pixels: int  # of the canvas
-    meetings: float  # pixels within objects' bounds, summed over objects; of solids, network evaluations
-    # pixels around those bounds, summed likewise, for each four samples; of solids, evaluations for a pixel
-    # times pixels of the canvas's shorter side, as outlines and shadows grow with both
-    outline: float
-
-    def row(self, skip: bool) -> tuple[float, float, float, float, float]:
-        """The terms of the sum; without skipping every object meets every pixel."""
-        meetings = self.meetings if skip else float(self.objects * self.pixels)
-        return 1.0, float(self.objects), float(self.pixels), meetings, self.outline
-
-
-def load_of(program: Program) -> Load:
-    """The load of a Program, of solids by a very small picture; `ModelError` if their weights are missing."""
-    width, height = program.canvas
-    if program.stage is not None:
-        scale = PROBE / (width * height) ** 0.5
-        small = replace(program, canvas=(max(1, round(width * scale)), max(1, round(height * scale))))
-        drawn = draw_objects(load_arrays(program.model, program.weights).network, small, samples="one")
-        each = drawn.pairs / drawn.met  # of a pixel
-        return Load(len(program), width * height, each * width * height, each * min(width, height))
-    unit = min(width, height) / 2  # pixels of a world unit
-    half = np.array([width, height], np.float64) / 2
-    corners = np.clip(program.bounds.astype(np.float64).reshape(-1, 2, 2) * unit, -half, half)
-    size = corners[:, 1] - corners[:, 0]  # (N, 2)
-    outline = np.minimum(2 * size.sum(1), 2 * half.sum()) * (program.samples / 4)
-    return Load(len(program), width * height, float(size.prod(1).sum()), float(outline.sum()))
-
 
 MOST_MS: Final = 250.0
 """Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""
-_NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
-"""Nanoseconds of a frame, an object, a pixel, a meeting and a pixel around bounds (`Load.row`).
-
-`python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
-"""
-_SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
-"""Shares of that for other ways to sample."""
-
 Drawer = tuple[Literal["numpy", "torch"], str]
 """The library that draws a picture, and the reason in words."""
 
@@ -98,12 +53,6 @@ def choose_drawer(
     numpy = ms <= MOST_MS
     bound = "at most" if numpy else "more than"
     return "numpy" if numpy else "torch", f"about {ms:,.0f} ms of work, {bound} {MOST_MS:.0f}"
-
-
-def work_ms(program: Program, samples: Samples = "adaptive") -> float:
-    """Milliseconds to draw a Program on one core of the machine that was measured."""
-    row = load_of(program).row(skip=True)
-    return _SHARES.get(samples, 1.0) * sum(n * ns for n, ns in zip(row, _NS, strict=True)) / 1e6
 
 
 def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:

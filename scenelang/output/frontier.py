@@ -33,7 +33,8 @@ from scenelang.drawing.how import RenderError, Samples
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import MOST_DB, flip, over_white, psnr
 from scenelang.drawing.render import exact_graph
-from scenelang.drawing.small import Load, draw_small
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.work import LIGHT_MS, Load
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.scene import Scene
 from scenelang.language.words import TOKENS
@@ -143,11 +144,13 @@ class Offer(Record):
 
     point: Point  # from the frontier
     ms: float  # at least the time of 95 of 100 frames
-    flip: float  # at least the error of 97.5 of 100 scenes
+    flip: float  # at least the error of 97.5 of 100 scenes; 1 where nothing is known
 
     def told(self) -> str:
-        digits = 0 if self.ms >= 10 else 1
-        return f"{self.point.name}: {self.ms:.{digits}f} ms and FLIP {self.flip:.2g} at most"
+        ms = f"{self.point.name}: {self.ms:,.{0 if self.ms >= 10 else 1}f} ms"
+        return (
+            f"{ms} and FLIP {self.flip:.2g} at most" if self.flip < 1 else f"{ms} at most, no error promised"
+        )
 
 
 def error_scale(canvas: tuple[int, int], objects: int) -> float:
@@ -168,6 +171,8 @@ def refusal(point: Point, scene: Scene | None, program: Program, only: str | Non
         return "not installed"
     if not point.offered:
         return point.why_not or "not offered"
+    if point.backend == "reference" and program.stage is not None and program.stage.sky is not None:
+        return "its paths under a sky take longer than was measured"
     if scene is None:
         if point.backend == "reference":
             return "a compiled program keeps only what the network needs"
@@ -184,13 +189,16 @@ def refusal(point: Point, scene: Scene | None, program: Program, only: str | Non
 
 
 def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: float) -> list[Offer]:
-    """Promises of points for a scene, the fastest first; ``scale`` is that of `machine_scale`."""
+    """Promises of points for a scene, the fastest first; ``scale`` is that of `machine_scale`. Of light from
+    everywhere no errors were measured.
+    """
     result = []
     for point in points:
         if point.cost is None or point.flip is None:
             continue
         ms = predicted_ms(point.cost, load, point.skip) * point.cost.spread * scale
-        result.append(Offer(point, ms, min(1.0, point.flip.bound * error_scale(canvas, load.objects))))
+        flip = 1.0 if load.light else min(1.0, point.flip.bound * error_scale(canvas, load.objects))
+        result.append(Offer(point, ms, flip))
     return sorted(result, key=lambda o: (o.ms, o.flip))
 
 
@@ -246,7 +254,8 @@ def _nearest(offers: Sequence[Offer], limits: Limits) -> str:
 def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:
     """Likely milliseconds of a frame on the measured machine; at most `Cost.spread` times as many."""
     terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
-    return sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
+    own = sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
+    return own + LIGHT_MS * load.light
 
 
 def yardstick() -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import scenelang as nsg
 from lab.frontier.record import FrameErrors, Frontier
 from scenelang.cli import inputs
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.small import load_of
+from scenelang.drawing.work import LIGHT_MS, load_of
 from scenelang.output import frontier as frontier_file
 from scenelang.output.frontier import Cost
 from tests.cli.conftest import Folder
@@ -158,6 +159,28 @@ def test_solids_are_chosen_for(shipped: Folder) -> None:
         assert "drawn by numpy on one core" in text
     mist = shipped.write("mist.nsg", "sphere { scale(1.5); material volumetric; }\n")
     shipped.run("render", mist, "-o", "a.png", "--max-ms", "12", "--max-flip", "0.005", code=2)
+
+
+def test_a_sky_is_in_what_is_promised(shipped: Folder) -> None:
+    """Its light takes as long however fast a way draws, and no errors of it were measured."""
+    draft = point("solids3d, draft", 3, 0.015, model="solids3d", renderer="solid", samples="draft")
+    exact = replace(EXACT, cost=Cost(1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    (shipped.path / "shipped.json").write_text(
+        replace(frontier(draft, exact), set="mixed").to_json(), "utf-8"
+    )
+    scene = "canvas(24, 24); sky();\nsphere { scale(0.5); }\n"
+    light = LIGHT_MS * load_of(nsg.compile(nsg.loads(scene))).light
+    name = shipped.write("sky.nsg", scene)
+    for limit in ("--max-ms", f"{light:g}"), ("--max-flip", "0.9"):
+        result = shipped.run("render", name, "-o", "a.png", *limit, code=2)
+        assert re.search(r"solids3d, draft: \d+ ms at most, no error promised", result.stderr)
+        assert not (shipped.path / "a.png").exists()
+    text = said(shipped, f"--max-ms {2 * light + 99:g}", scene)
+    assert "chosen by the frontier: solids3d, draft" in text
+    assert "ms of work for the network were foretold" in text
+    assert (
+        "not in question: exact reference, 4 spp: its paths under a sky take longer than was measured" in text
+    )
 
 
 def test_the_reference_is_not_chosen_where_originals_are_missing(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,10 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
+from scenelang.cli import say
+from scenelang.drawing import work
 from scenelang.drawing.image import PROVED
+from scenelang.drawing.neural import draw
 from scenelang.output import encoders
 from tests.cli.conftest import GOOD, Folder
 
@@ -38,6 +43,53 @@ def same(*paths: str) -> bool:
 
 
 # ---------------------------------------------------------------- stills
+def test_work_that_tells_nothing_shows_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once it has taken a while, and nothing of it is left at the end; elsewhere nothing is written."""
+    for terminal in (True, False):
+        stream = io.StringIO()
+        monkeypatch.setattr(stream, "isatty", lambda terminal=terminal: terminal)
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setattr(say, "PATIENCE_S", 0.05)
+        with say.Bar() as bar:
+            bar("drawing", 0.25, 1.0)
+            assert not stream.getvalue()
+            until = time.monotonic() + (20 if terminal else 0.3)
+            while "25%" not in stream.getvalue() and time.monotonic() < until:
+                time.sleep(0.02)
+        assert ("drawing" in stream.getvalue() and "25%" in stream.getvalue()) == terminal
+        assert stream.getvalue().endswith("\x1b[2K" if terminal else "")
+
+
+def test_who_is_patient_gets_all_of_a_picture(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stills and films alike; a frame that was kept coarser is drawn again."""
+    rings = "for (i in 0..<40) { disc { scale(1 - i / 40); material flat { color(hsv(i / 9, 1, 1)); } } }\n"
+    still = folder.write("still.nsg", "canvas(64, 64);\n" + rings)
+    film = folder.write("film.nsg", "animate(seconds = 1, fps = 2); canvas(64, 64);\n" + rings)
+    ways = (still, "still.png"), (film, "film-%02d.png")
+    for name, out in ways:
+        folder.run("render", name, "-o", out, "--patient", code=0)
+    whole = [picture(folder.path / name) for name in ("still.png", "film-01.png")]
+    for name in ("LEAST_S", "BOUND_S"):
+        monkeypatch.setattr(work, name, 0.02)
+    monkeypatch.setattr(draw, "allowed_s", lambda _: 60.0)
+    for name, out in ways:
+        with pytest.warns(UserWarning, match=f"{name}: about .* drawn at .* x .*; --patient draws all of it"):
+            folder.run("render", name, "-o", out, code=0)
+    coarse = [picture(folder.path / name) for name in ("still.png", "film-01.png")]
+    for name, out in ways:
+        folder.run("render", name, "-o", out, "--patient", code=0)
+    again = [picture(folder.path / name) for name in ("still.png", "film-01.png")]
+    for one, less, other in zip(whole, coarse, again, strict=True):
+        assert one.shape == less.shape
+        assert (one != less).any()
+        assert (one == other).all()
+    monkeypatch.setattr(work, "SURE", 1e-9)
+    result = folder.run("render", still, "-o", "none.png", code=2)
+    assert (
+        "are allowed at 64 x 64; draw it smaller, with fewer objects or lamps, or with --patient"
+        in result.stderr
+    )
+    assert not (folder.path / "none.png").exists()
 
 
 def test_one_scene(folder: Folder) -> None:

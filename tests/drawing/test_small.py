@@ -18,8 +18,9 @@ from scenelang.drawing.how import How, RenderError, Samples
 from scenelang.drawing.image import enlarged
 from scenelang.drawing.neural.load import Model
 from scenelang.drawing.neural.paper import Streaming, StreamingConfig
-from scenelang.drawing.small import MOST_MS, choose_drawer, draw_small, work_ms
+from scenelang.drawing.small import MOST_MS, choose_drawer, draw_small
 from scenelang.drawing.torch_backend import draw_program, open_model
+from scenelang.drawing.work import work_ms
 from scenelang.language.evaluation import Source
 from scenelang.output.frames import Clip
 from scenelang.output.painting import Painter

@@ -19,7 +19,8 @@ from lab.frontier.record import FrameErrors, Frontier, Point, Quality, Times, be
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.image import enlarged, from_samples
-from scenelang.drawing.small import Load, draw_small, load_of
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.work import Load, load_of
 from scenelang.language.scene import Object, Scale, Scene, Twist
 from scenelang.output import frontier as shipped
 from scenelang.output.frontier import (

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 _SECTIONS: Final = {
     "Animations": "--frame --frames --fps --jobs --cluster --palette --dither",
-    "How it is drawn": "--model --backend --samples --max-ms --max-flip --originals --device --threads",
+    "How it is drawn": "--model --backend --samples --patient --max-ms --max-flip --originals "
+    "--device --threads",
     "More than a picture": "--output --prove --redraw --verbose",
     "Meshes": "--resolution --up",
 }
@@ -171,8 +172,14 @@ def command(
             def progress(share: float, done: int = index) -> None:
                 bar("drawing", done + share, len(able))
 
+            progress(0.0)
             told += _save(job, path, outputs, prove, redraw, clock, progress)
             if verbose:
+                if job.program is not None and job.program.stage is not None:
+                    from scenelang.drawing.work import work_ms
+
+                    ms = work_ms(job.program, job.how.care["samples"])
+                    job.notes.append(f"about {ms:,.0f} ms of work for the network were foretold")
                 click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
     for line in told:
         click.echo(line, err=True)

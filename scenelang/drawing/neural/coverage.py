@@ -21,6 +21,7 @@ import numpy as np
 from scenelang.assets.records import Record
 from scenelang.compiler.groups import SMOOTH, UNION
 from scenelang.drawing.arrays import Array
+from scenelang.drawing.how import check_time
 from scenelang.drawing.image import sample_places
 from scenelang.drawing.neural.field import NO_TEXTURE, Field, Trace
 from scenelang.drawing.neural.meetings import (
@@ -322,6 +323,7 @@ class Coverage:
     ) -> tuple[Array, Array, Array]:
         """Leaf coordinates (2, groups, P), features (groups, F, P), memory (groups, S + R, B)."""
         field, objects = self.field, meetings.pairs.object
+        check_time(field.network.until_s)
         q = field.frames.local(self.xp, objects, self.xp.take(p, self.xp.array(meetings.places(), p)))
         d = field.features(objects, q, meetings.pairs.far)
         tile.pairs += d.shape[0] * len(objects)

@@ -7,6 +7,7 @@ where they are computed. Where all of those are, bit for bit, as in the picture 
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from typing import Unpack
@@ -26,6 +27,7 @@ from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
+from scenelang.drawing.work import Plan, allowed_s, plan_of
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
@@ -100,10 +102,27 @@ class Drawing(Record, frozen=False):
     refined: int  # pixels of which all samples were taken
     met: int  # pixels that an object reached; the others show the background, unseen by the network
     work: Work | None = None  # of solids, what it took in rays and steps
+    coarser: str | None = None  # why it is coarser than asked for, if it is
 
 
 def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
+) -> Drawing:
+    """Draw a Program, as of `Run`, in the time that there is; raises `RenderError` where it is too short."""
+    plan, patient = Plan(program.canvas), run.pop("patient", False)
+    if not patient:
+        plan = plan_of(program, network, run.get("samples", "adaptive"))
+        network.until_s = time.process_time() + allowed_s(program.canvas)
+    try:
+        coarse = program if plan.canvas == program.canvas else replace(program, canvas=plan.canvas)
+        drawing = _drawn(network, coarse, skip, plan.even, run)
+    finally:
+        network.until_s = float("inf")
+    return replace(drawing, image=enlarged(drawing.image, program.canvas), coarser=plan.told)
+
+
+def _drawn(
+    network: FramedNetwork | SolidNetwork, program: Program, skip: bool, even: bool, run: Run
 ) -> Drawing:
     """Draw a Program of the plane or of solids, as `draw` does, if the network has its dimension.
 
@@ -113,21 +132,21 @@ def draw_objects(
     """
     if run.get("samples") == "draft":
         run |= {"samples": "one", "split": None, "kept": None}
-        drawing = draw_objects(network, halved(program), **run)
+        drawing = _drawn(network, halved(program), skip, even, run)
         return replace(drawing, image=enlarged(drawing.image, program.canvas))
     if network.layout.dimension == 2:
         if program.stage is not None:
             raise ProgramError("a program of solids, which the model does not draw")
         if run.get("samples") == "quick":
             run["samples"] = "adaptive"
-        return draw(network, program, skip=skip, **run)  # type: ignore[arg-type]
+        return draw(network, program, skip=skip, **run)  # type: ignore[arg-type,misc]
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
     brought, paints = program.brought(), program.paints()
     field = SolidField(network, program.vectors, program.tokens, brought, paints)  # type: ignore[arg-type]
     image, work = draw_solids(
         field,
-        program.stage,
+        replace(program.stage, sky=None) if even else program.stage,
         program.canvas,
         threads=run.get("threads") or 1,
         split=run.get("split"),

@@ -93,6 +93,7 @@ class FramedNetwork:
     candidate: Any  # (TOKENS, F, S)
     bump: Any  # (TOKENS, S)
     read_slope: Any  # a logarithm
+    until_s: float = float("inf")  # processor seconds of the process when the picture has to be done
 
     def decoder_weights(self, code: Array) -> Decoder:
         """Decoders of objects from codes (M, C): each weight is linear in (code, 1)."""

@@ -28,7 +28,22 @@ from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.mist import Mist
 from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.nodes import SCATTER, Nodes, ground_places, hollow, on_ground, on_objects, turned
+from scenelang.drawing.solid.nodes import (
+    ALL,
+    HOLLOW,
+    LEAST,
+    NODES,
+    SCATTER,
+    SIDES,
+    Nodes,
+    ground_places,
+    hollow,
+    on_ground,
+    on_objects,
+    sphere,
+    spread,
+    turned,
+)
 from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
@@ -67,6 +82,10 @@ THICK = 0.3  # steps of the lattice: so near lies a point to the plane of anothe
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
+# of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
+# rays sent for each that gathers light, and where walls may hide nodes; from each pixel that mirrors; media;
+# the share of rays of the ground that meet media
+PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 7.0, (1.0, 1.5), 10, 2e6, 0.2
 CELLS = 8  # of the grid of nodes, along its longest side
 
 
@@ -273,7 +292,12 @@ class Around:
         way = turned(xp, xp.take(nodes.n, node), xp.array(disc(r, angle).astype(np.float32), nodes.p))
         p = xp.take(nodes.p + LIFT * nodes.n, node)
         limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit, through = march(self.field, p, way, limit, 0, GAP, True, few=self.few and OFTEN).hit, share
+        bands = [slice(at, at + BATCH) for at in range(0, max(1, len(limit)), BATCH)]
+        hits = [
+            march(self.field, p[:, band], way[:, band], limit[band], 0, GAP, True, few=self.few and OFTEN).hit
+            for band in bands
+        ]
+        hit, through = xp.concat(hits, 0), share
         if self.mist is not None:
             light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
             xp.add(escaped, node, light * share)
@@ -538,6 +562,34 @@ class Around:
             result = result + weight * xp.take(values, index)
         mean, rise, fall = (result / total.clip(1e-9)).reshape(3, -1, len(u))
         return (mean + (across * rise + down * fall) / total.clip(1e-9)).clip(0.0), most > 0.5
+
+
+def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int]) -> float:
+    """About how often the network is asked for what arrives from everywhere: rays, each as probes ask."""
+    xp, count, walls = field.xp, len(field.solids), hollow(field)
+    opaque = bool((np.asarray(xp.to_numpy(field.looks))[-1] < 0.5).any())
+    floor = 0.0 if stage.ground is None else SIDES[walls] ** 2 / 4  # from which many rays meet nothing
+    if not count:
+        return 0.0
+    nodes = floor + opaque * min(ALL, NODES * (HOLLOW if walls else 1) + LEAST[walls] * count)
+    side, rays = LATTICE[2 if walls else 0]
+    step = max(1, round(min(canvas) / side))
+    points = (-(-canvas[0] // step) + 1) * (-(-canvas[1] // step) + 1)
+    number = MORE_RAYS[walls] * (nodes * RAYS[walls][0] + 2 * points * rays)
+    number += SHINY * field.rough * canvas[0] * canvas[1]
+    # from balls around objects to places in those of others
+    u, v, r, turn = spread(np.arange(PROBES))
+    own, other = np.arange(PROBES) * 7919 % count, (np.arange(PROBES) * 104729 + count // 2) % count
+    centre = np.array([np.asarray(xp.to_numpy(solid.centre)) for solid in field.solids]).T
+    extent = np.array([solid.extent for solid in field.solids])
+    p = centre[:, own] + extent[own] * sphere(u, v)
+    way = centre[:, other] + r**0.5 * extent[other] * sphere(turn, u) - p
+    way /= np.linalg.norm(way, axis=0).clip(1e-9)
+    p, way = (xp.array(part.astype(np.float32), field.network.codes) for part in (p, way))
+    with xp.inference():
+        met = march(field, p, way, to_ground(xp, None, 0.0, way), 0, GAP, few=OFTEN).work.met
+    number *= 1.0 if opaque else ASIDE_RAYS * (floor > 0)
+    return number * (met / PROBES + EACH_RAY) + MIST * field.media
 
 
 def arriving(lighting: Any) -> Around:

@@ -46,7 +46,8 @@ FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
 PIXELS = 4096  # on surfaces, likewise
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
-TILE = 1 << 16  # samples at a time
+TILE, SLOTS = 1 << 16, 1 << 23  # samples at a time, and slots of their rays, or of points on these in media
+ACROSS = 8  # rays along each side of a picture, that tell how many those are
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 THIRDS = 3  # of pieces of which nodes do not tell enough
@@ -221,6 +222,16 @@ class Lighting:
         solids, length = self.field.solids, self.xp.length
         seen = [s.extent / max(float(length(list(s.centre - self.eye))), 1e-6) for s in solids]
         return float(np.median(seen or [0.0]) * min(canvas) / 2 / np.tan(self.stage.camera.fov_rad / 2))
+
+    def most(self, canvas: tuple[int, int]) -> int:
+        """Samples at a time, fewer where rays pass many balls, each of which is kept for each of the others
+        in media.
+        """
+        x, y = ((np.arange(ACROSS) + 0.5) * (side / ACROSS) for side in canvas)
+        way = directions(self.stage.camera, canvas, x, y[:, None]).reshape(3, -1)
+        way = self.xp.array(way, self.eye)
+        balls: int = self.field.passes(self.eye, way, self.limit(way))[1].slots.shape[1]
+        return min(TILE, SLOTS // max(1, balls * (1 + self.pace.nodes * balls * self.field.media)))
 
     def limit(self, way: Array) -> Array:
         """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
@@ -597,19 +608,21 @@ def draw_solids(
     """
     width, height = canvas
     lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
+    tell, lit = progress or (lambda _: None), 0.0  # how much of the share done is light from everywhere
     if stage.sky is not None:
         lighting.around = around = arriving(lighting)
+        tell(0.3)
         around.look(canvas, partial(lighting.places, canvas))
+        tell(lit := 0.5)
     out = np.empty((4, height, width), np.float32)
-    rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
+    rows = max(1, min(4 * lighting.most(canvas) // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     costs: list[Work] = []
 
     def one(band: range) -> None:
         out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples, count)
         costs.append(work)
-        if progress is not None:
-            progress(len(costs) / len(bands))
+        tell(lit + (1 - lit) * len(costs) / len(bands))
 
     field.xp.each(threads, one, bands)
     if not np.isfinite(out).all():

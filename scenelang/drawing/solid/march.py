@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.how import check_time
 from scenelang.drawing.solid.field import Meeting, SolidField, SolidPairs
 from scenelang.drawing.solid.network import Wanted, folded
 from scenelang.drawing.solid.passes import BEGIN, END, INF, OBJECT, RATE, WAY, Passes, placed
@@ -127,6 +128,7 @@ class Rays:
         """
         xp = self.xp
         for _ in range(most):
+            check_time(self.solids.network.until_s)
             under_way = sum(batch.left + batch.more for batch in self.batches)
             between = sum(len(place) for place, _ in self.between)
             if under_way + between < few * len(self.ids):

@@ -148,6 +148,7 @@ class SolidNetwork:
     candidate: Any  # (TOKENS,)
     bump: Any  # (TOKENS,)
     last: Any = None  # the `Around` of the last picture
+    until_s: float = float("inf")  # processor seconds of the process when the picture has to be done
 
     def lifted(self, code: Array) -> Array:
         """What weights are linear in (C',): a code (C,), its hidden units, and 1."""

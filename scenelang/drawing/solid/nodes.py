@@ -68,11 +68,16 @@ def turned(xp: Arrays, n: Array, local: Array, wanted: Sequence[int] = (0, 1, 2)
     return xp.stack([first[i] * x + second[i] * y + n[i] * z for i in wanted], 0)
 
 
+def sphere(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Unit directions (3, K) of places (K,) of the unit square, equal areas of equal areas."""
+    z, angle = 2 * u - 1, 2 * np.pi * v
+    return np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
+
+
 def chords(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Where lines begin that meet a ball about the origin evenly, and all the way through it (3, K)."""
     u, v, r, turn = spread(np.arange(count))
-    z, angle = 2 * u - 1, 2 * np.pi * v
-    way = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
+    way = sphere(u, v)
     least = np.eye(3)[abs(way).argmin(0)].T
     side = np.cross(way, least, axis=0)
     side /= np.linalg.norm(side, axis=0)
