@@ -28,7 +28,8 @@ from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.near import near
 from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.passes import INF, inverse_of
+from scenelang.drawing.solid.passes import INF
+from scenelang.drawing.tables import inverses
 
 Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
@@ -358,7 +359,7 @@ def box_of(field: SolidField, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarra
     for solid, its in zip(field.solids, wanted.tolist(), strict=True):
         if its and solid.draws:
             back, shift = (np.asarray(field.xp.to_numpy(part), np.float64) for part in solid.frame.outer)
-            back = inverse_of(back)
+            back = inverses(back)
             if solid.box is None:
                 half, middle = solid.ball * np.linalg.norm(back, axis=1), -back @ shift
             else:
