@@ -66,8 +66,9 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
     some = rng.integers(0, POINTS, 3)
     p[rng.integers(0, 3, 3), some] = (np.inf, np.nan, 3e38)
     reach = np.array([0.0, 0.1, 3.0, np.inf], np.float32)[rng.integers(0, 4, POINTS)]
-    found = kernel.field(tables, p, reach, *(rng.random(3) < 0.5).tolist())
-    assert found.owner is None or ((found.owner >= 0) & (found.owner <= len(program))).all()
+    found = kernel.field(tables, p, reach, *(rng.random(2) < 0.5).tolist())
+    assert ((found.owner >= 0) & (found.owner <= len(program))).all()
+    kernel.own(tables, rng.integers(0, len(program), POINTS), p)
 
 
 def programs() -> list[Program]:

@@ -8,7 +8,8 @@
 #endif
 #define EACH(v) \
     int64_t scratch_##v(const Scene *); \
-    int64_t field_##v(const Scene *, int64_t, const float *, const float *, float *, float *, float *, int32_t *, void *);
+    int64_t field_##v(const Scene *, int64_t, const float *, const float *, float *, float *, float *, int32_t *, void *); \
+    void own_##v(const Scene *, int64_t, const int32_t *, const float *, float *, float *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -43,4 +44,7 @@ OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); 
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
                   float *gradient, float *look, int32_t *owner, void *memory) {
     return PICK(field, s, n, p, reach, distance, gradient, look, owner, memory);
+}
+OUT void own(int32_t variant, const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient) {
+    PICK(own, s, n, object, p, distance, gradient);
 }

@@ -114,3 +114,21 @@ int64_t NAME(field)(const Scene *s, int64_t n, const float *p, const float *reac
                         : asked(s, n, p, reach, distance, 0, 0, 0, scratch, DISTANCE);
     return asked(s, n, p, reach, distance, gradient, look, owner, scratch, ALL);
 }
+// Distances of objects alone, whatever else there is, and their gradients (3, n), at points (3, n) with numbers from 0.
+void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient) {
+    for (int64_t i = 0; i < n; i += W) {
+        V q, g = {all(0), all(0), all(0)};
+        F d = all(0);
+        read_points(p, n, i, &q);
+        for (int k = 0; k < W && i + k < n; k++) {
+            if (k && object[i + k] == object[i + k - 1]) continue;
+            const Object *o = s->object + object[i + k];
+            M mine;
+            for (int j = 0; j < W; j++) mine[j] = i + j < n && object[i + j] == object[i + k] ? -1 : 0;
+            V slope, local;
+            F own = leaf_slope(s, o, mapped(o->map, q), 1, &slope, &local);
+            d = sel(mine, own, d); g = choose(mine, slope, g);
+        }
+        store(distance, n, i, d); store(gradient, n, i, g.x); store(gradient + n, n, i, g.y); store(gradient + 2 * n, n, i, g.z);
+    }
+}

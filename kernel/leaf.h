@@ -2,6 +2,7 @@
 #pragma once
 #include "scene.h"
 #include "vec.h"
+#include "formula.h"
 #define RIM 3.0f  // leaf units: decoders see points in this ball, farther ones at its rim
 enum { ACROSS = 3, UP = 4, MOST = 5, LEAST = 6 };  // features behind |x|, |y|, |z|
 
@@ -208,6 +209,7 @@ static F grid(const Decoder *n, V q, int grad, V *g) {
 }
 IN F decoded(const Decoder *n, V q, const int grad, V *g) {
     if (n->kind == NORMS) return norms(n, q, grad, g);
+    if (n->kind == FORMULA) return formula(n->width, q, grad, g);
     return n->kind == SILU ? silu(n, q, grad, g) : grid(n, q, grad, g);
 }
 

@@ -5,7 +5,8 @@
 enum { DEEP = 15, REGISTER = 12, CELL_ROWS = 5, FEATURES = 7, UNITS = 8, LINES = 27, WIDEST = 32, STEPS = 9 };
 enum { DRAWS = 1, CLIPS = 2, BEGINS = 4, BOXED = 8, SKINNED = 16, BUMPY = 32, STOPS = 64, MEDIUM = 128 };
 enum { MAP, TURN_Z, TURN_Y };  // kinds of steps
-enum { NORMS, SILU, GRID, GROWN };  // kinds of decoders
+enum { NORMS, SILU, GRID, GROWN, FORMULA };  // kinds of decoders
+enum { SPHERE, TORUS, BOX, CYLINDER, CONE, CAPSULE, OCTAHEDRON };  // formulas
 enum { PICTURE, SPACE, LINEAR, RADIAL };  // kinds of textures
 enum { TINT, GREY, HUE };  // operations on a colour
 
@@ -27,7 +28,7 @@ typedef struct { int32_t kind; float twirl, rate, map[12]; } Step;
 typedef struct {
     int32_t kind;
     int32_t units, size[UNITS], inner, features, feature[FEATURES];  // of norm units: lines of each, lines inside
-    int32_t width;  // units of a hidden layer, or nodes along an axis of a grid
+    int32_t width;  // units of a hidden layer, nodes along an axis of a grid, or which formula
     float radius, line[LINES][8];  // weights of the features that there are; the last is the bias
     const float *data;  // weights of layers, or nodes
 } Decoder;

@@ -26,6 +26,7 @@ _CALLS: Final = {
     "sizes": ("p", ""),
     "scratch": ("ip", "l"),
     "field": ("iplppppppp", "l"),
+    "own": ("iplpppp", ""),
 }
 """Arguments and results of the library's functions: i int32, l int64, p an address."""
 _TYPES: Final = {"i": ctypes.c_int32, "l": ctypes.c_int64, "p": ctypes.c_void_p, "": None}
@@ -38,12 +39,12 @@ class KernelError(RuntimeError):
 
 
 class Asked(NamedTuple):
-    """Answers of the field at M points; None where not asked for."""
+    """Answers of the field at M points; what was not asked for has none."""
 
     distance: Floats  # (M,) world units
-    gradient: Floats | None  # (3, M)
-    register: Floats | None  # (R, M) as `Looks`
-    owner: npt.NDArray[np.int32] | None  # (M,) numbers of objects whose material holds, from 1; 0 for none
+    gradient: Floats  # (3, M)
+    register: Floats  # (R, M) as `Looks`
+    owner: npt.NDArray[np.int32]  # (M,) numbers of objects whose material holds, from 1; 0 for none
     met: int  # pairs of points and objects that met
 
 
@@ -67,31 +68,42 @@ class Kernel:
     def field(
         self,
         tables: Tables,
-        points: Floats,
-        reach: Floats | float,
+        points: npt.NDArray[Any],
+        reach: Any,
         gradient: bool = False,
-        register: bool = False,
-        owners: bool = False,
+        every: bool = False,
     ) -> Asked:
         """The field at points (3, M), exact where D is less than a reach, (M,) or one, in world units;
-        elsewhere D is anything from there on, 100 where no object is near.
+        elsewhere D is anything from there on, 100 where no object is near. ``every`` asks for all there is.
         """
         points = np.ascontiguousarray(points, np.float32)
-        count = points.shape[1]
+        count, rows = points.shape[1], int(tables.scene["rows"])
         assert points.shape == (3, count)
         reach = np.ascontiguousarray(np.broadcast_to(np.asarray(reach, np.float32), (count,)))
-        every, rows = register or owners, int(tables.scene["rows"])
-        answers = (
-            np.empty(count, np.float32),
-            np.empty((3, count), np.float32) if gradient or every else None,
-            np.empty((rows, count), np.float32) if every else None,
-            np.empty(count, np.int32) if every else None,
-        )
+        slopes, looks = count * (gradient or every), count * every
+        answers = np.empty(count, np.float32), np.empty((3, slopes), np.float32)
+        more = np.empty((rows, looks), np.float32), np.empty(looks, np.int32)
         scene = tables.scene.ctypes.data
         scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
-        places = [None if part is None else part.ctypes.data for part in (points, reach, *answers, scratch)]
+        parts = (points, reach, *answers, *more, scratch)
+        places = [part.ctypes.data if part.size else None for part in parts]
         met = self._library.field(self.variant, scene, count, *places) if count else 0
-        return Asked(*answers, met)
+        return Asked(*answers, *more, met)
+
+    def own(
+        self, tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]
+    ) -> tuple[Floats, Floats]:
+        """Distances (M,) of objects alone by their numbers (M,), from 0, whatever else is at points (3, M),
+        and the gradients (3, M) of these.
+        """
+        numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
+        count = len(numbers)
+        assert points.shape == (3, count)
+        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
+        distance, gradient = np.empty(count, np.float32), np.empty((3, count), np.float32)
+        places = [part.ctypes.data for part in (numbers, points, distance, gradient)]
+        self._library.own(self.variant, tables.scene.ctypes.data, count, *places)
+        return distance, gradient
 
 
 def _source() -> Any:

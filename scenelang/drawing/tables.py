@@ -37,13 +37,14 @@ from scenelang.compiler.spaces import EXTINCTION
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.assets import grid_shape, texture_of
 from scenelang.drawing.neural.frames import MOST, read_skins
-from scenelang.drawing.solid.network import BLEND, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.network import BLEND, Formula, SolidNetwork, Wanted, element_box
 from scenelang.drawing.solid.norms import Norms
 
 UNITS, LINES, WIDEST = 8, 27, 32  # of decoders at most
 DRAWS, CLIPS, BEGINS, BOXED, SKINNED, BUMPY, STOPS, MEDIUM = (1 << bit for bit in range(8))
 MAP, TURN_Z, TURN_Y = range(3)  # kinds of steps
-NORMS, SILU, GRID, GROWN = range(4)  # of decoders
+NORMS, SILU, GRID, GROWN, FORMULA = range(5)  # of decoders
+FORMULAS = ("sphere", "torus", "box", "cylinder", "cone", "capsule", "octahedron")  # those that are known
 PICTURE, SPACE, LINEAR, RADIAL = range(4)  # of textures
 
 
@@ -446,9 +447,11 @@ class Tables:
                 row["data"] = self._held(np.asarray(xp.to_numpy(shape.nodes)))
                 sides.append(element_box(key))
                 continue
-            decoder = network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
+            decoder: Any = network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
             sides.append(network.box(decoder))
-            if isinstance(decoder, Norms):
+            if isinstance(decoder, Formula):
+                row["kind"], row["width"] = FORMULA, FORMULAS.index(decoder)
+            elif isinstance(decoder, Norms):
                 _norms(row, decoder, xp)
             else:
                 row["kind"], row["width"] = SILU, len(decoder[0][1])

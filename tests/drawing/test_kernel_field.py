@@ -12,7 +12,7 @@ from fuzz.kernel import ask, mutated
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Paint, Program, ProgramError
 from scenelang.compiler.weights import REPLACED
-from scenelang.drawing.closed import field_of
+from scenelang.drawing.closed import ClosedSolids, closed_forms, field_of
 from scenelang.drawing.exact.solid import ExactField
 from scenelang.drawing.kernel import Asked, KernelError, load_kernel
 from scenelang.drawing.neural.files import load_arrays
@@ -28,7 +28,7 @@ from tests.drawing.test_renderers_solids import COARSE, MOVED, SPACE, STEPS
 ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("examples/*.nsg"), *ROOT.glob("tests/conformance/cases/[!r]*.nsg")])
 FILES = [path for path in FILES if re.search("^camera|^light|^ground", path.read_text("utf-8"), re.MULTILINE)]
-KERNEL = load_kernel()
+KERNEL, CLOSED = load_kernel(), ClosedSolids("solids3d")
 TOLERANCE = 1e-5  # of a scene's size
 
 
@@ -49,9 +49,7 @@ def hold(field: SolidField, tables: Tables, seed: int = 0, loose: float = 0.01) 
     with field.xp.inference():
         met = near(field, p, reach, Wanted.ALL, gradient=True)
         owner = near(field, p, reach, Wanted.KIND, owners=True).owner
-    found = KERNEL.field(tables, p, reach, True, True, True)
-    assert found.gradient is not None
-    assert found.register is not None
+    found = KERNEL.field(tables, p, reach, every=True)
     within = abs(met.distance) < reach
     assert within.mean() > 0.05
     assert abs(found.distance - met.distance)[within].max() < TOLERANCE * size
@@ -98,6 +96,16 @@ def test_leaves_with_skins_and_warps(leaf: str) -> None:
     assert set(tables.decoders["kind"].tolist()) == {GROWN if "teapot" in leaf else NORMS}
 
 
+@pytest.mark.parametrize("name", ["castle", "chess", "clouds", "fog", "icecream", "robot", "stones"])
+def test_formulas(name: str) -> None:
+    """The exact field in the same kernel; where solids touch, rounding says whose the material is."""
+    program = compile_scene(load(ROOT / f"examples/{name}.nsg"))
+    given = program.vectors, program.tokens, program.brought(), program.paints()
+    net = closed_forms(program.model)
+    assert isinstance(net, ClosedSolids)
+    hold(SolidField(net, *given), Tables(net, *given))
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_trees(seed: int) -> None:
     """Groups in groups, cuts with rounded edges, media among solids; against the reference, too."""
@@ -107,9 +115,10 @@ def test_trees(seed: int) -> None:
     tables = tables_of(field)
     hold(field, tables, seed)
     p, reach = rng.uniform(-1.5, 1.5, (3, 2000)), 0.2
-    found = KERNEL.field(tables, p.astype(np.float32), reach).distance
-    truth = ExactField(tree_graph(tree)).at(p).d
-    assert abs(found.clip(-reach, reach) - truth.clip(-reach, reach)).max() < 6e-3
+    truth = ExactField(tree_graph(tree)).at(p).d.clip(-reach, reach)
+    for each, most in ((tables, 6e-3), (tables_of(tree_field(tree, CLOSED)), 1e-5)):
+        found = KERNEL.field(each, p.astype(np.float32), reach).distance
+        assert abs(found.clip(-reach, reach) - truth).max() < most
 
 
 def test_textures() -> None:
@@ -140,7 +149,7 @@ def test_layers_with_silu() -> None:
 
 
 def answers(tables: Tables, p: np.ndarray) -> list[np.ndarray]:
-    found = KERNEL.field(tables, p, 0.2, True, True, True)
+    found = KERNEL.field(tables, p, 0.2, every=True)
     return [part for part in found if isinstance(part, np.ndarray)]
 
 
@@ -197,3 +206,14 @@ def test_a_library_of_other_sources_is_told(tmp_path: Path, monkeypatch: pytest.
             (tmp_path / "libkernel.dll").write_bytes(text)
         with pytest.raises(KernelError, match="pip install ziglang"):
             load_kernel.__wrapped__()
+
+
+def test_an_object_alone() -> None:
+    """Distances and slopes of single objects, whatever else is there, in any order."""
+    program = compile_scene(load(ROOT / "examples/caterpillar.nsg"))
+    field, tables = of(program)
+    rng = np.random.default_rng(2)
+    objects, p = rng.integers(0, len(program), 500), rng.uniform(-1, 1, (3, 500)).astype(np.float32)
+    distance, gradient = KERNEL.own(tables, objects, p)
+    assert distance == pytest.approx(field.own(objects, field.behind(objects, p)), abs=1e-5)
+    assert gradient == pytest.approx(field.normals(objects, p), abs=1e-3)
