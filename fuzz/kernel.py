@@ -61,7 +61,7 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
     """Ask the field of a Program anywhere; raises `ProgramError` where it holds no scene."""
     rng = np.random.default_rng(seed)
     given = (program.vectors, program.tokens, program.brought(), program.paints())
-    tables = Tables(field_of(program, False), *given)  # type: ignore[arg-type]
+    tables = Tables(field_of(program, seed % 3 == 0), *given)  # type: ignore[arg-type]
     p = (rng.normal(size=(3, POINTS)) * 10.0 ** rng.integers(-2, 3, POINTS)).astype(np.float32)
     some = rng.integers(0, POINTS, 3)
     p[rng.integers(0, 3, 3), some] = (np.inf, np.nan, 3e38)
