@@ -16,6 +16,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.drawing.arrays import Array
+from scenelang.drawing.how import RenderError
 from scenelang.drawing.tables import CELL, DECODER, OBJECT, SCENE, STEP, TEXTURE, Tables
 
 FOLDER: Final = Path(__file__).resolve().parent
@@ -34,17 +36,17 @@ _TYPES: Final = {"i": ctypes.c_int32, "l": ctypes.c_int64, "p": ctypes.c_void_p,
 Floats = npt.NDArray[np.float32]
 
 
-class KernelError(RuntimeError):
+class KernelError(RenderError):
     """The kernel's library cannot be loaded here, and why."""
 
 
 class Asked(NamedTuple):
     """Answers of the field at M points; what was not asked for has none."""
 
-    distance: Floats  # (M,) world units
-    gradient: Floats  # (3, M)
-    register: Floats  # (R, M) as `Looks`
-    owner: npt.NDArray[np.int32]  # (M,) numbers of objects whose material holds, from 1; 0 for none
+    distance: Array  # (M,) world units
+    gradient: Array  # (3, M)
+    register: Array  # (R, M) as `Looks`
+    owner: Array  # (M,) numbers of objects whose material holds, from 1; 0 for none
     met: int  # pairs of points and objects that met
 
 

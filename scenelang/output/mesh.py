@@ -25,7 +25,7 @@ from scenelang.assets.files import write_output
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import decoded, encoded
-from scenelang.drawing.kernel import Asked, KernelError, load_kernel
+from scenelang.drawing.kernel import Asked, load_kernel
 from scenelang.drawing.tables import DRAWS, Tables
 
 Floats = npt.NDArray[np.float64]
@@ -76,10 +76,7 @@ class Sampler:
     def __init__(self, program: Program, exact: bool) -> None:
         from scenelang.drawing.closed import field_of
 
-        try:
-            self.kernel = load_kernel()
-        except KernelError as error:
-            raise RenderError(str(error)) from None
+        self.kernel = load_kernel()
         given = program.vectors, program.tokens, program.brought(), program.paints()
         self.tables = Tables(field_of(program, exact), *given)  # type: ignore[arg-type]
         rows, kinds = self.tables.objects.rows, self.tables.looks.register[-1] > 0.5

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -30,6 +30,7 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
 from scenelang.drawing.arrays import Array, Arrays, Smooth
+from scenelang.drawing.kernel import Asked, load_kernel
 from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidCell, SolidNetwork, Wanted, element_box
@@ -45,7 +46,7 @@ from scenelang.drawing.solid.passes import (
     find_passes,
     read_solids,
 )
-from scenelang.drawing.tables import DRAWS, SKINNED, SLACK, SMALL, read_looks, read_objects
+from scenelang.drawing.tables import DRAWS, SKINNED, SLACK, SMALL, Tables, read_looks, read_objects
 
 
 class SolidClosing(NamedTuple):
@@ -299,7 +300,7 @@ class SolidField:
         """The extinction (M,) of media with registers (R, M), per world unit."""
         return 0 * register[0] + self.sigma if self.sigma else register[-self.switched]
 
-    def material(self, met: Meeting) -> Material:
+    def material(self, met: Meeting | Asked) -> Material:
         """The material at points that were asked for all (`Wanted.ALL`), as it holds wherever D < 0."""
         register = met.register
         parts = self.glow(register), self.extinction(register), register[-2] * self.rough
@@ -632,6 +633,18 @@ class SolidField:
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What the kernel takes."""
+        return Tables(self.network, *self.rows, self.paints, self.reach)
+
+    def near(self, p: Array, reach: Array, gradient: bool = False, every: bool = False) -> Asked:
+        """As `Kernel.field`, at points (3, M) anywhere: exact where D is less than a reach (M,)."""
+        at, far = (np.asarray(self.xp.to_numpy(part)) for part in (p, reach))
+        *answers, met = load_kernel().field(self.tables, at, far, gradient, every)
+        d, slope, register, owner = (self.xp.array(part, p) for part in answers)
+        return Asked(d, slope, register, owner, met)
 
     def pairs(self, passes: Passes, t: Array) -> SolidPairs:
         """Pairs of points at t (M,) and the objects in whose balls these are."""

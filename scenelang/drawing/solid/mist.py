@@ -26,8 +26,6 @@ from scenelang.compiler.spaces import Light, Sky, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.near import near
-from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.passes import INF
 from scenelang.drawing.tables import inverses
 
@@ -103,7 +101,7 @@ class Mist:
         field, like = self.field, self.field.network.codes
         p = self.xp.array(self.p.reshape(3, -1), like)
         with self.xp.inference():
-            met = near(field, p, 0 * p[0] + 2 * self.h, Wanted.ALL)
+            met = field.near(p, 0 * p[0] + 2 * self.h, every=True)
             answers = [met.distance.clip(None, 2 * self.h), *field.material(met)]
         d, colour, medium, glow, density, _ = (
             np.asarray(self.xp.to_numpy(part)).reshape(*part.shape[:-1], *self.sides) for part in answers
