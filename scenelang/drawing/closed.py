@@ -14,14 +14,13 @@ import numpy as np
 from scenelang.compiler.geometries import GEOMETRIES, SECTORS
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.manifest import load_manifest
-from scenelang.drawing.arrays import Array, Smooth
+from scenelang.drawing.arrays import Array
 from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import Floats, FramedArrays, FramedConfig
-from scenelang.drawing.solid.network import SolidArrays, SolidCell, Wanted
-from scenelang.drawing.solid.norms import Norms
+from scenelang.drawing.solid.network import Formula, SolidArrays, SolidCell
 
 if TYPE_CHECKING:
     from scenelang.compiler.program import Program
@@ -114,7 +113,7 @@ class ClosedPlane(FramedArrays):
 
 
 class ClosedSolids(SolidArrays):
-    """`SolidArrays` by formulas: distances, their gradients, looks and the fold."""
+    """`SolidArrays` by formulas: distances, their gradients, looks, and a cell with weights of the fold."""
 
     def __init__(self, model: str) -> None:
         self.__dict__.update(vars(load_arrays(model).network) | {"segment_w": [], "segment_b": []})
@@ -122,60 +121,47 @@ class ClosedSolids(SolidArrays):
         self.geometries = manifest.geometries
         self.media = np.array([material == "volumetric" for material in manifest.materials], np.float32)
 
-    def decoder(self, code: Array) -> Smooth:
-        """The index of the geometry in the place of weights."""
-        return Smooth([(abs(self.codes - code).sum(1).argmin(), code)])
+    def decoder(self, code: Array) -> Any:
+        return Formula(self.geometries[int(abs(self.codes - code).sum(1).argmin())])
 
     def look(self, material_code: Array) -> Array:
         nearest = abs(self.material_codes - material_code[..., None, :]).sum(-1).argmin(-1)
         return np.stack([*(np.ones_like(self.media[nearest]),) * 3, self.media[nearest]], -1)
 
     def cell(self, token: int, width: float) -> tuple[SolidCell, ...]:
-        """The token in the place of the first weight, the width of blends in that of the second."""
+        """Gates of the distance, colours and kinds that open as the fold does: lines in (d, D), biases."""
         return self.cut(token, width if token == SMOOTH else 0.0)
 
     def cut(self, token: int, width: float) -> tuple[SolidCell, ...]:
-        token_, width_, none = (np.full((1, 1), value, np.float32) for value in (token, width, 0.0))
-        return (SolidCell(token_, width_, none, none, none),) * len(Wanted)
+        k = 0.5 / width if width else SHARP
+        first, second = [-k, k, 0.5], [-SHARP, SHARP, 0.5]
+        if token == UNION:  # d < D; d < D or d < 0
+            gates = [first, first, [-SHARP, 0.0, 0.5], first, [-SHARP, 0.0, 0.5]]
+        elif token == SMOOTH:
+            gates = [first, first, first, second, second]
+        else:  # -d > D or d > D
+            gates = [[-k if token == SUBTRACT else k, -k, 0.5], *[[0.0, 0.0, -1.0]] * 4]
+        side, cuts = 1.0 - 2.0 * (token == SUBTRACT), token >= SUBTRACT
+        own, past, bias = np.array(gates, np.float32).T[..., None]
+        candidate, bump = (np.full((1, 1), value, np.float32) for value in (side, -width if cuts else width))
+        return tuple(
+            SolidCell(own[rows], past[rows], bias[rows], candidate, bump)
+            for rows in ([0], [0, 3, 4], [*range(5)])
+        )
 
-    def field(self, q: Array, layers: Smooth | Norms, gradient: bool) -> Array:
-        assert isinstance(layers, Smooth)
-        geometry = self.geometries[layers[0][0]]
+    def field(self, q: Array, layers: Any, gradient: bool) -> Array:
         if not gradient:
-            return leaf_distance(geometry, q)[None]
-        slopes = GEOMETRIES[geometry].slopes
+            return leaf_distance(layers, q)[None]
+        slopes = GEOMETRIES[layers].slopes
         assert slopes is not None
         return np.stack(slopes(q))
 
-    def join(
-        self, d: Array, memory: Array, look: Array, cell: SolidCell, wanted: Wanted, switched: int = 1
-    ) -> tuple[Array, Array]:
-        tokens, joined = cell.own[0], None
-        for token in np.unique(tokens):
-            result = _joined(token, cell.past[0], memory[0], d)
-            joined = result if joined is None else np.where(tokens == token, result, joined)
-        assert joined is not None
-        register, paint = memory[1:], joined[2]
-        if wanted != Wanted.DISTANCE:
-            register = register + paint * (look[-len(register) :] - register)
-            last = slice(-min(switched, len(register)), None)
-            register[last] = np.where(paint > 0.5, look[last], memory[last])
-        return np.concatenate([joined[:1], register]), joined[1]
-
-    def box(self, layers: Smooth | Norms) -> np.ndarray:
-        assert isinstance(layers, Smooth)
-        half = np.array(GEOMETRIES[self.geometries[layers[0][0]]].half, np.float32)
+    def box(self, layers: Any) -> np.ndarray:
+        half = np.array(GEOMETRIES[layers].half, np.float32)
         return np.stack([-half, half])
 
-    def edged(self, layers: Smooth | Norms) -> bool:
-        assert isinstance(layers, Smooth)
-        return GEOMETRIES[self.geometries[layers[0][0]]].edged
-
-    def alone(self, reach: Array, cell: SolidCell) -> Array:
-        return 0 * reach + 1
-
-    def partials(self, d: Array, state: Array, take: Array, cell: SolidCell) -> tuple[Array, Array]:
-        return np.where(cell.own[0] == SUBTRACT, -take, take), 1 - take
+    def edged(self, layers: Any) -> bool:
+        return GEOMETRIES[layers].edged
 
 
 @lru_cache(maxsize=8)
@@ -193,15 +179,3 @@ def field_of(program: Program, exact: bool) -> FramedArrays | SolidArrays:
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
     return formulas or network
-
-
-def _joined(token: Any, k: Array, state: Array, d: Array) -> Array:
-    """The distance behind an object, its share in that and in colours (3, M)."""
-    if token == SMOOTH:
-        h = (0.5 + 0.5 * (state - d) / np.maximum(k, 1e-9)).clip(0, 1)  # k is 0 for other tokens
-        return np.stack([(1 - h) * state + h * (d - k * (1 - h)), h, h])
-    if token == UNION:
-        return np.stack([np.minimum(state, d), d < state, d < np.maximum(state, 0)])
-    d = -d if token == SUBTRACT else d
-    h = np.where(k > 0, (0.5 + 0.5 * (d - state) / np.maximum(k, 1e-9)).clip(0, 1), d > state)
-    return np.stack([(1 - h) * state + h * (d + k * (1 - h)), h, 0 * d])

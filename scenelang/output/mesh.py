@@ -14,7 +14,6 @@ import json
 import os
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
@@ -25,16 +24,14 @@ import numpy.typing as npt
 from scenelang.assets.files import write_output
 from scenelang.compiler.program import Program
 from scenelang.drawing.image import decoded, encoded
-from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.network import EMPTY, Wanted
-from scenelang.drawing.solid.passes import INF
+from scenelang.drawing.kernel import Asked, load_kernel
+from scenelang.drawing.tables import DRAWS, Tables
 
 Floats = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Up = Literal["y", "z"]
 
 MOST_CELLS: Final = 1 << 22
-POINTS: Final = 1 << 15  # that the field is asked for at once
 COARSE: Final = 8  # cells along the longest side to begin with, about
 STEEP: Final = 1.1  # how much faster than exact ones learned distances change at most
 SEARCHED: Final = 32  # cells along the longest side when the box is made smaller
@@ -86,67 +83,46 @@ class TriangleMesh(NamedTuple):
 
 
 class Sampler:
-    """The field of a Program of solids, asked at points."""
+    """The field of a Program of solids, asked at points; raises `RenderError` without the kernel."""
 
     def __init__(self, program: Program, exact: bool) -> None:
         from scenelang.drawing.closed import field_of
 
-        network, elements = field_of(program, exact), program.brought()
-        self.field = SolidField(network, program.vectors, program.tokens, elements, program.paints())  # type: ignore[arg-type]
-        self.solids, self.field.far = self.field.solids, True
-        drawn = [solid for solid in self.solids if solid.draws]
-        self._stretch = [float(np.linalg.norm(solid.frame.outer.linear, 2)) for solid in self.solids]
-        rates = [s.rate * stretch for s, stretch in zip(self.solids, self._stretch, strict=True)]
-        self.steep = STEEP * max([1.0, *rates])
-        ends = [np.asarray(s.centre, np.float64) + side * s.extent for s in drawn for side in (-1, 1)]
-        corners = np.array(ends).reshape(-1, 3) if ends else np.zeros((1, 3))
+        self.kernel = load_kernel()
+        given = program.vectors, program.tokens, program.brought(), program.paints()
+        self.tables = Tables(field_of(program, exact), *given)  # type: ignore[arg-type]
+        rows, kinds = self.tables.objects.rows, self.tables.looks.register[-1] > 0.5
+        self.media, self.mixed = bool(kinds.any()), bool(kinds.any() and not kinds.all())
+        linear = rows["map"][:, :9].reshape(-1, 3, 3).astype(np.float64)
+        rates = rows["rate"] * np.linalg.norm(linear, 2, axis=(1, 2))
+        self.steep, self.reach = STEEP * max([1.0, *rates.tolist()]), 0.0
+        drawn = rows[rows["flags"] & DRAWS > 0]
+        ends = [drawn["centre"] + side * drawn["extent"][:, None].astype(np.float64) for side in (-1, 1)]
+        corners = np.concatenate(ends) if len(drawn) else np.zeros((1, 3))
         self.low, self.high = corners.min(0), corners.max(0)
-        longest = INF
+        longest = np.inf
         while (size := float((self.high - self.low).max())) and size < TIGHT * longest:  # booleans leave less
-            self._origin = ((self.low + self.high) / 2 + 1e-3).astype(np.float32)
             side, longest = size / SEARCHED, size
             counts = np.ceil((self.high - self.low) / side).clip(1).astype(np.intp)
             cells = self.touched(np.indices(counts).reshape(3, -1).T, self.low, side)
             first, last = (cells.min(0), cells.max(0) + 1) if len(cells) else (0, 0)
             self.low, self.high = self.low + first * side, np.minimum(self.low + last * side, self.high)
 
-    def widen(self, by: float) -> None:
-        """Let objects take part up to some way outside of their balls, world units."""
-        pairs = zip(self.solids, self._stretch, strict=True)
-        self.field.solids = [replace(s, ball=s.ball + by * rate, extent=s.extent + by) for s, rate in pairs]
-
     def touched(self, cells: Index, first: Floats, side: float) -> Index:
         """Those of some cells (M, 3), numbered from a point, that the surface may touch."""
-        reach = 3**0.5 / 2 * side
-        self.widen(reach)
-        return cells[abs(self.at(first + (cells + 0.5) * side)) <= self.steep * reach]
+        self.reach = 3**0.5 / 2 * side
+        return cells[abs(self.at(first + (cells + 0.5) * side)) <= self.steep * self.reach]
 
-    def meet(self, p: Floats, wanted: Wanted, gradient: bool = False, owners: bool = False) -> Meeting:
-        """As `SolidField.meet`, at points (M, 3); those that meet nothing are far outside."""
-        field, count = self.field, len(p)
-        register = np.zeros(((0, 1, len(field.looks))[wanted], count))
-        result = Meeting(np.full(count, EMPTY), register, np.zeros((3, count)), None, np.zeros(count))
-        for start in range(0, count, POINTS):
-            points = p[start : start + POINTS].T.astype(np.float32)
-            way = points - self._origin[:, None]
-            t = np.sqrt((way * way).sum(0)).clip(1e-9)
-            with field.xp.inference():
-                some, passes = field.passes(self._origin, way / t, t, tight=False)
-                met = field.meet(passes, t[some], wanted, gradient, owners=owners, p=points[:, some])
-            some = some + start
-            result.distance[some], result.register[:, some] = met.distance, met.register
-            if gradient:
-                result.gradient[:, some] = met.gradient
-            if owners:
-                result.owner[some] = met.owner
-        return result
+    def meet(self, p: Floats, gradient: bool = False, every: bool = False) -> Asked:
+        """The field at points (M, 3), distances as far as `reach`, world units, beyond objects' balls."""
+        return self.kernel.field(self.tables, p.T, self.reach, gradient, every)
 
     def at(self, p: Floats) -> Floats:
         """Distances (M,) at points (M, 3), negative in what is opaque alone."""
-        media = self.field.media
-        met = self.meet(p, Wanted.KIND if media else Wanted.DISTANCE)
-        inside = (met.distance < 0) & (met.register[-1] > 0.5) if media else False
-        return np.asarray(np.where(inside, TINY - met.distance, met.distance))
+        met = self.meet(p, every=self.media)
+        distance = met.distance.astype(np.float64)
+        inside = (distance < 0) & (met.register[-1] > 0.5) if self.media else False
+        return np.asarray(np.where(inside, TINY - distance, distance))
 
 
 class Sheets(NamedTuple):
@@ -196,7 +172,7 @@ class Grid:
         self.sampler, self.resolution = sampler, resolution
         while (cells := self._split()) is None:
             self.resolution -= self.resolution // 8
-        sampler.widen(2 * self.side)
+        sampler.reach = 2 * self.side
         self.bits, self.cells = self.number(_BITS), self.number(cells)
         self.nodes, self.values, self.holed = np.zeros(0, np.intp), np.zeros(0), False
         self.inside = np.zeros(self.shape.prod(), bool)
@@ -282,7 +258,7 @@ class Grid:
 def surface_of(program: Program, resolution: int, exact: bool) -> tuple[TriangleMesh, dict[str, str]]:
     """The surface of what is opaque in a Program of solids, and warnings by code."""
     sampler = Sampler(program, exact)
-    said = {"W0551": "a mesh has no media: what is volumetric is left out"} if sampler.field.media else {}
+    said = {"W0551": "a mesh has no media: what is volumetric is left out"} if sampler.media else {}
     empty = TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), np.intp), np.zeros((0, 3)))
     if not (sampler.high > sampler.low).all():
         return empty, said
@@ -310,7 +286,7 @@ def surface_of(program: Program, resolution: int, exact: bool) -> tuple[Triangle
     back = rising == (turns == 1)
     quad[back] = quad[back][:, ::-1]
     triangles = _cut(sampler, quad, places, side)
-    met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), Wanted.ALL)
+    met = sampler.meet(places - _normals(quad, n, len(places)) * (0.05 * side), every=True)
     if grid.resolution < resolution:
         said["W0553"] = f"more than {MOST_CELLS:,} cells: a resolution of {grid.resolution}, not {resolution}"
     if thin:
@@ -320,20 +296,20 @@ def surface_of(program: Program, resolution: int, exact: bool) -> tuple[Triangle
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:
     """Points (E, 3) where edges between nodes cross the surface, and unit normals, by false position."""
-    sampler, mixed = grid.sampler, grid.sampler.field.mixed  # a value jumps where a medium begins
+    sampler, mixed = grid.sampler, grid.sampler.mixed  # a value jumps where a medium begins
     low, high, f, g = grid.points(a).T, grid.points(b).T, grid.value(a), grid.value(b)
     steps = HALVINGS if mixed else STEPS
     near = 0.0 if mixed else NEAR * grid.side
     zero, beyond = zeros(lambda p: sampler.at(p.T), low, high, f, g, steps, mixed, near)
     p = zero.T
-    met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
+    met = sampler.meet(p, gradient=True)
     n = np.asarray(met.gradient, np.float64).T
     if mixed:  # what ends where a medium begins ends as the medium's own distance says
         some = np.flatnonzero(met.distance < -0.05 * grid.side)
         outside = beyond.T[some]
-        owner = np.asarray(sampler.meet(outside, Wanted.KIND, owners=True).owner, np.intp) - 1
+        owner = np.asarray(sampler.meet(outside, every=True).owner) - 1
         kept = owner >= 0
-        n[some[kept]] = -sampler.field.normals(owner[kept], outside[kept].T.astype(np.float32)).T
+        n[some[kept]] = -sampler.kernel.own(sampler.tables, owner[kept], outside[kept].T)[1].T
     return p, n / np.linalg.norm(n, axis=1).clip(1e-12)[:, None]
 
 
@@ -382,9 +358,9 @@ def _parted(sampler: Sampler, mesh: TriangleMesh, side: float) -> TriangleMesh:
     some = np.flatnonzero(np.isin(triangles, triangles[jumps]).any(1))
     if not len(some):
         return mesh
-    met = sampler.meet(middle[some], Wanted.DISTANCE, gradient=True)
+    met = sampler.meet(middle[some], gradient=True)
     inside = middle[some] - ((met.distance + 0.02 * side) * met.gradient).T
-    tint = encoded(sampler.meet(inside, Wanted.ALL).register[:3].T)[:, None]
+    tint = encoded(sampler.meet(inside, every=True).register[:3].T)[:, None]
     tints[some] = np.where((abs(tints[some] - tint) > JUMP).any(2, keepdims=True), tint, tints[some])
     # of each edge its first and last corner here, and those of the same vertices beyond
     corner = np.arange(triangles.size).reshape(-1, 3)
@@ -423,7 +399,7 @@ def _thin(grid: Grid, cases: Index) -> bool:
     p = grid.points(some) + grid.side / 2
     if not len(p):
         return False
-    met = sampler.meet(p, Wanted.DISTANCE, gradient=True)
+    met = sampler.meet(p, gradient=True)
     p -= np.asarray((met.distance + 0.02 * grid.side) * met.gradient).T
     within = (abs(p - grid.points(some) - grid.side / 2) < grid.side / 2).all(1)
     hit = np.flatnonzero(within)[sampler.at(p[within]) < 0]

@@ -28,7 +28,7 @@ from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.neural.frames import Frames, read_skins
 from scenelang.drawing.neural.outlines import table_of
-from scenelang.drawing.solid.passes import read_solid_frame
+from scenelang.drawing.tables import read_ways
 
 MODULES: Final = (
     *("store", "gl", "grids", "groups", "ways", "plane"),
@@ -172,7 +172,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     if layout.dimension == 2:  # world distances per leaf distance
         scales = Frames(program.vectors, layout).scale.tolist()
     else:
-        scales = [read_solid_frame(vector, layout).scale for vector in program.vectors]
+        scales = read_ways(program.vectors, layout).scale.tolist()
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
     rows, skins = [], read_skins(parts)
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]

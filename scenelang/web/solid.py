@@ -19,7 +19,7 @@ from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.network import TOKENS
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidArrays, SolidCell
 from scenelang.drawing.solid.norms import Norms
-from scenelang.drawing.solid.passes import LOOSE, SLACK
+from scenelang.drawing.tables import LOOSE, SLACK
 from scenelang.web.arrays import ArrayStore, web
 
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "lamps.glsl", "light.glsl")

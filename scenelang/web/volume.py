@@ -20,8 +20,7 @@ from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import MARCH_SETTINGS
 from scenelang.drawing.solid.mist import AROUND, Floats, box_of, pair_of
-from scenelang.drawing.solid.near import near
-from scenelang.drawing.solid.network import SolidArrays, Wanted
+from scenelang.drawing.solid.network import SolidArrays
 from scenelang.web.arrays import ArrayStore
 
 SPREAD = 3.0  # nodes along a side of the ground's map stand at s sinh(SPREAD u)
@@ -120,7 +119,7 @@ def _light(
     """
     p = np.stack(np.meshgrid(*axes, indexing="ij")).astype(np.float32)
     sides, p = p.shape[1:], p.reshape(3, -1)
-    met = near(around.field, p, 0 * p[0] + GAP, Wanted.ALL)
+    met = around.field.near(p, 0 * p[0] + GAP, every=True)
     free = ~((met.distance < 0) & ~around.field.material(met).medium).reshape(sides)
     glow = _glowing(around, p, counts)
     light = (glow + _gathered(around, p, 0, detail.rays, counts)).reshape(-1, *sides)

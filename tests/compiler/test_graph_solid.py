@@ -15,12 +15,14 @@ from scenelang.compiler import steps as affine
 from scenelang.compiler.chain import LevelsError, merged, normal, slots, split_levels
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Leaf, Look, Move
+from scenelang.compiler.groups import read_groups
 from scenelang.compiler.lifting import SOLID_LAYOUT, lift_many
 from scenelang.compiler.spaces import SPACES, Camera, Ground, Light, Stage, decoded
 from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.solid import ExactBody
-from scenelang.drawing.solid.passes import read_solid_frame
+from scenelang.drawing.solid.passes import read_solids
+from scenelang.drawing.tables import read_objects
 from scenelang.language import words
 
 SOLID = SPACES[3]
@@ -117,7 +119,9 @@ def test_normal_form_and_levels_keep_the_map() -> None:
         fitting += 1
         flat = [*levels.inner, Affine(levels.middle), *levels.outer, Affine(levels.affine)]
         assert back(flat, p) == pytest.approx(wanted, abs=1e-8)
-        frame = read_solid_frame(lift_many([levels], [CODE], SOLID_LAYOUT)[0])
+        vectors = lift_many([levels], [CODE], SOLID_LAYOUT)
+        objects = read_objects(vectors, SOLID_LAYOUT, read_groups(np.zeros(1, np.int8)), np.zeros(1))
+        frame = read_solids(NUMPY, objects, vectors)[0].frame
         assert frame.local(NUMPY, frame.outer(NUMPY, p)) == pytest.approx(wanted, abs=1e-3)
     assert fitting > 90
 

@@ -145,7 +145,7 @@ def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidFi
     return SolidField(net, vectors, tokens, paints=[o.paint for o in objects])
 
 
-def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Meeting:
+def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False, owners: bool = False) -> Meeting:
     """What a field answers where every object is met."""
     xp, like, count = solids.xp, solids.network.codes, len(solids.solids)
     slots = np.zeros((SLOT, count, p.shape[1]), np.float32)
@@ -155,7 +155,7 @@ def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False) -> Mee
     slots[END] = INF
     passes = Passes(xp.array(slots, like), solids.shift)
     with xp.inference():
-        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient)
+        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient, owners=owners)
 
 
 MIXED = (

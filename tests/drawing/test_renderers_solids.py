@@ -23,7 +23,8 @@ from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted, element_box, surrounding
-from scenelang.drawing.solid.passes import BEGIN, END, RATE, SLACK
+from scenelang.drawing.solid.passes import BEGIN, END, RATE
+from scenelang.drawing.tables import SLACK
 from scenelang.language.words import TOKENS
 from tests.assets.shapes import element, noise, torus
 from tests.drawing.solids import (

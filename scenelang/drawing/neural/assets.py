@@ -197,7 +197,7 @@ class Texture:
         assert isinstance(paint.element, Element)
         values = _nodes(paint.element, light)
         flat = xp.array(values.reshape(3, -1), like)
-        self._lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
+        self.lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
         (a, b, u), (c, d, v) = _rows(frame)
         self.place = FrameMap(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
@@ -210,7 +210,7 @@ class Texture:
         return stepped(self._xp, self._colours(q), self.steps)
 
     def _colours(self, q: Array) -> Array:
-        return self._picture(q) if self._lattice is None else self._lattice.at(q.clip(-1.0, 1.0))
+        return self._picture(q) if self.lattice is None else self.lattice.at(q.clip(-1.0, 1.0))
 
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides

@@ -26,8 +26,6 @@ from scenelang.drawing.solid.emitters import Emitters
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.mist import Mist
-from scenelang.drawing.solid.near import near
-from scenelang.drawing.solid.network import Wanted
 from scenelang.drawing.solid.nodes import (
     ALL,
     HOLLOW,
@@ -237,11 +235,10 @@ class Around:
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
-            wanted = Wanted.KIND if self.field.mixed else Wanted.DISTANCE
-            found = near(self.field, p + OFF * n, 0 * p[0] + GAP, wanted)
+            found = self.field.near(p + OFF * n, 0 * p[0] + GAP, every=self.field.mixed)
             buried = found.distance < 0  # in what touches the surface
             if self.field.mixed:
-                buried = buried & (found.register[0] < 0.5)
+                buried = buried & (found.register[-1] < 0.5)
             p = self.xp.select(buried, p + 2 * ELSEWHERE, p)
             there = self.xp.where(p[0] < ELSEWHERE)
             numbers = np.stack(np.divmod(np.asarray(self.xp.to_numpy(there)), self.columns))
@@ -331,7 +328,7 @@ class Around:
     def _around(self, at: Array, way: Array) -> tuple[Array, ...]:
         """Nodes (j, K) around points (3, K) where rays end, their shares, as of `Lookup`, 1, and normals."""
         xp = self.xp
-        g = near(self.field, at, 0 * at[0] + GAP, gradient=True).gradient
+        g = self.field.near(at, 0 * at[0] + GAP, gradient=True).gradient
         # in a crevice the nearest surface may be the one that is left
         g = xp.select((g * way).sum(0) > 0, way, g * (-1 / xp.length(list(g)).clip(1e-9)))
         way = WAY * way + g

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -29,8 +29,8 @@ from scenelang.compiler.groups import (
 )
 from scenelang.compiler.lifting import Parts
 from scenelang.compiler.program import Paint
-from scenelang.compiler.spaces import EXTINCTION
 from scenelang.drawing.arrays import Array, Arrays, Smooth
+from scenelang.drawing.kernel import Asked, load_kernel
 from scenelang.drawing.neural.assets import GridShape, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins, read_skins
 from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidCell, SolidNetwork, Wanted, element_box
@@ -40,16 +40,13 @@ from scenelang.drawing.solid.passes import (
     END,
     INF,
     OBJECT,
-    SLACK,
-    SMALL,
     WAY,
     Passes,
     SolidFrame,
     find_passes,
     read_solids,
 )
-
-TAGS = np.array([[0.618034], [0.754878], [0.569840]])  # parts of whole numbers times these lie apart
+from scenelang.drawing.tables import DRAWS, SKINNED, SLACK, SMALL, Tables, read_looks, read_objects
 
 
 class SolidClosing(NamedTuple):
@@ -207,13 +204,14 @@ class SolidField:
         widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, parts.width)
         self.stacks = Stacks(self.xp, self.tree, network.codes) if self.tree.deepest else None
         with self.xp.inference():
-            self.solids = read_solids(network, vectors, self.tree, widths, reach)
+            self.objects = read_objects(vectors, network.layout, self.tree, widths, reach)
+            self.solids = read_solids(self.xp, self.objects, network.codes)
             self._tables(parts)
             self._cells(widths)
             self._textures(parts.texture, paints or none)
+            self._looks(parts)
             self._decoders(parts.code, brought or none)
             self._alone()
-            self._properties(parts)
         kinds = self.xp.to_numpy(self.looks)[-1] > 0.5
         drawn = np.array([solid.draws for solid in self.solids], bool)
         self.edged = any(not isinstance(own, GridShape) and network.edged(own) for own in self.decoders)
@@ -249,11 +247,7 @@ class SolidField:
         skins = read_skins(parts)
         self.skins = None if skins is None else skins.placed(xp, network.codes)
         # which objects (N,) have a skin
-        self.skinned = np.zeros(count, bool) if skins is None else np.any(skins[:3], axis=0)
-        look = network.look(xp.array(parts.material.copy(), network.codes)).T
-        colour = table(parts.rgb.T, 3) * look[:3]
-        # colour and medium (R, N) of objects; where some have textures, a plain colour between these
-        self.looks = xp.concat([colour.clip(0.0, 1.0), look[3:]], 0)
+        self.skinned = self.objects.flagged(SKINNED)
 
     def _cells(self, widths: Floats) -> None:
         """Cells of the objects and, behind these, of the groups; `widths` are those of rows' blends."""
@@ -277,7 +271,7 @@ class SolidField:
         ]
 
     def _textures(self, frames: np.ndarray, paints: Sequence[Paint | None]) -> None:
-        """Build the textures of objects, which get unique plain colours to find outlines and shadows by."""
+        """Build the textures of objects."""
         xp, like = self.xp, self.network.codes
         worn = {
             i: texture_of(xp, paint, frames[i], like, light=True)
@@ -288,28 +282,15 @@ class SolidField:
         # texels that a way of a world unit may cross; 0 without a texture
         detail = [worn[i].detail / s.frame.scale if i in worn else 0.0 for i, s in enumerate(self.solids)]
         self.detail = xp.array(np.array(detail, np.float32), like)
-        if worn:
-            tags = (0.4 + 0.6 * (TAGS * (np.arange(len(paints)) + 1) % 1.0)).astype(np.float32)
-            plain = xp.select(self.detail > 0, xp.array(tags, like), self.looks[:3])
-            self.looks = xp.concat([self.looks[:3], plain, self.looks[3:]], 0)
 
-    def _properties(self, parts: Parts) -> None:
-        """Build what materials have beside colours: rows of the register where a scene writes them."""
-        xp, looks = self.xp, self.looks
-        self.hues = len(looks) - 1  # rows of colours, and plain ones in place of textures'
-        glow, density, roughness = (part.T for part in (parts.glow, parts.density, parts.roughness))
-        density = np.where(density > 0, density, np.float32(EXTINCTION))
-        drawn = np.array([solid.draws for solid in self.solids], bool)
-        media = (np.asarray(xp.to_numpy(looks))[-1] > 0.5) & drawn
-        there = np.unique(density[media])
-        # the extinction of media, None where they differ; and that of each object (N,)
-        self.sigma = None if len(there) > 1 else float(there[0]) if len(there) else EXTINCTION
-        self.density = xp.array(density, looks)
-        self.glowing, self.rough = bool(glow.any()), bool(roughness.any())
-        switched = [density] * (self.sigma is None) + [roughness] * self.rough
-        if rows := [*(glow if self.glowing else ()), *switched]:
-            self.looks = xp.concat([looks[:-1], xp.array(np.array(rows, np.float32), looks), looks[-1:]], 0)
-        self.switched = 1 + len(switched)  # rows that come with the kind of material
+    def _looks(self, parts: Parts) -> None:
+        """Build the register (R, N) of objects: colours, medium, and what a scene writes beside these."""
+        worn = np.zeros(len(self.solids), bool)
+        worn[[i for i, _ in self.textures]] = True
+        looks, like = read_looks(self.network, parts, worn, self.objects.flagged(DRAWS)), self.network.codes
+        self.looks, self.density = self.xp.array(looks.register, like), self.xp.array(looks.density, like)
+        self.hues, self.switched, self.sigma = looks.hues, looks.switched, looks.sigma
+        self.glowing, self.rough = looks.glowing, looks.rough
 
     def glow(self, register: Array) -> Array:
         """The light (3, M) that materials of registers (R, M) give off, linear."""
@@ -319,7 +300,7 @@ class SolidField:
         """The extinction (M,) of media with registers (R, M), per world unit."""
         return 0 * register[0] + self.sigma if self.sigma else register[-self.switched]
 
-    def material(self, met: Meeting) -> Material:
+    def material(self, met: Meeting | Asked) -> Material:
         """The material at points that were asked for all (`Wanted.ALL`), as it holds wherever D < 0."""
         register = met.register
         parts = self.glow(register), self.extinction(register), register[-2] * self.rough
@@ -430,7 +411,7 @@ class SolidField:
         xp = self.xp
         return (xp.take(self.linear, objects) * p).sum(1) + xp.take(self.shift, objects)
 
-    def _looks(self, q: Array, objects: Array) -> Array:
+    def _worn_looks(self, q: Array, objects: Array) -> Array:
         """Registers (R, P) of objects with their textures' colours at leaf coordinates (3, P)."""
         xp = self.xp
         looks = xp.take(self.looks, objects)
@@ -614,7 +595,7 @@ class SolidField:
             at = self.behind(objects, xp.take(p, rays))
         q, own_points = self._local(at, objects)
         d, own = self._distances(q, own_points, objects, gradient, far)
-        looks = self._looks(q, objects) if wanted == Wanted.ALL and self.textures else None
+        looks = self._worn_looks(q, objects) if wanted == Wanted.ALL and self.textures else None
         states = States(
             memory=xp.full(((1, 2, 1 + len(self.looks))[wanted], size), 0.0, t),
             slope=xp.full((3, size), 0.0, t) if gradient else None,
@@ -652,6 +633,18 @@ class SolidField:
         if bound is not None:
             bound = xp.minimum(bound, abs(memory[0]))
         return Meeting(memory[0], memory[1:], slope, bound, owner, len(rays))
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What the kernel takes."""
+        return Tables(self.network, *self.rows, self.paints, self.reach)
+
+    def near(self, p: Array, reach: Array, gradient: bool = False, every: bool = False) -> Asked:
+        """As `Kernel.field`, at points (3, M) anywhere: exact where D is less than a reach (M,)."""
+        at, far = (np.asarray(self.xp.to_numpy(part)) for part in (p, reach))
+        *answers, met = load_kernel().field(self.tables, at, far, gradient, every)
+        d, slope, register, owner = (self.xp.array(part, p) for part in answers)
+        return Asked(d, slope, register, owner, met)
 
     def pairs(self, passes: Passes, t: Array) -> SolidPairs:
         """Pairs of points at t (M,) and the objects in whose balls these are."""

@@ -26,9 +26,8 @@ from scenelang.compiler.spaces import Light, Sky, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.near import near
-from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.passes import INF, inverse_of
+from scenelang.drawing.solid.passes import INF
+from scenelang.drawing.tables import inverses
 
 Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
@@ -102,7 +101,7 @@ class Mist:
         field, like = self.field, self.field.network.codes
         p = self.xp.array(self.p.reshape(3, -1), like)
         with self.xp.inference():
-            met = near(field, p, 0 * p[0] + 2 * self.h, Wanted.ALL)
+            met = field.near(p, 0 * p[0] + 2 * self.h, every=True)
             answers = [met.distance.clip(None, 2 * self.h), *field.material(met)]
         d, colour, medium, glow, density, _ = (
             np.asarray(self.xp.to_numpy(part)).reshape(*part.shape[:-1], *self.sides) for part in answers
@@ -358,7 +357,7 @@ def box_of(field: SolidField, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarra
     for solid, its in zip(field.solids, wanted.tolist(), strict=True):
         if its and solid.draws:
             back, shift = (np.asarray(field.xp.to_numpy(part), np.float64) for part in solid.frame.outer)
-            back = inverse_of(back)
+            back = inverses(back)
             if solid.box is None:
                 half, middle = solid.ball * np.linalg.norm(back, axis=1), -back @ shift
             else:

@@ -107,6 +107,10 @@ class SolidConfig:
     answered: int = 0  # geometries, the first ones, that these answer for; 0: all
 
 
+class Formula(str):
+    """The name of a geometry whose formula stands in the place of a decoder."""
+
+
 class SolidCell(NamedTuple):
     """Weights of the cell for a token and a width of blends, or (…, M) for those of each point."""
 

@@ -17,8 +17,6 @@ import numpy as np
 from scenelang.compiler.spaces import Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.near import near
-from scenelang.drawing.solid.network import Wanted
 
 ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of rays
@@ -155,7 +153,7 @@ def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Arra
     xp, weight = field.xp, None
     reach = 0 * p[0] + 4 * COVERED
     for _ in range(NEWTON):
-        met = near(field, p, reach, gradient=True)
+        met = field.near(p, reach, gradient=True)
         if weight is None:
             weight = (1 - abs(met.distance) / COVERED).clip(0.0)
         square = (met.gradient * met.gradient).sum(0).clip(1e-6)
@@ -163,11 +161,11 @@ def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Arra
     g = met.gradient
     slope = xp.sqrt((g * g).sum(0))  # of what is scaled unevenly, less than 1
     n = g / slope.clip(1e-9)
-    inside = near(field, p - INSIDE * n, reach, Wanted.ALL)
+    inside = field.near(p - INSIDE * n, reach, every=True)
     material = field.material(inside)
     weight = weight * (inside.distance < 0) * ~material.medium * (slope > FLAT)
     if len(field.solids) > 1 and not field.media:  # where two touch nobody sees their nodes
-        before = near(field, p + BEFORE * n, reach)
+        before = field.near(p + BEFORE * n, reach)
         weight = weight * (before.distance / (BEFORE * slope.clip(FLAT))).clip(0.0, 1.0)
     if stage.ground is not None:
         weight = weight * ((p[1] - stage.ground.y) / COVERED).clip(0.0, 1.0)
@@ -195,7 +193,7 @@ def on_ground(field: SolidField, stage: Stage, many: bool) -> Nodes:
         p[0], p[1], p[2] = np.tile(x, side), ground.y, np.repeat(x, side)
         colour[:] = np.asarray(ground.rgb, np.float32)[:, None]
     p, n, colour = (xp.array(part, like) for part in (p, n, colour))
-    d = near(field, p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
+    d = field.near(p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
     place = xp.concat([p, xp.full((5, p.shape[1]), 1.0, p)], 0)
     return Nodes(p, n, colour, 0 * p, (d / COVERED).clip(0.0, 1.0), 0 * p[0], place)
 

@@ -88,7 +88,10 @@ def answers(xp: Arrays, q: Array, layers: Norms, gradient: bool) -> Array:
         return d[None]
     far = 1 / length.clip(1e-30)
     highest = reduce(xp.maximum, sums)
-    rates = [above[part] * (far * (own == highest)) for part, own in zip(parts, sums, strict=False)]
+    rates, left = [], highest == highest
+    for part, own in zip(parts, sums, strict=False):  # of units that tell the same one counts
+        rates.append(above[part] * (far * (left & (own == highest))))
+        left = left & (own != highest)
     if depth is not None:
         within = (depth < 0) | (length == 0)  # on a face, rounding may say neither
         rates.append(((inside == depth) & within) * (0 * depth + 1))

@@ -7,17 +7,13 @@ objects the scene has. An object that cuts away everything outside of it is met 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from scenelang.compiler.groups import INTERSECT, SMOOTH, SUBTRACT, UNION, Floats, Groups, Mask, felt
-from scenelang.compiler.lifting import SOLID_LAYOUT, Layout
-from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.frames import MOST, read_skins
-from scenelang.drawing.solid.network import BLEND, SolidNetwork
+from scenelang.drawing.tables import BEGINS, CLIPS, DRAWS, MAP, TURN_Z, Objects
 
 
 class Turn(NamedTuple):
@@ -54,17 +50,6 @@ class Turn(NamedTuple):
         result = xp.stack(rows, 0)
         return result if length is None else result + (self.twirl * swing / length.clip(1e-12)) * p
 
-    def stretch(self, radius: float) -> float:
-        """Greatest factor by which it lengthens a small step, in the ball of a radius about the origin.
-
-        The turn's derivative is a rotation times ``1 + u v^T``, u the point turned by a right angle in the
-        plane of the turn and v the angle's gradient: with m = |u| |v| and c = u . v the larger singular
-        value is ``(m + sqrt(m² + 4 + 4 c)) / 2``.
-        """
-        m = radius * (abs(self.twirl) + abs(self.rate))
-        c = radius * abs(self.rate) if self.along in (self.i, self.j) else 0.0
-        return float(m + np.sqrt(m * m + 4 + 4 * c)) / 2
-
 
 class Map(NamedTuple):
     """An affine map: p to linear p + shift."""
@@ -79,10 +64,6 @@ class Map(NamedTuple):
         """As `Turn.pulled`."""
         return self.linear.T @ g
 
-    def placed(self, xp: Arrays, like: Array) -> Map:
-        """The same where an array lies."""
-        return Map(xp.array(self.linear, like), xp.array(self.shift, like))
-
 
 @dataclass(frozen=True, slots=True)
 class SolidFrame:
@@ -95,22 +76,10 @@ class SolidFrame:
     moved: float
     amount: float  # of the displacement
     frequency: float
-    blend: float  # width of the blend by which the object joins
 
     def ball(self, radius: float) -> float:
         """Radius of the ball behind `outer` outside which leaf coordinates are longer than ``radius``."""
         return self.reach * radius + self.moved
-
-    def growth(self, radius: float) -> float:
-        """Leaf units by which the distance changes at most, in a leaf ball, per step of 1 behind `outer`."""
-        growth, ball = 1.0 + abs(self.amount * self.frequency), self.ball(radius)
-        for step in self.steps:
-            if isinstance(step, Map):
-                growth *= float(np.linalg.norm(step.linear, 2))
-                ball = radius
-            else:
-                growth *= step.stretch(ball)
-        return growth
 
     def local(self, xp: Arrays, p: Array) -> Array:
         """Leaf coordinates of points behind `outer`, both (3, M)."""
@@ -128,76 +97,8 @@ class SolidFrame:
             g = step.pulled(xp, at, g)
         return g
 
-    def placed(self, xp: Arrays, like: Array) -> SolidFrame:
-        """The same where an array lies."""
-        steps = tuple(step if isinstance(step, Turn) else step.placed(xp, like) for step in self.steps)
-        return replace(self, outer=self.outer.placed(xp, like), steps=steps)
-
-
-def read_solid_frame(g: np.ndarray, layout: Layout = SOLID_LAYOUT) -> SolidFrame:
-    """The frame of one vector (64,); raises `ProgramError` where it leads to no leaf."""
-    g = g.astype(np.float64)
-    if not np.abs(g[: layout.geometry]).max() < MOST:
-        raise ProgramError("a frame beyond float32")
-    parts = layout.unpack(g)
-    last, middle = (
-        Map(rows[:, :3], rows[:, 3]) for rows in np.reshape([parts.frame, parts.middle], (2, 3, 4))
-    )
-    outer, inner = _turns(parts.outer), _turns(parts.inner)
-    whole = Map(middle.linear @ last.linear, middle.linear @ last.shift + middle.shift)
-    stretches = np.linalg.svd(whole.linear, compute_uv=False)
-    if not (stretches[2] > 1 / MOST and stretches[0] < MOST):
-        raise ProgramError("a frame beyond float32")
-    (amount, frequency), blend = parts.bulge.tolist(), float(parts.width)
-    reach, moved = 1.0, 0.0
-    steps: tuple[Turn | Map, ...] = tuple(inner)
-    if outer:
-        back = inverse_of(middle.linear)
-        reach, moved = float(np.linalg.norm(back, 2)), float(np.linalg.norm(back @ middle.shift))
-        steps = (*outer, _single(middle), *inner)
-    return SolidFrame(
-        outer=_single(last if outer else whole),
-        steps=steps,
-        scale=1 / float(stretches[0]),
-        reach=reach,
-        moved=moved,
-        amount=amount,
-        frequency=frequency,
-        blend=blend if blend > 0 else BLEND,
-    )
-
-
-def inverse_of(linear: np.ndarray) -> np.ndarray:
-    """The inverse of a linear map (3, 3); raises `ProgramError` where float32 has none."""
-    try:
-        result: np.ndarray = np.linalg.inv(linear)
-    except np.linalg.LinAlgError:
-        raise ProgramError("a damaged program: a frame without an inverse") from None
-    if not np.abs(result).max() < MOST:
-        raise ProgramError("a frame beyond float32")
-    return result
-
-
-def _single(wide: Map) -> Map:
-    """A map in float32."""
-    return Map(wide.linear.astype(np.float32), wide.shift.astype(np.float32))
-
-
-def _turns(slots: np.ndarray) -> list[Turn]:
-    """Turns of slots of three strengths: by t |p| + b x about z, then by w y about y."""
-    turns = []
-    for twirl, bend, twist in slots.reshape(-1, 3).tolist():
-        if twirl or bend:
-            turns.append(Turn(0, 1, twirl, bend, 0))
-        if twist:
-            turns.append(Turn(0, 2, 0.0, twist, 1))
-    return turns
-
 
 INF = float("inf")
-SMALL = 1.7  # a side of a box that is worth the asking
-SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
-LOOSE = 0.03  # the same, per leaf unit, of one that grows
 OBJECT, WAY, BEGIN, END, RATE, SLOT = 0, slice(1, 4), 4, 5, 6, 7  # what a slot of a ray has, and how many
 
 
@@ -221,100 +122,42 @@ class Solid:
     )
 
 
-def read_solids(
-    network: SolidNetwork, vectors: np.ndarray, groups: Groups, widths: Floats, reach: float = 0.0
-) -> list[Solid]:
-    """The objects of a stream, whose groups and widths of blends are as of `felt`, with distances up to
-    ``reach`` around them; raises `ProgramError`.
-    """
-    xp, layout, like = network.xp, network.layout, network.codes
-    solids: list[Solid] = []
-    frames = [read_solid_frame(vector, layout) for vector in vectors]
-    skins = read_skins(layout.unpack(vectors))
-    grown = np.zeros(len(frames)) if skins is None else np.asarray(skins.reach, np.float64)
-    more = grown + [abs(frame.amount) for frame in frames]  # how much farther out than leaves they reach
-    deepest = float(np.max([frame.scale for frame in frames] * (1 + more.clip(0.0)), initial=0.0))
-    matters = felt(groups, widths)
-    # rows (1 + D, N) that may show something where it was empty: at all, and in their groups
-    shows = np.isin(groups.tokens, (UNION, SMOOTH))
-    inner = [np.isin(groups.joins[path], (UNION, SMOOTH)) | (path < 0) for path in groups.path.T[::-1]]
-    seen = np.logical_and.accumulate([shows, *inner])[::-1]
-    # rows that a subtract joins, or a group around them: these say how deep points inside others lie
-    taken = (groups.tokens == SUBTRACT) | ((groups.path >= 0) & (groups.joins[groups.path] == SUBTRACT)).any(
-        1
-    )
-    deep = matters.everywhere & taken
-    for i, frame in enumerate(frames):
-        # a blend reaches as far as its width, and each lowers the distance by a quarter of that at most
-        blends = reach + float(matters.widest[i]) * (1 + int(matters.blends[i]) / 4)
-        if deep[i]:
-            blends += deepest
-        radius = 1 + SLACK + float(more[i] + LOOSE * abs(grown[i])) + blends / frame.scale
-        back = inverse_of(frame.outer.linear.astype(np.float64))
-        centre, ball = (-back @ frame.outer.shift).astype(np.float32), frame.ball(radius)
+def read_solids(xp: Arrays, objects: Objects, like: Array) -> list[Solid]:
+    """The rows of a table, with arrays where another lies."""
+    steps = [_step(xp, row, like) for row in objects.steps]
+    rows, flags = objects.rows, {flag: objects.flagged(flag).tolist() for flag in (DRAWS, CLIPS, BEGINS)}
+    names = ("scale", "reach", "moved", "amount", "frequency", "ends", "radius", "ball", "rate", "extent")
+    numbers = {name: rows[name].tolist() for name in (*names, "step", "steps")}
+    solids = []
+    for i in range(len(rows)):
+        own = {name: numbers[name][i] for name in names}
+        first, count = numbers["step"][i], numbers["steps"][i]
+        frame = {name: own.pop(name) for name in names[:5]}
         solids.append(
             Solid(
-                frame=frame.placed(xp, like),
-                draws=bool(seen[0, i]),
-                clips=bool(groups.tokens[i] == INTERSECT),
-                begins=bool(groups.first[i]),
-                ends=int(groups.ends[i]),
-                radius=radius,
-                ball=ball,
-                rate=frame.scale * frame.growth(radius),
-                centre=xp.array(centre, like),
-                extent=float(np.linalg.norm(back, 2)) * ball,
+                SolidFrame(_affine(xp, rows["map"][i], like), tuple(steps[first : first + count]), **frame),
+                **{
+                    name: flags[flag][i]
+                    for name, flag in (("draws", DRAWS), ("clips", CLIPS), ("begins", BEGINS))
+                },
+                centre=xp.array(rows["centre"][i], like),
+                wide=bool(objects.wide[i]),
+                **own,
             )
         )
-    return _widened(xp, solids, frames, groups, seen) if groups.deepest else solids
-
-
-def _widened(
-    xp: Arrays, solids: list[Solid], frames: Sequence[SolidFrame], groups: Groups, seen: Mask
-) -> list[Solid]:
-    """The same frames, as numpy's arrays, of which those that intersect are met wherever they have to be.
-
-    A group that is intersected with what stands before it has to be there, whatever cuts it: what intersects
-    in it is met wherever the group may be. Elsewhere what came before ends with its ball.
-    """
-    centres = np.array([np.asarray(xp.to_numpy(solid.centre), np.float64) for solid in solids])
-    extents = np.array([solid.extent for solid in solids])[:, None]
-    number = len(groups.joins)
-    middle, reach = np.zeros((number, 3)), np.zeros(number)  # balls of what may be in the groups
-    for path, shown in zip(groups.path.T, seen[1:], strict=True):
-        rows = np.flatnonzero((path >= 0) & shown)
-        low, high = np.full((number, 3), INF), np.full((number, 3), -INF)
-        np.minimum.at(low, path[rows], centres[rows] - extents[rows])
-        np.maximum.at(high, path[rows], centres[rows] + extents[rows])
-        here = np.unique(path[rows])
-        middle[here] = (low[here] + high[here]) / 2
-        far = np.linalg.norm(centres[rows] - middle[path[rows]], axis=1) + extents[rows, 0]
-        np.maximum.at(reach, path[rows], far)
-    depth = (groups.path >= 0).sum(1)
-    for i, solid in enumerate(solids):
-        own = groups.path[i, : depth[i]].tolist()
-        held = own.pop() if solid.begins else -1  # what its ball has to hold, and where that stands
-        if not (solid.clips or (held >= 0 and groups.joins[held] == INTERSECT)):
-            continue
-        clips = not own or bool(groups.joins[own[-1]] != INTERSECT)
-        if not clips:
-            held = own[-1]
-        if held < 0:
-            continue
-        linear, frame = frames[i].outer.linear.astype(np.float64), frames[i]
-        far = float(np.linalg.norm(centres[i] - middle[held]) + reach[held])
-        ball = max(solid.ball, float(np.linalg.norm(linear, 2)) * far)
-        radius = (ball - frame.moved) / frame.reach
-        solids[i] = replace(
-            solid,
-            clips=clips,
-            radius=radius,
-            ball=ball,
-            rate=frame.scale * frame.growth(radius),
-            extent=float(np.linalg.norm(np.linalg.inv(linear), 2)) * ball,
-            wide=True,
-        )
     return solids
+
+
+def _step(xp: Arrays, row: np.void, like: Array) -> Turn | Map:
+    if row["kind"] == MAP:
+        return _affine(xp, row["map"], like)
+    if row["kind"] == TURN_Z:
+        return Turn(0, 1, float(row["twirl"]), float(row["rate"]), 0)
+    return Turn(0, 2, 0.0, float(row["rate"]), 1)
+
+
+def _affine(xp: Arrays, numbers: np.ndarray, like: Array) -> Map:
+    return Map(xp.array(numbers[:9].reshape(3, 3), like), xp.array(numbers[9:], like))
 
 
 class Passes(NamedTuple):

@@ -1,0 +1,124 @@
+"""Damaged Programs through the kernel: ``python -m fuzz.kernel [--count N] [--seed S]``, under sanitizers.
+
+The library is built by gcc with AddressSanitizer and UndefinedBehaviorSanitizer, whose runtime has to be
+loaded before Python: this starts itself once more with it. Programs are those of examples and of the
+conformance suite, with numbers, tokens, elements and paints of rows changed. A finding ends the process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.tensors import FLOATS
+from scenelang.compiler.compile import compile_scene
+from scenelang.compiler.program import Program, ProgramError
+from scenelang.drawing.closed import field_of
+from scenelang.drawing.kernel import Kernel
+from scenelang.drawing.tables import Tables
+from scenelang.language.evaluation import load
+from scenelang.language.reports import SceneError
+
+ROOT = Path(__file__).parents[1]
+POINTS = 100  # asked of each Program
+
+
+def mutated(program: Program, seed: int) -> Program:
+    """A Program with some of its rows changed; raises `ProgramError` where it is none."""
+    rng = np.random.default_rng(seed)
+    vectors, tokens = program.vectors.copy(), program.tokens.copy()
+    forms, worn = (np.array(part, np.int32) for part in (program.forms, program.worn))
+    count = len(program)
+    for _ in range(int(rng.integers(1, 4))):
+        row, place, kind = int(rng.integers(count)), int(rng.integers(vectors.shape[1])), int(rng.integers(8))
+        if kind < 2:
+            vectors[row, place] = FLOATS[rng.integers(len(FLOATS))]
+        elif kind == 2:
+            vectors[row, place] = rng.normal() * 10.0 ** rng.integers(-6, 9)
+        elif kind == 3:
+            vectors[row] = vectors[rng.integers(count)] * rng.choice([1, -1, 1e-3, 1e3])
+        elif kind == 4:
+            vectors[:, place] *= rng.normal(size=count)
+        elif kind == 5:
+            tokens[row] = rng.integers(0, 128)
+        elif kind == 6:
+            tokens[rng.integers(count) :] &= 3
+        else:
+            forms[row] = rng.integers(-1, 1 + len(program.elements))
+            worn[row] = rng.integers(-1, 1 + len(program.palette))
+    with np.errstate(all="ignore"):
+        return replace(program, vectors=vectors, tokens=tokens, forms=forms, worn=worn)
+
+
+def ask(kernel: Kernel, program: Program, seed: int) -> None:
+    """Ask the field of a Program anywhere; raises `ProgramError` where it holds no scene."""
+    rng = np.random.default_rng(seed)
+    given = (program.vectors, program.tokens, program.brought(), program.paints())
+    tables = Tables(field_of(program, seed % 3 == 0), *given)  # type: ignore[arg-type]
+    p = (rng.normal(size=(3, POINTS)) * 10.0 ** rng.integers(-2, 3, POINTS)).astype(np.float32)
+    some = rng.integers(0, POINTS, 3)
+    p[rng.integers(0, 3, 3), some] = (np.inf, np.nan, 3e38)
+    reach = np.array([0.0, 0.1, 3.0, np.inf], np.float32)[rng.integers(0, 4, POINTS)]
+    found = kernel.field(tables, p, reach, *(rng.random(2) < 0.5).tolist())
+    assert ((found.owner >= 0) & (found.owner <= len(program))).all()
+    kernel.own(tables, rng.integers(0, len(program), POINTS), p)
+
+
+def programs() -> list[Program]:
+    """Those of all scenes of solids."""
+    found = []
+    for path in sorted([*ROOT.glob("examples/*.nsg"), *ROOT.glob("tests/conformance/cases/*.nsg")]):
+        try:
+            program = compile_scene(load(path))
+        except SceneError:
+            continue
+        if program.stage is not None and len(program):
+            found.append(program)
+    return found
+
+
+def run(library: Path, count: int, seed: int) -> None:
+    """Mutate and ask so many times."""
+    kernel, known = Kernel(library), programs()
+    answered = 0
+    for at in range(seed, seed + count):
+        try:
+            ask(kernel, mutated(known[at % len(known)], at), at)
+            answered += 1
+        except ProgramError:
+            continue
+    print(f"{count:,} Programs, {answered:,} of which the kernel answered for, nothing found")
+
+
+def main() -> int:
+    """Build the library, and start again with the sanitizers' runtime."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--library", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.library is not None:
+        run(options.library, options.count, options.seed)
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder, "libkernel.so")
+        build = [sys.executable, str(ROOT / "kernel" / "build.py"), str(library), "--check"]
+        subprocess.run(build, check=True)
+        asked = [["gcc", f"-print-file-name={name}"] for name in ("libasan.so", "libubsan.so")]
+        runtimes = [subprocess.check_output(each, text=True).strip() for each in asked]
+        own = [sys.executable, "-m", "fuzz.kernel", "--library", str(library)]
+        own += ["--count", str(options.count), "--seed", str(options.seed)]
+        # Python itself leaks, and what it allocates is watched only without its own allocator
+        kept = {"LD_PRELOAD": ":".join(runtimes), "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc"}
+        return subprocess.run(own, env={**os.environ, **kept}, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,50 @@
+// The flat tables of a scene, as scenelang/drawing/tables.py fills them and has checked them; its dtypes mirror these.
+// Distances are in world units, or in leaf units behind an object's way to its leaf. Matrices lie row by row.
+#pragma once
+#include <stdint.h>
+enum { DEEP = 15, REGISTER = 12, CELL_ROWS = 5, FEATURES = 7, UNITS = 8, LINES = 27, WIDEST = 32, STEPS = 9 };
+enum { DRAWS = 1, CLIPS = 2, BEGINS = 4, BOXED = 8, SKINNED = 16, BUMPY = 32, STOPS = 64, MEDIUM = 128 };
+enum { MAP, TURN_Z, TURN_Y };  // kinds of steps
+enum { NORMS, SILU, GRID, GROWN, FORMULA };  // kinds of decoders
+enum { SPHERE, TORUS, BOX, CYLINDER, CONE, CAPSULE, OCTAHEDRON };  // formulas
+enum { PICTURE, SPACE, LINEAR, RADIAL };  // kinds of textures
+enum { TINT, GREY, HUE };  // operations on a colour
+
+typedef struct {  // one object
+    float map[12];  // into the space in which it lies in a ball about the origin
+    float scale;  // world distance per leaf distance
+    float reach, moved;  // a leaf ball of radius r lies in one of radius reach r + moved behind the map
+    float radius;  // leaf units beyond which it changes nothing
+    float ball;  // radius of the ball around that behind the map
+    float rate;  // at which its distance changes in that at most, per step of 1 behind the map
+    float centre[3], extent;  // a ball of the world around that
+    float low[3], high[3];  // a box behind the map, of a `BOXED` one
+    float amount, frequency;  // of a displacement
+    float first, wall, last, late;  // of a skin: |d - first| - wall - last
+    float look[REGISTER];
+    int32_t flags, ends, decoder, step, steps, texture, depth, path[DEEP];
+} Object;
+typedef struct { int32_t kind; float twirl, rate, map[12]; } Step;
+typedef struct {
+    int32_t kind;
+    int32_t units, size[UNITS], inner, features, feature[FEATURES];  // of norm units: lines of each, lines inside
+    int32_t width;  // units of a hidden layer, nodes along an axis of a grid, or which formula
+    float radius, line[LINES][8];  // weights of the features that there are; the last is the bias
+    const float *data;  // weights of layers, or nodes
+} Decoder;
+typedef struct {  // gates: that of distance, two of colour, two of the kind of material
+    float own[CELL_ROWS], past[CELL_ROWS], bias[CELL_ROWS], candidate, bump;
+} Cell;
+typedef struct {
+    int32_t kind, wide, high, stops, steps;  // sides of texels, or of colours of space; numbers of stops and steps
+    float place[6];  // from leaf coordinates x and y to the picture
+    const float *data, *step;  // texels (3, high, wide), nodes (3, n, n, n) or stops (k, 4); steps (k, 4)
+} Texture;
+typedef struct {
+    int32_t objects, groups, deepest, rows, switched, clipping;  // rows of the register; the last that come with a kind
+    const Object *object;
+    const Step *step;
+    const Decoder *decoder;
+    const Cell *cell;  // of the objects, then of the groups
+    const Texture *texture;
+} Scene;
