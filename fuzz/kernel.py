@@ -30,6 +30,7 @@ ROOT = Path(__file__).parents[1]
 POINTS = 100  # asked of each Program
 
 
+@np.errstate(all="ignore")
 def mutated(program: Program, seed: int) -> Program:
     """A Program with some of its rows changed; raises `ProgramError` where it is none."""
     rng = np.random.default_rng(seed)
@@ -53,8 +54,7 @@ def mutated(program: Program, seed: int) -> Program:
         else:
             forms[row] = rng.integers(-1, 1 + len(program.elements))
             worn[row] = rng.integers(-1, 1 + len(program.palette))
-    with np.errstate(all="ignore"):
-        return replace(program, vectors=vectors, tokens=tokens, forms=forms, worn=worn)
+    return replace(program, vectors=vectors, tokens=tokens, forms=forms, worn=worn)
 
 
 def ask(kernel: Kernel, program: Program, seed: int) -> None:
