@@ -30,8 +30,8 @@ from scenelang.compiler.manifest import Manifest, load_manifest
 from scenelang.drawing.how import keep_memory
 from scenelang.drawing.image import Image, enlarged, from_samples
 from scenelang.drawing.metrics import flip, over_white, psnr
-from scenelang.drawing.work import Load, load_of
 from scenelang.drawing.torch_backend import open_model
+from scenelang.drawing.work import Load, load_of
 from scenelang.language.scene import Scene
 from scenelang.output.frontier import Cost, error_scale, reference_of, yardstick
 

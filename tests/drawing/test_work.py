@@ -145,6 +145,8 @@ def test_the_clock_ends_what_was_foretold_wrongly(text: str, monkeypatch: pytest
         patch.setattr(draw, "allowed_s", lambda _: -1.0)
         with pytest.raises(RenderError, match=r"more work than was foretold.*--patient"):
             nsg.render(drawn)
+        with pytest.raises(RenderError, match="more work than was foretold"):
+            nsg.render_outputs(drawn, ["alpha"])
         patient = nsg.render(drawn, patient=True)
     assert np.array_equal(nsg.render(drawn), patient)
 
