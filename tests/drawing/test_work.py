@@ -78,6 +78,7 @@ def test_light_from_everywhere_is_foretold(text: str, monkeypatch: pytest.Monkey
     load = load_of(drawn)
     assert 1 / 4 < load.light / counted(drawn, monkeypatch) < 4
     assert load_of(drawn) == load
+    assert (load_of(replace(drawn, samples=16)).light > load.light) == ("metal" in text)
     assert load_of(program(BALL)).light == 0
 
 
