@@ -278,7 +278,8 @@ def _neural(program: Program, wanted: Sequence[Output], how: How) -> Outputs:
             raise RenderError(f"model `{program.model}` draws colours only")
         keep_memory()
         field = field_of(program, how.backend == "exact")
-        result = program_outputs(field, program, threads=how.threads or threads_for(program.canvas))
+        threads = how.threads or threads_for(program.canvas)
+        result = program_outputs(field, program, threads=threads, patient=how.patient)
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     except (ModelError, ProgramError) as error:

@@ -92,7 +92,9 @@ def _of_solids(program: Program, network: Any) -> Load:
         if work.met > enough:
             break
     each = some.step * work.met / (sides[0] * sides[1])
-    light = 0.0 if stage.sky is None else some.step * light_work(field, stage, program.canvas)
+    light = (
+        0.0 if stage.sky is None else some.step * light_work(field, stage, program.canvas, program.samples)
+    )
     return Load(len(program), pixels, each * pixels, each * min(width, height), light)
 
 

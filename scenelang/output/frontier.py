@@ -129,6 +129,7 @@ def load_frontier(model: str) -> Frontier | None:
     return Frontier.from_json(data)
 
 
+LIGHT_SPREAD: Final = 2.0  # times as long as foretold takes light from everywhere, seldom more
 UNITS: Final = (1.0, 1e3, 1e6, 1e6, 1e3)  # of the terms of a `Cost`
 _ROUNDS: Final = 15  # of the yardstick
 OBJECTS: Final = 4
@@ -196,7 +197,8 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
     for point in points:
         if point.cost is None or point.flip is None:
             continue
-        ms = predicted_ms(point.cost, load, point.skip) * point.cost.spread * scale
+        own = predicted_ms(point.cost, load, point.skip) * point.cost.spread
+        ms = (own + LIGHT_SPREAD * LIGHT_MS * load.light) * scale  # which is the same for all
         flip = 1.0 if load.light else min(1.0, point.flip.bound * error_scale(canvas, load.objects))
         result.append(Offer(point, ms, flip))
     return sorted(result, key=lambda o: (o.ms, o.flip))
@@ -254,8 +256,7 @@ def _nearest(offers: Sequence[Offer], limits: Limits) -> str:
 def predicted_ms(cost: Cost, load: Load, skip: bool) -> float:
     """Likely milliseconds of a frame on the measured machine; at most `Cost.spread` times as many."""
     terms = (cost.frame, cost.thousand_objects, cost.megapixel, cost.megameeting, cost.outline)
-    own = sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
-    return own + LIGHT_MS * load.light
+    return sum(t * v / unit for t, v, unit in zip(terms, load.row(skip), UNITS, strict=True))
 
 
 def yardstick() -> float:

@@ -78,6 +78,7 @@ def test_light_from_everywhere_is_foretold(text: str, monkeypatch: pytest.Monkey
     load = load_of(drawn)
     assert 1 / 4 < load.light / counted(drawn, monkeypatch) < 4
     assert load_of(drawn) == load
+    assert (load_of(replace(drawn, samples=16)).light > load.light) == ("metal" in text)
     assert load_of(program(BALL)).light == 0
 
 
@@ -145,6 +146,8 @@ def test_the_clock_ends_what_was_foretold_wrongly(text: str, monkeypatch: pytest
         patch.setattr(draw, "allowed_s", lambda _: -1.0)
         with pytest.raises(RenderError, match=r"more work than was foretold.*--patient"):
             nsg.render(drawn)
+        with pytest.raises(RenderError, match="more work than was foretold"):
+            nsg.render_outputs(drawn, ["alpha"])
         patient = nsg.render(drawn, patient=True)
     assert np.array_equal(nsg.render(drawn), patient)
 

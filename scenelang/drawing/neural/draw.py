@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import field, replace
 from typing import Unpack
 
@@ -105,6 +106,17 @@ class Drawing(Record, frozen=False):
     coarser: str | None = None  # why it is coarser than asked for, if it is
 
 
+@contextmanager
+def _timed(network: FramedNetwork | SolidNetwork, program: Program, patient: bool) -> Iterator[None]:
+    """Have the network raise `RenderError` when the time of a picture is over, unless patient."""
+    if not patient:
+        network.until_s = time.process_time() + allowed_s(program.canvas)
+    try:
+        yield
+    finally:
+        network.until_s = float("inf")
+
+
 def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
@@ -112,12 +124,9 @@ def draw_objects(
     plan, patient = Plan(program.canvas), run.pop("patient", False)
     if not patient:
         plan = plan_of(program, network, run.get("samples", "adaptive"))
-        network.until_s = time.process_time() + allowed_s(program.canvas)
-    try:
+    with _timed(network, program, patient):
         coarse = program if plan.canvas == program.canvas else replace(program, canvas=plan.canvas)
         drawing = _drawn(network, coarse, skip, plan.even, run)
-    finally:
-        network.until_s = float("inf")
     return replace(drawing, image=enlarged(drawing.image, program.canvas), coarser=plan.told)
 
 
@@ -218,8 +227,17 @@ def as_image(picture: npt.NDArray[np.float32]) -> Image:
     return from_samples(picture[..., :3], picture[..., 3] if picture.shape[2] == 4 else None)
 
 
-def program_outputs(network: FramedNetwork | SolidNetwork, program: Program, *, threads: int = 1) -> Outputs:
-    """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene."""
+def program_outputs(
+    network: FramedNetwork | SolidNetwork, program: Program, *, threads: int = 1, patient: bool = False
+) -> Outputs:
+    """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene, and
+    `RenderError` where the time of a picture is over.
+    """
+    with _timed(network, program, patient):
+        return _outputs(network, program, threads)
+
+
+def _outputs(network: FramedNetwork | SolidNetwork, program: Program, threads: int) -> Outputs:
     if program.stage is not None:
         solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)

@@ -561,7 +561,7 @@ class Around:
         return (mean + (across * rise + down * fall) / total.clip(1e-9)).clip(0.0), most > 0.5
 
 
-def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int]) -> float:
+def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples: int) -> float:
     """About how often the network is asked for what arrives from everywhere: rays, each as probes ask."""
     xp, count, walls = field.xp, len(field.solids), hollow(field)
     opaque = bool((np.asarray(xp.to_numpy(field.looks))[-1] < 0.5).any())
@@ -573,7 +573,7 @@ def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int]) -> floa
     step = max(1, round(min(canvas) / side))
     points = (-(-canvas[0] // step) + 1) * (-(-canvas[1] // step) + 1)
     number = MORE_RAYS[walls] * (nodes * RAYS[walls][0] + 2 * points * rays)
-    number += SHINY * field.rough * canvas[0] * canvas[1]
+    number += SHINY * field.rough * canvas[0] * canvas[1] * (samples / 4)
     # from balls around objects to places in those of others
     u, v, r, turn = spread(np.arange(PROBES))
     own, other = np.arange(PROBES) * 7919 % count, (np.arange(PROBES) * 104729 + count // 2) % count
