@@ -22,6 +22,7 @@ from scenelang.language.reports import WIDTH, paint, printable, render_text
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+STDOUT = "-", "/dev/stdout"  # names of standard output where a command writes to a file
 _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
 
@@ -53,7 +54,7 @@ def say_trouble(message: str) -> None:
 
 def put_out(result: str | bytes, out: str | None) -> None:
     """Write a command's result to a file, whole or not at all; ``-`` or None is standard output."""
-    if out is None or out == "-":
+    if out is None or out in STDOUT:
         click.echo(result, nl=False)
         return
     write_output(out, result.encode() if isinstance(result, str) else result)
