@@ -63,9 +63,7 @@ def streamed(ctx: click.Context, out: str, suffix: str) -> str:
     if out not in STDOUT and (not os.path.exists(out) or os.path.isfile(out) or os.path.isdir(out)):
         return out
     if out in STDOUT and sys.stdout.isatty():
-        raise click.UsageError(
-            "standard output is a terminal, which shows no such data; name a file with -o."
-        )
+        raise click.UsageError("standard output is a terminal, which shows no such data; name a file.")
     file = Path(ctx.with_resource(tempfile.TemporaryDirectory()), f"stdout{suffix}")
     ctx.meta[str(file)] = "standard output" if out in STDOUT else out
 

@@ -75,12 +75,13 @@ def show_difference(name: str, before: str, after: str, color: str = "auto") -> 
     from difflib import unified_diff
 
     painted = wants_color(sys.stdout, color)
+    end = "\r" if "\r\n" in before and "\r\n" in after else ""  # the same on both sides: nothing to show
     # text after the last line feed is a line unless it is empty
     one, other = (re.findall(r"[^\n]*\n|[^\n]+", text) for text in (before, after))
     for line in unified_diff(one, other, name, name):
         style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
         text = line.removesuffix("\n")
-        safe = printable(text) if painted or sys.stdout.isatty() else text
+        safe = printable(text.removesuffix(end)) if painted or sys.stdout.isatty() else text
         click.echo(paint(style, safe, painted), color=True)
         if text == line:
             click.echo("\\ No newline at end of file")

@@ -34,18 +34,7 @@ _SECTIONS: Final = {
     "Meshes": "--resolution",
 }
 
-_OF_SHAPES: Final = (
-    "files",
-    "out",
-    "format",
-    "defines",
-    "frame",
-    "model",
-    "root",
-    "backend",
-    "strict",
-    "verbose",
-)
+_OF_SHAPES: Final = "files out format defines frame model root backend strict verbose".split()
 """Parameters that shapes have too."""
 
 
