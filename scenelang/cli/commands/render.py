@@ -34,7 +34,9 @@ _SECTIONS: Final = {
     "Meshes": "--resolution",
 }
 
-_OF_SHAPES: Final = "files out format defines frame model root backend strict verbose".split()
+_OF_SHAPES: Final = (
+    "files", "out", "format", "defines", "frame", "model", "root", "backend", "strict", "verbose"
+)  # fmt: skip
 """Parameters that shapes have too."""
 
 
